@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 import aerodaas
 from tools.fuzz.coverage import Coverage
 
@@ -39,12 +41,14 @@ def test_only_new_lines_of_ours_count() -> None:
     assert not _watched(coverage, theirs, 0)
 
 
-def test_a_function_called_often_still_tells_a_new_line() -> None:
-    """Within as many calls and inputs as are left out at a time."""
-    ours = _function(Path(aerodaas.__file__).parent)
+@pytest.mark.parametrize(("before", "share"), [(200, 1), (1000, 4), (5000, 16)])
+def test_after_many_inputs_a_new_line_is_still_told(before: int, share: int) -> None:
+    """Within as many calls and inputs as are left out at a time; that of a new function, too."""
+    ours, new = (_function(Path(aerodaas.__file__).parent) for _ in range(2))
     coverage = Coverage()
-    for _ in range(1000):
+    for _ in range(before):
         _watched(coverage, ours, 0, times=5)
     assert not coverage.grew
-    assert any([_watched(coverage, ours, 1, times=16) for _ in range(4)])  # noqa: C419 - all of them
-    assert _watched(coverage, _function(Path(aerodaas.__file__).parent), 0)
+    for function, number, times in ((ours, 1, 16), (new, 0, 1)):
+        told = [_watched(coverage, function, number, times) for _ in range(share)]
+        assert sum(told) == 1

@@ -18,18 +18,17 @@ _PATIENCE = 64
 """Calls of a function without a new line after which only some of its calls are watched."""
 _SHARE = 16
 """One call of so many is watched then."""
-_QUIET = 256
-"""Inputs without a new line after which only some inputs are watched."""
-_WATCHED = 4
-"""One input of so many is watched then."""
+_WATCHED = ((4096, 16), (256, 4), (0, 1))
+"""Inputs so far, and of how many inputs one is watched from then on."""
 
 
 class Coverage:
     """Lines reached so far, by the interpreter's trace hook, in this thread and our own files.
 
-    Other code runs at full speed. So do most inputs, and most calls of a function, once nothing new
-    has been seen for long: a flight's loops would otherwise take three times as long. What is
-    watched depends on the inputs alone, so that the same seed makes the same inputs.
+    Other code runs at full speed. So do most inputs after the first ones, and most calls of a
+    function that has shown nothing new for long: a flight's loops would otherwise take three times
+    as long. What is watched depends on the inputs alone, so that the same seed makes the same
+    inputs.
     """
 
     def __init__(self) -> None:
@@ -37,15 +36,14 @@ class Coverage:
         # here, so that its identity stays its own.
         self._functions: dict[int, _Function] = {}
         self._grew = False
-        self._quiet = 0
-        """Inputs since the last new line."""
+        self._inputs = 0
 
     @contextmanager
     def watch(self) -> Iterator[None]:
         """Note the lines that the block reaches."""
         self._grew = False
-        self._quiet += 1
-        if self._quiet > _QUIET and self._quiet % _WATCHED:
+        self._inputs += 1
+        if self._inputs % next(share for inputs, share in _WATCHED if self._inputs > inputs):
             yield
             return
         sys.settrace(self._call)
@@ -73,7 +71,6 @@ class Coverage:
 
     def _note(self) -> None:
         self._grew = True
-        self._quiet = 0
 
 
 class _Function:

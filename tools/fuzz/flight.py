@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import queue
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 
 from aerodaas.config.model import LimitsConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.commands import AddNavigation, Start, Steer, TakeControls
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
@@ -20,14 +21,16 @@ from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.geometry import Vector
 from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, Vehicle, VehicleState
-from aerodaas.types.waypoints import Waypoint, WaypointType
+from aerodaas.types.waypoints import VelocityCommand, Waypoint, WaypointType
 
 __all__ = [
     "LIMITS",
+    "START",
     "TURN",
     "FuzzedFlight",
     "ViolationError",
     "clock_of",
+    "queues_of",
     "replaced",
     "require",
 ]
@@ -42,7 +45,11 @@ LIMITS = {
     "max_range": 12.0,
     "geofence": {"polygon": [[-8, -8], [8, -8], [8, 8], [-8, 8]], "floor": 0.3, "ceiling": 6.0},
 }
-"""Of the fuzzed robot: a small fence, which a wrong setpoint soon leaves."""
+"""Of the fuzzed robot."""
+START = (7.99, 7.99, 0.0)
+"""Where it stands: in a corner of its fence, which a wrong setpoint leaves at once."""
+_HASTE = VelocityCommand(forward=9.0, left=5.0, up=3.0, yaw_rate=9.0)
+"""Asked by hand: faster than allowed, and out of the fence."""
 _SLACK = 1e-3
 _NANOSECONDS = 1_000_000_000
 _POLE = 90.0
@@ -62,8 +69,12 @@ def require(holds: object, what: str) -> None:
 class FuzzedFlight:
     """A mission on a connected vehicle, turned 20 times a second of a clock of its own."""
 
+    by_hand = False
+    """Whether somebody flies by hand, who wants to leave the fence as fast as possible: waypoints
+    beyond it are refused before they are flown to."""
+
     def __init__(self, vehicle: Vehicle, robot: RobotConfig) -> None:
-        """Plan a few waypoints, one of them beyond the fence."""
+        """Plan a few waypoints."""
         self._vehicle = vehicle
         self._limits: LimitsConfig = robot.limits
         self.mission = Mission(
@@ -87,12 +98,15 @@ class FuzzedFlight:
     def turn(self) -> None:
         """Turn once, and check what was sent and what is believed."""
         self._now += round(TURN * _NANOSECONDS)
+        if self.by_hand:
+            self.mission.handle(TakeControls("somebody", 1), self._now)
+            self.mission.handle(Steer(1, _HASTE), self._now)
         record = self._loop.turn(self._now)
-        if record.sent is not None:
-            self._check_setpoint(record.sent)
         state = self._loop.state
         if state is not None:
             _check_state(state)
+        if record.sent is not None:
+            self._check_setpoint(record.sent, None if state is None else state.odometry.position)
         printable = all(text.isprintable() for text in self.mission.status.faults)
         require(printable, "a fault that cannot be printed")
 
@@ -112,9 +126,11 @@ class FuzzedFlight:
         within = fence.inside(place) and fence.floor - 1.0 <= place[2] <= fence.ceiling + _SLACK
         require(near or within, "a place beyond the fence")
 
-    def _check_setpoint(self, sent: Setpoint) -> None:
+    def _check_setpoint(self, sent: Setpoint, position: Vector | None) -> None:
         if not isinstance(sent, PositionSetpoint):
             self.check_motion(sent.velocity, sent.yaw_rate)
+            if position is not None and np.isfinite(position).all():
+                self._check_way(position, position + TURN * sent.velocity)
             return
         require(np.isfinite(sent.position).all(), "a place that is no number")
         require(self.mission.fence.inside(sent.position), "a place beyond the fence")
@@ -122,6 +138,17 @@ class FuzzedFlight:
         require(away <= self._limits.max_range + _SLACK, "a place beyond the range")
         speed = math.hypot(self._limits.max_speed, self._limits.max_climb)
         require(sent.speed is None or 0.0 < sent.speed <= speed + _SLACK, "faster than allowed")
+
+    def _check_way(self, position: Vector, after: Vector) -> None:
+        fence = self.mission.fence
+        if fence.inside(position):
+            require(fence.inside(after), "a way out of the fence")
+        else:
+            out = (position - fence.nearest_allowed(position))[:2]
+            onwards = float((after - position)[:2] @ out)
+            require(onwards <= _SLACK * float(np.linalg.norm(out)), "away from the fence")
+        top = max(fence.ceiling, float(position[2])) + _SLACK
+        require(float(after[2]) <= top, "a way above the ceiling")
 
 
 def _check_state(state: VehicleState) -> None:
@@ -153,3 +180,26 @@ def replaced(*places: tuple[ModuleType | type, str, Any]) -> Iterator[None]:
 def clock_of(rig: Any, sleep: Any) -> SimpleNamespace:  # noqa: ANN401 - anything with `now`
     """Stand-in for the module `time`, whose clock is the attribute `now` of `rig`."""
     return SimpleNamespace(monotonic=lambda: rig.now, sleep=sleep, time=lambda: 1.7e9 + rig.now)
+
+
+def queues_of(rig: Any) -> SimpleNamespace:  # noqa: ANN401 - anything with `now` and `advance`
+    """Stand-in for the module `queue`, whose readers let the time of `rig` pass while they wait."""
+    return SimpleNamespace(SimpleQueue=lambda: _Queue(rig), Empty=queue.Empty)
+
+
+class _Queue:
+    """A queue that is filled while its reader waits."""
+
+    def __init__(self, rig: Any) -> None:  # noqa: ANN401
+        self._rig = rig
+        self._items: list[Any] = []
+        self.put: Callable[[Any], None] = self._items.append
+
+    def get(self, timeout: float) -> Any:  # noqa: ANN401
+        """The next item, within `timeout` seconds of the clock."""
+        end = self._rig.now + timeout
+        while not self._items:
+            if self._rig.now >= end:
+                raise queue.Empty
+            self._rig.advance()
+        return self._items.pop(0)

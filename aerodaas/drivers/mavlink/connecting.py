@@ -22,7 +22,7 @@ from aerodaas.drivers.mavlink.microservices.journal import Journal
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.state.alignment import Alignment, global_origin
+from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
@@ -90,20 +90,19 @@ def establish(
     """Wait until it is ready, see to its protections and its fence; raises VehicleError."""
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
-    frame = _frame(telemetry, robot, settings, home, pause)
+    # Now: its place may be lost again, which changes nothing any more, while the rest is seen to.
+    alignment = Alignment(_frame(telemetry, robot, settings, home, pause), telemetry)
     journal = Journal(_own_name(autopilot, telemetry, settings, link.target[0], pause))
     fallback = Fallback(link, autopilot, settings, name=robot.id, journal=journal)
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
-        origin = global_origin(telemetry, frame)
         if settings.fence != "off" and not settings.observe:
-            upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
+            upload_fence(link, autopilot, robot.limits.geofence, alignment.origin, settings.fence)
         if settings.fallback != "ignore":
             ways = settings.way_home
-            plan = [] if isinstance(ways, str) else way_home_items(robot, ways, origin)
+            plan = [] if isinstance(ways, str) else way_home_items(robot, ways, alignment.origin)
             fallback.establish(robot.limits.geofence.ceiling, telemetry.software, plan)
     _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
-    alignment = Alignment(frame, telemetry)
     return Connection(link, autopilot, commander, departure, alignment, fallback, link.target)
 
 
@@ -163,27 +162,24 @@ def _frame(
     pause: Callable[[], None],
 ) -> LocalFrame:
     start = np.array(robot.start, dtype=np.float64)
-    assert telemetry.position is not None  # noqa: S101 - it is ready
-    assert telemetry.place is not None  # noqa: S101 - the same
+    took_off = _armed_at(telemetry, pause) if telemetry.armed else None
+    place, position = telemetry.whereabouts()
     if settings.frame == "home" and home is not None:
         up = float(start[2])
-        if telemetry.armed:
-            up += float(
-                ned_to_enu(telemetry.position)[2] - ned_to_enu(_armed_at(telemetry, pause))[2]
-            )
-        return LocalFrame.over_home(home, *telemetry.place, up, telemetry.position)
-    ned = _armed_at(telemetry, pause) if telemetry.armed else telemetry.position
+        if took_off is not None:
+            up += float(ned_to_enu(position)[2] - ned_to_enu(took_off)[2])
+        return LocalFrame.over_home(home, *place, up, position)
     if home is not None:
-        east, north, _ = home.to_local(*telemetry.place, home.altitude)
+        east, north, _ = home.to_local(*place, home.altitude)
         away = float(np.hypot(east - start[0], north - start[1]))
-        if away > _FAR and not telemetry.armed:
+        if away > _FAR and took_off is None:
             _log.warning(
                 "%s stands %.0f m from where the environment's home and its start say: global "
                 'waypoints would lead astray; mend home, or set "frame": "home"',
                 robot.id,
                 away,
             )
-    return LocalFrame.standing_at(start, ned)
+    return LocalFrame.standing_at(start, position if took_off is None else took_off)
 
 
 def _armed_at(telemetry: Telemetry, pause: Callable[[], None]) -> Vector:

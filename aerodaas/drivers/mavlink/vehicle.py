@@ -168,6 +168,7 @@ class MavlinkVehicle:
                 pause=self._pause,
             )
             self._report.alignment = self._connection.alignment
+            self._connection.alignment.require_same_boot()
         except BaseException:
             self.close()
             raise

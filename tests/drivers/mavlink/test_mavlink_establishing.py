@@ -192,6 +192,31 @@ def test_a_vehicle_in_the_air_is_given_three_seconds_to_say_where_it_took_off(
     assert meeting.now == 105.75
 
 
+def test_who_loses_its_place_before_its_frame_lies_is_not_met(meeting: Meeting) -> None:
+    """In the seconds in which it is asked where it took off."""
+    meeting.telemetry.armed = True
+
+    def lost() -> None:
+        meeting.telemetry.place, meeting.telemetry.home = None, np.array([10.0, 20.0, 0.0])
+
+    meeting.deeds[101.0] = lost
+    with pytest.raises(VehicleError, match="lost its position while being connected"):
+        meeting.establish()
+
+
+def test_who_loses_its_place_once_its_frame_lies_is_met(meeting: Meeting) -> None:
+    """Where zero lies is known by then, whatever is seen to afterwards."""
+    origin = meeting.establish().alignment.origin
+    meeting.telemetry.software = ""
+
+    def lost() -> None:
+        meeting.telemetry.place, meeting.telemetry.software = None, "4.7.0"
+
+    meeting.deeds[meeting.now + 0.5] = lost
+    assert meeting.establish().alignment.origin == origin
+    assert meeting.telemetry.place is None
+
+
 def lose(meeting: Meeting, what: str) -> None:
     """Have it not know something."""
     if what == "place":

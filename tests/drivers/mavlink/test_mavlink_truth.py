@@ -12,6 +12,7 @@ import pytest
 from mavlink_flights import flight
 from stepped import Stepped
 
+from aerodaas.drivers.mavlink import connecting
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
@@ -132,6 +133,23 @@ def test_an_autopilot_that_starts_anew_on_the_ground(
         assert state.odometry.position == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
         assert world.vehicle.preflight() == []
         assert world.guide(2.0).odometry.height == pytest.approx(2.0, abs=0.3)
+
+
+def test_an_autopilot_that_starts_anew_while_being_connected(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where its old frame lay says nothing about the new one: it is not flown by it."""
+    world = Stepped(monkeypatch, fence="land")
+
+    def uploaded(*_: object) -> None:
+        world.advance(20.0)
+        world.autopilot.restart()
+        world.advance(8.0)
+
+    monkeypatch.setattr(connecting, "upload_fence", uploaded)
+    with pytest.raises(VehicleError, match="started anew while being connected"), world:
+        pass
+    assert not world.vehicle.connected
 
 
 def test_a_local_frame_that_jumps(world: Stepped) -> None:

@@ -21,18 +21,21 @@ from aerodaas.mission.commands import Answer, Command, OpenStream, StreamItem
 from aerodaas.types.data import Alert
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
-from tools.fuzz.flight import LIMITS, TURN, FuzzedFlight, require
+from tools.fuzz.flight import LIMITS, START, TURN, FuzzedFlight, require
 
 __all__ = ["run", "seeds"]
 
 _ENVIRONMENT = EnvironmentConfig.model_validate(
-    {"robots": [{"id": "drone", "limits": LIMITS}], "simulation": {"world": "empty"}}
+    {
+        "robots": [{"id": "drone", "limits": LIMITS, "start": START}],
+        "simulation": {"world": "empty"},
+    }
 )
 _STREAM = "drone/remote"
 _REQUESTS = 8
 """Most requests of one input that are made."""
-_TURNS = 12
-"""Turns of the setpoint loop after each request."""
+_BETWEEN, _TURNS = 3, 12
+"""Turns of the setpoint loop between two requests, and after the last one."""
 _CLIMB = 80
 """Turns until the drone is on its way."""
 _OK = 200
@@ -62,6 +65,7 @@ def run(data: bytes) -> None:
     """Make the requests; the loop flies on, and what it sends stays within its limits."""
     link, app, loop = _service()
     link.begin()
+    link.flight.by_hand = bool(len(data) % 2)
     for line in data.split(b"\n")[:_REQUESTS]:
         path, _, body = line.partition(b" ")
         method = "GET" if path in {b"/status", b"/frame.jpg"} else "POST"
@@ -69,7 +73,8 @@ def run(data: bytes) -> None:
         require(code < _SERVERS_FAULT, f"an answer of code {code}")
         if method == "POST":
             require(answer["accepted"] == (code == _OK), "an answer that contradicts its code")
-        link.turn(_TURNS)
+        link.turn(_BETWEEN)
+    link.turn(_TURNS - _BETWEEN)
     kinds = {alert.kind for alert in link.flight.mission.alerts}
     require(not kinds & {"motors_stopped", "geofence", "turn_failed"}, f"alerts {kinds}")
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import random
 import struct
+from collections import deque
 from collections.abc import Iterable
 from typing import Any
 
@@ -12,22 +14,26 @@ import numpy as np
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink import connecting, vehicle
 from aerodaas.drivers.mavlink.control import watchdog
+from aerodaas.drivers.mavlink.microservices import parameters
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire import link
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import ned_to_enu
 from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
+    START,
     TURN,
     FuzzedFlight,
     ViolationError,
     clock_of,
+    queues_of,
     replaced,
     require,
 )
-from tools.fuzz.records import record, records
+from tools.fuzz.records import EARLY, QUIET, early, record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
@@ -36,6 +42,7 @@ _ROBOT = RobotConfig.model_validate(
         "id": "d",
         "driver": "mavlink",
         "limits": LIMITS,
+        "start": START,
         "settings": {"failsafes": "ignore", "ready_timeout": 2.0},
     }
 )
@@ -45,21 +52,37 @@ _KINDS = sorted(link._WANTED)  # noqa: SLF001 - every message that the driver re
 _LONGEST_BODY = 600
 _BYTES, _MESSAGE, _FORGED, _OTHER = range(4)
 """Bytes as they are; a message of the vehicle, of a stranger, of another system: kind, payload."""
-_QUIET = 0x80
-"""Bit of a record: the vehicle itself says nothing until the next one."""
 _LONGEST_REST = 40
 _FIRST = 3
 """Turns in each of which the vehicle says everything, so that it is soon met."""
 _WORD = 4
 """Bytes of most fields."""
+_SILENT = 5.0
+"""Seconds of silence after which a vehicle on the ground may have another address."""
+_PARAMETERS = {
+    "MAV_GCS_SYSID": 245,
+    "MAV_GCS_SYSID_HI": 0,
+    "FS_GCS_TIMEOUT": 3,
+    "RTL_ALT_M": 3,
+    "RTL_ALT_FINAL_M": 0,
+    "FS_OPTIONS": 8,
+    "FS_GCS_ENABLE": 1,
+    "BATT_FS_LOW_ACT": 2,
+    "FS_EKF_ACTION": 1,
+}
+"""Of the vehicle; it does not know others."""
 
 
 class _Rig:
     """An ArduCopter that flies at once as it is told, with its driver; `now` is the clock."""
 
-    def __init__(self) -> None:
+    def __init__(self, early: deque[tuple[int, int, bytes]]) -> None:
         self.now = 1000.0
+        self.early = early
+        self.connected = False
         self.armed, self.rising, self.quiet = False, 0, False
+        self.mode = _GUIDED
+        self._told: tuple[object, ...] = ()
         self.up = 0.0
         self.sent: list[Any] = []
         self._mav = mavlink.MAVLink(None, 1, 1)
@@ -68,6 +91,7 @@ class _Rig:
         self.vehicle = MavlinkVehicle(_ROBOT, EnvironmentConfig(robots=[_ROBOT]))
         self.link: MavlinkLink | None = None
         self._turns = 0
+        self._spoke_at, self._was_silent = math.inf, False
 
     def receive(self) -> list[tuple[bytes, tuple[str, int]]]:
         """As the wire."""
@@ -76,8 +100,7 @@ class _Rig:
 
     def send(self, packet: bytes, peers: tuple[object, ...]) -> None:
         """As the wire: obey, if it is for this vehicle alone."""
-        known = self.link is not None and self.link._pins.target is not None  # noqa: SLF001
-        require(not known or peers == (_OWN,), "told a stranger")
+        require(not self.connected or peers == (_OWN,) or self._may_move(), "told a stranger")
         message = self._ear.decode(bytearray(packet))
         kind = message.get_type()
         if kind == "SET_POSITION_TARGET_LOCAL_NED":
@@ -87,23 +110,49 @@ class _Rig:
                 self.armed = message.param1 == 1
             elif message.command == mavlink.MAV_CMD_NAV_TAKEOFF:
                 self.rising = 4
+            elif message.command == mavlink.MAV_CMD_DO_SET_MODE:
+                self.mode = round(message.param2)
+            elif message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
+                self.hear(_version())
             self.hear(mavlink.MAVLink_command_ack_message(message.command, 0, 0, 0, 245, 191))
+        elif kind == "PARAM_REQUEST_READ" and message.param_id in _PARAMETERS:
+            self.hear(_parameter(message.param_id))
 
     def close(self) -> None:
         """As the wire."""
 
     def hear(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """Let the driver hear a message of the vehicle."""
-        self.bytes(bytes(message.pack(self._mav)), _OWN)
+        self.arrive(bytes(message.pack(self._mav)), _OWN)
 
-    def bytes(self, content: bytes, peer: tuple[str, int]) -> None:
+    def arrive(self, content: bytes, peer: tuple[str, int]) -> None:
         """Let the driver hear a datagram."""
+        if peer == _OWN:
+            self._was_silent, self._spoke_at = self._may_move(), self.now
         self._inbox.append((content, peer))
+
+    def _may_move(self) -> bool:
+        """Whether it was silent for so long that another address may be taken for its own."""
+        return self._was_silent or self.now - self._spoke_at > _SILENT
+
+    def hear_record(self, kind: int, body: bytes) -> None:
+        """Let the driver hear a record."""
+        self.quiet = bool(kind & QUIET)
+        sender = kind & 3
+        if sender == _BYTES:
+            self.arrive(body, _OWN)
+        elif body:
+            number, system = _KINDS[body[0] % len(_KINDS)], 2 if sender == _OTHER else 1
+            peer = _STRANGER if sender == _FORGED else _OWN
+            self.arrive(_packet(number, body[1:], system), peer)
 
     def advance(self, _: float = 0.0) -> None:
         """Let a turn's time pass at both ends."""
         self.now = round(self.now + TURN, 6)
         self._turns += 1
+        if self.early:
+            kind, _, body = self.early.popleft()
+            self.hear_record(kind, body)
         if not self.quiet:
             self._speak()
         if self.link is not None:
@@ -115,12 +164,12 @@ class _Rig:
             self.rising, climb = self.rising - 1, 6.0
             self.up += 0.3
         boot = round((self.now - 900.0) * 1e3)
-        still = self._turns % 10 and not climb and self._turns > _FIRST
-        if still:
+        before, self._told = self._told, (self.mode, self.armed, self.up, climb)
+        if self._told == before and self._turns > _FIRST and self._turns % 10:
             return
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
         for message in (
-            mavlink.MAVLink_heartbeat_message(2, 3, armed, _GUIDED, 4, 3),
+            mavlink.MAVLink_heartbeat_message(2, 3, armed, self.mode, 4, 3),
             mavlink.MAVLink_sys_status_message(1, 1, 1, 0, 12000, 500, 80, 0, 0, 0, 0, 0, 0),
             mavlink.MAVLink_extended_sys_state_message(0, 2 if self.up > 0.0 else 1),
             mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0),
@@ -133,8 +182,11 @@ class _Rig:
 
 
 def run(data: bytes) -> None:
-    """Fly, hear what `data` says in flight, and check every setpoint."""
-    rig = _Rig()
+    """Fly, hear what `data` says before and in flight, and check every setpoint."""
+    heard = list(records(data, _LONGEST_BODY))
+    first = early(heard)
+    later = heard[len(first) :]
+    rig = _Rig(first)
 
     def begin(started: MavlinkLink) -> None:
         rig.link = started
@@ -144,24 +196,38 @@ def run(data: bytes) -> None:
         (vehicle, "time", clock),
         (connecting, "time", clock),
         (watchdog, "time", clock),
+        (parameters, "time", clock),
+        (link, "queue", queues_of(rig)),
         (link, "open_transport", lambda *_: rig),
         (MavlinkLink, "_start", begin),
     ):
-        rig.vehicle.connect(1.0)
-        flight = FuzzedFlight(rig.vehicle, _ROBOT)
         try:
-            for _ in range(40):
-                _turn(rig, flight)
-                if flight.state is MissionState.ENROUTE:
-                    break
-            for kind, rest, body in records(data, _LONGEST_BODY):
-                _hear(rig, kind & 3, body)
-                rig.quiet = bool(kind & _QUIET)
-                for _ in range(1 + rest % _LONGEST_REST):
-                    _turn(rig, flight)
+            rig.vehicle.connect(1.0)
+        except VehicleError:
+            return
+        try:
+            require(not (rig.sent or rig.armed), "flown before the mission")
+            _fly(rig, later, by_hand=bool(len(data) % 2))
         finally:
             rig.quiet = False
             rig.vehicle.close()
+
+
+def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
+    assert rig.link is not None  # noqa: S101 - it is connected
+    if rig.link._pins.pin.address != _OWN:  # noqa: SLF001
+        return  # it was a stranger who was met first
+    rig.connected = True
+    flight = FuzzedFlight(rig.vehicle, _ROBOT)
+    for _ in range(40):
+        _turn(rig, flight)
+        if flight.state is MissionState.ENROUTE:
+            break
+    flight.by_hand = by_hand
+    for kind, rest, body in heard:
+        rig.hear_record(kind, body)
+        for _ in range(1 + rest % _LONGEST_REST):
+            _turn(rig, flight)
 
 
 def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
@@ -182,16 +248,6 @@ def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
             flight.check_place(frame.position(place), frame.position(position))
 
 
-def _hear(rig: _Rig, kind: int, body: bytes) -> None:
-    if kind == _BYTES:
-        rig.bytes(body, _OWN)
-        return
-    if not body:
-        return
-    number, system = _KINDS[body[0] % len(_KINDS)], 2 if kind == _OTHER else 1
-    rig.bytes(_packet(number, body[1:], system), _STRANGER if kind == _FORGED else _OWN)
-
-
 def _packet(number: int, payload: bytes, system: int) -> bytes:
     """A packet that is whole, whatever its payload."""
     size = mavlink.mavlink_map[number].unpacker.size
@@ -199,6 +255,18 @@ def _packet(number: int, payload: bytes, system: int) -> bytes:
     head = bytes([size, 0, 0, 0, system, 1, number & 255, number >> 8 & 255, number >> 16])
     crc = mavlink.x25crc(bytearray(head + payload + bytes([mavlink.mavlink_map[number].crc_extra])))
     return b"\xfd" + head + payload + struct.pack("<H", crc.crc)
+
+
+def _version() -> Any:  # noqa: ANN401
+    return mavlink.MAVLink_autopilot_version_message(
+        0, 0x04050000, 0, 0, 0, *[bytes(8)] * 3, 0, 0, 7
+    )
+
+
+def _parameter(name: str) -> Any:  # noqa: ANN401
+    value = float(_PARAMETERS[name])
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    return mavlink.MAVLink_param_value_message(name.encode(), value, kind, len(_PARAMETERS), 0)
 
 
 def _said(message: Any, kind: int = _MESSAGE, rest: int = 1) -> bytes:  # noqa: ANN401
@@ -216,7 +284,7 @@ def seeds() -> Iterable[bytes]:
     yield _said(here) + _said(look) + _said(beat)
     yield _said(mavlink.MAVLink_heartbeat_message(2, 3, 128, 6, 5, 3), rest=30)
     yield _said(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3), _FORGED) + _said(here, _OTHER)
-    yield _said(beat, _MESSAGE | _QUIET, 38) + _said(here)
+    yield _said(beat, _MESSAGE | QUIET, 38) + _said(here)
     yield _said(mavlink.MAVLink_attitude_message(5, 0, 0, 0, 0, 0, 0)) + _said(here, rest=20)
     yield _said(mavlink.MAVLink_statustext_message(2, b"PreArm: \xff\xfe", 3, 1)) + _said(
         mavlink.MAVLink_gps_raw_int_message(0, 3, 1, 2, 3, 4, 5, 6, 7, 8)
@@ -224,6 +292,8 @@ def seeds() -> Iterable[bytes]:
     yield _said(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 20)) + _said(
         mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0)
     )
+    yield _said(_parameter("FS_OPTIONS"), _MESSAGE | EARLY) + _said(_version(), _MESSAGE | EARLY)
+    yield _said(here, _MESSAGE | EARLY | QUIET) + _said(beat, _FORGED | EARLY) + _said(look)
     yield record(_BYTES, 1, bytes(beat.pack(mavlink.MAVLink(None, 1, 1))) + b"\xfd\x00\xfenoise")
 
 
@@ -251,11 +321,12 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
         kind, rest, body = found[index] if found else (0, 0, b"")
         match rng.randrange(6) if found else 0:
             case 0 | 1:
-                found.insert(index, (rng.choice(_SENT), rng.randrange(8), _body(rng)))
+                kind = rng.choice(_SENT) | kind & EARLY
+                found.insert(index, (kind, rng.randrange(8), _body(rng)))
             case 2:
                 del found[index]
             case 3:
-                kind = rng.choice((kind, kind ^ _QUIET, kind & _QUIET | rng.randrange(4)))
+                kind = rng.choice((kind ^ EARLY, kind ^ QUIET, kind & ~3 | rng.randrange(4)))
                 found[index] = (kind, rng.choice((rest, 0, _LONGEST_REST - 1)), body)
             case _:
                 place = rng.randrange(1, max(2, len(body) - _WORD + 1))

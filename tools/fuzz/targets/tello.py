@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import queue
 import random
 import re
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,24 +20,26 @@ from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
+    START,
     TURN,
     FuzzedFlight,
     ViolationError,
     clock_of,
+    queues_of,
     replaced,
     require,
 )
-from tools.fuzz.records import record, records
+from tools.fuzz.records import EARLY, QUIET, early, record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
-_ROBOT = RobotConfig.model_validate({"id": "t", "driver": "tello", "limits": LIMITS})
+_ROBOT = RobotConfig.model_validate(
+    {"id": "t", "driver": "tello", "limits": LIMITS, "start": START}
+)
 _OWN = ("192.168.10.1", 8889)
 _STICKS = re.compile(r"rc (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3})")
 _LONGEST_BODY = 2000
 _REPLY, _STATE, _STRANGERS_REPLY, _STRANGERS_STATE = range(4)
-_QUIET = 0x80
-"""Bit of a record: the Tello itself sends no state until the next one."""
 _LONGEST_REST = 40
 _FULL = 100
 """Percent."""
@@ -47,8 +49,9 @@ _FIELDS = tuple("pitch roll yaw vgx vgy vgz templ temph tof h bat baro time".spl
 class _Rig:
     """A Tello that rises at once and then says that it hovers; `now` is the clock."""
 
-    def __init__(self) -> None:
+    def __init__(self, early: deque[tuple[int, int, bytes]]) -> None:
         self.now = 1000.0
+        self.early = early
         self.quiet, self.height, self.motors = False, 0, 0.0
         self.flies = False
         self.commands: list[tuple[bytes, str, int]] = []
@@ -76,11 +79,21 @@ class _Rig:
             self.flies, self.height = False, 0
         self.commands.append((b"20" if text == "sdk?" else b"ok", *_OWN))
 
+    def hear_record(self, kind: int, body: bytes) -> None:
+        """Let the driver hear a record."""
+        self.quiet = bool(kind & QUIET)
+        host, port = ("192.168.10.66", 8889) if kind & 2 else _OWN
+        inbox = self.states if kind & 1 == _STATE else self.commands
+        inbox.append((body, host, port))
+
     def advance(self, _: float = 0.0) -> None:
         """Let a turn's time pass at both ends."""
         self.now = round(self.now + TURN, 6)
         self._turns += 1
         self.motors += TURN * self.flies
+        if self.early:
+            kind, _, body = self.early.popleft()
+            self.hear_record(kind, body)
         if not self.quiet and self._turns % 2:
             self.states.append((_state(h=self.height, time=int(self.motors)), *_OWN))
         if self.link is not None:
@@ -106,24 +119,6 @@ class _Socket:
         self._rig.obey(content.decode("ascii"))
 
 
-class _Answers:
-    """A queue whose reader lets time pass."""
-
-    def __init__(self, rig: _Rig) -> None:
-        self._rig = rig
-        self._items: list[str | None] = []
-        self.put: Callable[[str | None], None] = self._items.append
-
-    def get(self, timeout: float) -> str | None:
-        """The next item, within `timeout` seconds of the clock."""
-        end = self._rig.now + timeout
-        while not self._items:
-            if self._rig.now >= end:
-                raise queue.Empty
-            self._rig.advance()
-        return self._items.pop(0)
-
-
 def _taken(source: _Socket) -> list[tuple[bytes, str, int]]:
     arrived = source.inbox[:]
     source.inbox.clear()
@@ -131,8 +126,11 @@ def _taken(source: _Socket) -> list[tuple[bytes, str, int]]:
 
 
 def run(data: bytes) -> None:
-    """Fly, hear what `data` says in flight, and check every setpoint and command."""
-    rig = _Rig()
+    """Fly, hear what `data` says before and in flight, and check every setpoint and command."""
+    heard = list(records(data, _LONGEST_BODY))
+    first = early(heard)
+    later = heard[len(first) :]
+    rig = _Rig(first)
 
     def begin(started: TelloLink) -> None:
         rig.link = started
@@ -140,40 +138,35 @@ def run(data: bytes) -> None:
     def guard(*_: object) -> Any:  # noqa: ANN401
         return SimpleNamespace(note=lambda **_: None, close=lambda: None)
 
-    queues = SimpleNamespace(SimpleQueue=lambda: _Answers(rig), Empty=queue.Empty)
     clock = clock_of(rig, rig.advance)
     with replaced(
         *((module, "time", clock) for module in (handshake, link, vehicle)),
-        (handshake, "queue", queues),
+        (handshake, "queue", queues_of(rig)),
         (link, "bound_socket", rig.open),
         (link, "datagrams", _taken),
         (link, "DeadMan", guard),
         (TelloLink, "_start", begin),
     ):
-        heard = list(records(data, _LONGEST_BODY))
-        if heard and heard[0][0] & _QUIET:
-            # Some inputs begin before the handshake.
-            _hear(rig, *heard[0])
         try:
             rig.vehicle.connect(3.0)
         except VehicleError:
             return
         try:
-            _fly(rig, heard)
+            _fly(rig, later, by_hand=bool(len(data) % 2))
         finally:
             rig.quiet = False
             rig.vehicle.close()
 
 
-def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]]) -> None:
+def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
     flight = FuzzedFlight(rig.vehicle, _ROBOT)
     for _ in range(60):
         _turn(rig, flight)
         if flight.state is MissionState.ENROUTE:
             break
+    flight.by_hand = by_hand
     for kind, rest, body in heard:
-        _hear(rig, kind, rest, body)
-        rig.quiet = bool(kind & _QUIET)
+        rig.hear_record(kind, body)
         for _ in range(1 + rest % _LONGEST_REST):
             _turn(rig, flight)
 
@@ -182,12 +175,6 @@ def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
     rig.advance()
     flight.turn()
     require(np.isfinite(rig.vehicle.read().odometry.position).all(), "a position that is no number")
-
-
-def _hear(rig: _Rig, kind: int, _: int, body: bytes) -> None:
-    host, port = ("192.168.10.66", 8889) if kind & 2 else _OWN
-    inbox = rig.states if kind & 1 == _STATE else rig.commands
-    inbox.append((body, host, port))
 
 
 def _state(**fields: object) -> bytes:
@@ -199,10 +186,11 @@ def seeds() -> Iterable[bytes]:
     """States and replies in flight, a stranger's, a silence, a fall, and a garbled packet."""
     yield record(_STATE, 3, _state(h=100, vgx=3, yaw=20)) + record(_REPLY, 3, b"error Motor stop")
     yield record(_STRANGERS_STATE, 3, _state(bat=1)) + record(_STRANGERS_REPLY, 3, b"ok")
-    yield record(_STATE | _QUIET, 38, _state(h=100)) + record(_STATE, 2, _state(h=90))
+    yield record(_STATE | QUIET, 38, _state(h=100)) + record(_STATE, 2, _state(h=90))
     yield record(_STATE, 1, _state(h=90, vgz=40)) + record(_STATE, 30, _state(h=0))
     yield record(_STATE, 5, b"pitch:0;roll:0;bat:1e9;\xff\xfe") + record(_REPLY, 1, b"\xff")
     yield record(_STATE, 2, _state(temph=90, bat=5)) + record(_REPLY, 2, b"ok")
+    yield record(_REPLY | EARLY, 0, b"error") + record(_STATE | EARLY | QUIET, 0, _state(bat=9))
 
 
 _VALUES = (
@@ -234,13 +222,13 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
         kind, rest, body = found[index] if found else (0, 0, b"")
         match rng.randrange(5) if found else 0:
             case 0 | 1:
-                kind = rng.choice(_SENT)
+                kind = rng.choice(_SENT) | kind & EARLY
                 said = _values(rng) if kind & 1 == _STATE else rng.choice(_REPLIES)
                 found.insert(index, (kind, rng.randrange(6), said))
             case 2:
                 del found[index]
             case 3:
-                kind = rng.choice((kind, kind ^ _QUIET, kind & _QUIET | rng.randrange(4)))
+                kind = rng.choice((kind ^ EARLY, kind ^ QUIET, kind & ~3 | rng.randrange(4)))
                 found[index] = (kind, rng.choice((rest, 0, _LONGEST_REST - 1)), body)
             case _:
                 place = rng.randrange(len(body) + 1)

@@ -13,6 +13,7 @@ import numpy as np
 
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
 
 __all__ = ["Alignment", "global_origin"]
@@ -42,13 +43,17 @@ class Alignment:
     """Alignment of one connection."""
 
     def __init__(self, frame: LocalFrame, telemetry: Telemetry) -> None:
-        """Start with `frame`, which was aligned by the present `telemetry`."""
+        """Start with `frame`, which was aligned by the present `telemetry`.
+
+        Raises VehicleError if it has lost its position since.
+        """
         self.frame: LocalFrame | None = frame
         """The frame; None while no position is valid."""
         self.fault = ""
         """Text for the operator; empty if aligned."""
         self._telemetry = telemetry
         self._pinned = frame
+        self._reboots = telemetry.reboots
         self.origin = global_origin(telemetry, frame)
         """Geodetic origin of our frame."""
         self._sea_level = _sea_level(telemetry, frame)
@@ -56,6 +61,14 @@ class Alignment:
         self._candidates: list[tuple[float, Vector]] = []
         self._stood_at: Vector | None = None
         self._mended_at = 0.0
+
+    def require_same_boot(self) -> None:
+        """Raise VehicleError if the autopilot has restarted since the frame was aligned."""
+        if self._telemetry.reboots != self._reboots:
+            raise VehicleError(
+                "its autopilot started anew while being connected, and its local frame with it; "
+                "connect again"
+            )
 
     def move(self) -> None:
         """Update by a new local position."""
@@ -121,11 +134,12 @@ def _leap(before: _Sample, after: _Sample) -> float:
 
 
 def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
-    """Geodetic origin of our local frame by the autopilot's own estimate."""
-    assert telemetry.place is not None  # noqa: S101 - it is ready
-    assert telemetry.position is not None  # noqa: S101 - the same
-    here = GeodeticOrigin(*telemetry.place)
-    latitude, longitude, _ = here.to_geodetic(-frame.position(telemetry.position))
+    """Geodetic origin of our local frame by the autopilot's own estimate.
+
+    Raises VehicleError if it has none now.
+    """
+    place, position = telemetry.whereabouts()
+    latitude, longitude, _ = GeodeticOrigin(*place).to_geodetic(-frame.position(position))
     return GeodeticOrigin(latitude, longitude)
 
 

@@ -14,6 +14,7 @@ from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.data import Battery, GpsFix
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import Vector
 
 __all__ = ["Sensors", "Telemetry"]
@@ -130,6 +131,16 @@ class Telemetry:
         """Whether position and attitude are recent, and valid by its own estimate."""
         fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
         return fresh and not self.health.lost(now)
+
+    def whereabouts(self) -> tuple[tuple[float, float], Vector]:
+        """Latitude and longitude (degrees), and local position (NED metres).
+
+        Raises VehicleError if it does not know them now: what was there a moment ago may be lost.
+        """
+        place, position = self.place, self.position
+        if place is None or position is None:
+            raise VehicleError("it lost its position while being connected; connect again")
+        return place, position
 
     def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
         self.beat_at = now
