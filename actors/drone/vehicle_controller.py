@@ -36,16 +36,19 @@ from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.terrain.ground import SEA_TOLERANCE
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, failure_line
+from aerodaas.types.errors import AeroDaaSError, ConfigError, failure_line
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import (
     ClockedVehicle,
     PlayedVehicle,
+    SeaLevelVehicle,
     SteppedVehicle,
     VehicleState,
 )
@@ -119,6 +122,7 @@ class VehicleController:
         self._stepped = self.vehicle if isinstance(self.vehicle, SteppedVehicle) else None
         self._played = self.vehicle if isinstance(self.vehicle, PlayedVehicle) else None
         robot, environment = self.spec.robot, self._session.environment
+        sea_level = self._sea_level()
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
         self._planner = self.make_planner(self.spec.scheduler)
@@ -129,11 +133,28 @@ class VehicleController:
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
             obeyed=self.vehicle.capabilities.obeys,
+            clearance=GroundClearance.of(environment, robot.limits, takeoff, sea_level),
+            sea_level=sea_level,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()
         """The newest state used by the loop or a sensor."""
         give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
+
+    def _sea_level(self) -> float | None:
+        """Metres of the local frame's zero above the sea: the environment's word, or the vehicle's.
+
+        Raises ConfigError if they contradict each other.
+        """
+        home = self._session.environment.home
+        given = None if home is None else home.above_sea
+        told = self.vehicle.sea_level if isinstance(self.vehicle, SeaLevelVehicle) else None
+        if given is not None and told is not None and abs(given - told) > SEA_TOLERANCE:
+            raise ConfigError(
+                f"{self.id}: home lies {given:.0f} m above the sea by the environment file, and "
+                f"{told:.0f} m by the vehicle: is home.above_sea above the ellipsoid?"
+            )
+        return told if given is None else given
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
         """Create the planner for `scheduler`; may take seconds to start."""

@@ -10,21 +10,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pymap3d
+import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from aerodaas.config.model import TerrainConfig
 from aerodaas.terrain.terrain import Terrain
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
 
-__all__ = ["Ground"]
+__all__ = ["SEA_TOLERANCE", "Ground"]
 
 _MAJOR, _ECCENTRICITY_SQUARED = 6378137.0, 6.69437999014e-3
 """WGS84: semi-major axis in metres, first eccentricity squared."""
 _AROUND = 200.0
 """Metres of ground beyond the range of the flight that are kept in memory."""
-_TOLERANCE = 30.0
-"""Metres by which terrain and vehicle may differ on the height of the take-off, as ArduPilot's
+SEA_TOLERANCE = 30.0
+"""Metres by which terrain, vehicle and file may differ on the height of home, as ArduPilot's
 TERRAIN_OFS_MAX: the geoid lies up to a hundred metres from the ellipsoid."""
 
 
@@ -76,21 +79,19 @@ class Ground:
     @classmethod
     def of(
         cls,
-        config: TerrainConfig | None,
-        origin: GeodeticOrigin | None,
+        config: TerrainConfig,
+        origin: GeodeticOrigin,
         takeoff: Vector,
         reach: float,
         sea_level: float | None = None,
-    ) -> Ground | None:
-        """Read the ground of an environment; None if it names no terrain.
+    ) -> Ground:
+        """Read the ground of an environment's terrain.
 
         Raises ConfigError as `Terrain.open` does, if the ground at the take-off is not known, and
         if its height above the sea contradicts `sea_level`, that of the local frame's zero.
         """
-        if config is None or origin is None:
-            return None
         ground = cls(Terrain.open(config.files), origin, takeoff, reach)
-        if sea_level is not None and abs(sea_level - ground.sea_level) > _TOLERANCE:
+        if sea_level is not None and abs(sea_level - ground.sea_level) > SEA_TOLERANCE:
             raise ConfigError(
                 f"home lies {sea_level:.0f} m above the sea by its own word, and "
                 f"{ground.sea_level:.0f} m by the terrain: one is wrong, or above the ellipsoid"
@@ -106,7 +107,8 @@ class Ground:
     def spacing(self) -> float:
         """Metres between the terrain's samples, the smaller of both directions."""
         grid = self._patch.grid
-        return min(grid.latitude_step * self._metres_north, grid.longitude_step * self._metres_east)
+        steps = (grid.latitude_step * self._metres_north, grid.longitude_step * self._metres_east)
+        return float(min(steps))
 
     def heights(self, east: NDArray[np.float64], north: NDArray[np.float64]) -> NDArray[np.float64]:
         """Heights of the ground at places of any shape; NaN where it is not known."""
@@ -133,16 +135,24 @@ class Ground:
         shares = np.linspace(0.0, 1.0, count)
         return shares * long, self.heights(start[0] + shares * way[0], start[1] + shares * way[1])
 
-    def nearest_known(self, east: float, north: float) -> Vector | None:
-        """The nearest place (east, north) whose ground is known; None if there is none."""
-        side = np.arange(-self._reach, self._reach, max(self.spacing / 2.0, self._reach / 500.0))
-        x, y = np.meshgrid(self._centre[0] + side, self._centre[1] + side)
-        distance = np.hypot(x - east, y - north)
-        distance[np.isnan(self.heights(x, y))] = np.inf
-        nearest = np.unravel_index(int(distance.argmin()), distance.shape)
-        if not math.isfinite(distance[nearest]):
+    def unknown(self) -> BaseGeometry | None:
+        """Where the ground is not known, as polygons (east, north); None if it is everywhere."""
+        grid, void = self._patch.grid, np.isnan(self._patch.samples)
+        cells = void[:-1, :-1] | void[:-1, 1:] | void[1:, :-1] | void[1:, 1:]
+        if not cells.any():
             return None
-        return np.array([x[nearest], y[nearest]])
+        # Runs of cells, row by row: an area without data has a few hundred of them, not millions.
+        padded = np.pad(cells, ((0, 0), (1, 1))).astype(np.int8)
+        rows, starts = np.nonzero(np.diff(padded, axis=1) == 1)
+        _, ends = np.nonzero(np.diff(padded, axis=1) == -1)
+        north = grid.north - np.stack([rows, rows, rows + 1, rows + 1], 1) * grid.latitude_step
+        east = grid.west + np.stack([starts, ends, ends, starts], 1) * grid.longitude_step
+        origin = self._origin
+        x, y, _ = pymap3d.geodetic2enu(
+            north, east, origin.altitude, origin.latitude, origin.longitude, origin.altitude
+        )
+        seam = 0.1
+        return shapely.union_all(shapely.polygons(np.stack([x, y], 2))).buffer(seam)
 
     def _degrees(
         self, east: NDArray[np.float64], north: NDArray[np.float64]

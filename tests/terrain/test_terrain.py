@@ -276,7 +276,7 @@ def test_a_terrain_and_a_home_that_contradict_each_other_are_refused(tmp_path: P
     files = [str(hgt(tmp_path, "N47E008", lambda y, x: 540.0 + 0 * y * x))]
     config, origin = TerrainConfig(files=files), GeodeticOrigin(47.1, 8.1)
     standing = np.zeros(3)
-    assert Ground.of(config, origin, standing, 500.0, sea_level=555.0) is not None
+    Ground.of(config, origin, standing, 500.0, sea_level=555.0)
     with pytest.raises(ConfigError, match="above the ellipsoid"):
         Ground.of(config, origin, standing, 500.0, sea_level=588.0)
 
