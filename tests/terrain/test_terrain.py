@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,7 +160,7 @@ def test_geotiff_samples_lie_where_its_keys_say(
     [("deflate", {"predictor": 3, "tile": (16, 16)}), ("lzw", {"predictor": 2}), (None, {})],
 )
 def test_geotiff_is_read_as_it_is_usually_packed(
-    tmp_path: Path, compression: str | None, words: dict[str, object]
+    tmp_path: Path, compression: str | None, words: dict[str, Any]
 ) -> None:
     """Copernicus has a floating-point predictor and tiles, others LZW, or nothing."""
     pytest.importorskip("imagecodecs")
@@ -201,7 +202,7 @@ def test_geotiff_of_other_coordinates_is_refused(
 
 
 @pytest.mark.parametrize("words", [{}, {"tile": (16, 16)}, {"compression": "deflate"}])
-def test_a_geotiff_that_is_cut_short_is_refused(tmp_path: Path, words: dict[str, object]) -> None:
+def test_a_geotiff_that_is_cut_short_is_refused(tmp_path: Path, words: dict[str, Any]) -> None:
     """What is missing at its end is not read as zeros."""
     pytest.importorskip("imagecodecs")
     path = write_geotiff(tmp_path / "a.tif", _slope(60, 60), 47.6, 8.0, 0.01, **words)
