@@ -39,10 +39,10 @@ from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.terrain.ground import SEA_TOLERANCE
+from aerodaas.terrain.ground import agreed_sea_level
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, ConfigError, failure_line
+from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import (
@@ -147,14 +147,8 @@ class VehicleController:
         Raises ConfigError if they contradict each other.
         """
         home = self._session.environment.home
-        given = None if home is None else home.above_sea
         told = self.vehicle.sea_level if isinstance(self.vehicle, SeaLevelVehicle) else None
-        if given is not None and told is not None and abs(given - told) > SEA_TOLERANCE:
-            raise ConfigError(
-                f"{self.id}: home lies {given:.0f} m above the sea by the environment file, and "
-                f"{told:.0f} m by the vehicle: is home.above_sea above the ellipsoid?"
-            )
-        return told if given is None else given
+        return agreed_sea_level(None if home is None else home.above_sea, told)
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
         """Create the planner for `scheduler`; may take seconds to start."""

@@ -20,15 +20,28 @@ from aerodaas.terrain.terrain import Terrain
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
 
-__all__ = ["SEA_TOLERANCE", "Ground"]
+__all__ = ["Ground", "agreed_sea_level"]
 
 _MAJOR, _ECCENTRICITY_SQUARED = 6378137.0, 6.69437999014e-3
 """WGS84: semi-major axis in metres, first eccentricity squared."""
 _AROUND = 200.0
 """Metres of ground beyond the range of the flight that are kept in memory."""
-SEA_TOLERANCE = 30.0
+_TOLERANCE = 30.0
 """Metres by which terrain, vehicle and file may differ on the height of home, as ArduPilot's
 TERRAIN_OFS_MAX: the geoid lies up to a hundred metres from the ellipsoid."""
+
+
+def agreed_sea_level(given: float | None, told: float | None) -> float | None:
+    """Metres of home above the sea: as an environment file gives them, else as the vehicle does.
+
+    Raises ConfigError if they contradict each other.
+    """
+    if given is not None and told is not None and abs(given - told) > _TOLERANCE:
+        raise ConfigError(
+            f"home lies {given:.0f} m above the sea by the environment file, and {told:.0f} m by "
+            "the vehicle: is home.above_sea above the ellipsoid?"
+        )
+    return told if given is None else given
 
 
 class Ground:
@@ -91,7 +104,7 @@ class Ground:
         if its height above the sea contradicts `sea_level`, that of the local frame's zero.
         """
         ground = cls(Terrain.open(config.files), origin, takeoff, reach)
-        if sea_level is not None and abs(sea_level - ground.sea_level) > SEA_TOLERANCE:
+        if sea_level is not None and abs(sea_level - ground.sea_level) > _TOLERANCE:
             raise ConfigError(
                 f"home lies {sea_level:.0f} m above the sea by its own word, and "
                 f"{ground.sea_level:.0f} m by the terrain: one is wrong, or above the ellipsoid"

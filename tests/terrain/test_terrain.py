@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from aerodaas.terrain.ground import Ground
+from aerodaas.config.model import TerrainConfig
+from aerodaas.terrain.ground import Ground, agreed_sea_level
 from aerodaas.terrain.terrain import Terrain
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin
@@ -272,14 +273,22 @@ def test_heights_are_differences_from_the_ground_of_the_take_off(tmp_path: Path)
 
 def test_a_terrain_and_a_home_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     """A height above the ellipsoid, given as above the sea, differs by the geoid's."""
-    from aerodaas.config.model import TerrainConfig  # noqa: PLC0415
-
     files = [str(hgt(tmp_path, "N47E008", lambda y, x: 540.0 + 0 * y * x))]
     config, origin = TerrainConfig(files=files), GeodeticOrigin(47.1, 8.1)
     standing = np.zeros(3)
     Ground.of(config, origin, standing, 500.0, sea_level=555.0)
     with pytest.raises(ConfigError, match="above the ellipsoid"):
         Ground.of(config, origin, standing, 500.0, sea_level=588.0)
+
+
+def test_the_vehicles_word_for_the_sea_is_held_against_the_files() -> None:
+    """Either is enough; where both are given, they agree within the errors of a GPS."""
+    assert agreed_sea_level(None, None) is None
+    assert agreed_sea_level(None, 480.0) == 480.0
+    assert agreed_sea_level(488.0, None) == 488.0
+    assert agreed_sea_level(488.0, 470.0) == 488.0
+    with pytest.raises(ConfigError, match="535 m above the sea by the environment file, and 488"):
+        agreed_sea_level(535.0, 488.0)
 
 
 def test_a_take_off_over_unknown_ground_is_refused(tmp_path: Path) -> None:
