@@ -268,6 +268,7 @@ def test_heights_are_differences_from_the_ground_of_the_take_off(tmp_path: Path)
             origin.to_geodetic(takeoff),
         )
     )
+    assert math.isnan(ground.height(5000.0, 0.0))
     assert ground.height(200.0, 100.0) == pytest.approx(2.0 + float(there - here), abs=8.0)
 
 
