@@ -19,7 +19,7 @@ from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, MissionError
 
 HOME = {"latitude": 47.5, "longitude": 8.5, "altitude": 590.0}
-HIGH = {"limits": {"takeoff_height": 10.0}}
+HIGH: dict[str, Any] = {"limits": {"takeoff_height": 10.0}}
 
 
 @pytest.fixture(scope="module")
@@ -98,17 +98,16 @@ def test_what_only_the_vehicle_or_its_node_knows_is_left_to_them() -> None:
     """A real vehicle tells how high it stands; a file may lie on the edge node alone."""
     real = robot(driver="mavlink", settings={"url": "udpin:127.0.0.1:14999"}, **HIGH)
     environment = _environment("/nowhere/N47E008.hgt", robots=[real])
-    asked = {"waypoint_type": "local"}
     _rehearsed(
         environment,
-        Waypoint("a", 9, 0, 560, above="sea", **asked),
-        Waypoint("b", 9, 0, 12, above="ground", **asked),
+        Waypoint("a", 9, 0, 560, above="sea", waypoint_type="local"),
+        Waypoint("b", 9, 0, 12, above="ground", waypoint_type="local"),
     )
     with pytest.raises(MissionError, match="beyond the range"):
         _rehearsed(
             environment,
-            Waypoint("a", 9, 0, 560, above="sea", **asked),
-            Waypoint("c", 9, 5000, 12, **asked),
+            Waypoint("a", 9, 0, 560, above="sea", waypoint_type="local"),
+            Waypoint("c", 9, 5000, 12, waypoint_type="local"),
         )
 
 
