@@ -41,6 +41,7 @@ from .types.data import Readings as Readings
 from .types.errors import AeroDaaSError as AeroDaaSError
 from .types.status import MissionState as MissionState
 from .types.status import MissionStatus as MissionStatus
+from .types.waypoints import HeightReference as HeightReference
 from .types.waypoints import NavigationType as NavigationType
 from .types.waypoints import SchedulingType as SchedulingType
 from .types.waypoints import VelocityCommand as VelocityCommand

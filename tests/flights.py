@@ -15,6 +15,7 @@ from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS
@@ -254,6 +255,8 @@ def flight(
     planner: Planner | None = None,
     origin: GeodeticOrigin | None = None,
     start: bool = True,
+    clearance: GroundClearance | None = None,
+    sea_level: float | None = None,
 ) -> Flight:
     """Prepare a flight that has been told `commands` and then to start."""
     vehicle = vehicle or KinematicVehicle()
@@ -262,7 +265,9 @@ def flight(
     )
     planner = planner or InlinePlanner(scheduler or OrderedScheduler())
     takeoff = vehicle.position.copy()
-    mission = Mission(robot, planner, takeoff=takeoff, origin=origin)
+    mission = Mission(
+        robot, planner, takeoff=takeoff, origin=origin, clearance=clearance, sea_level=sea_level
+    )
     prepared = Flight(vehicle, mission, SetpointLoop(vehicle, mission))
     for command in (*commands, *([Start()] if start else [])):
         prepared.tell(command)

@@ -36,8 +36,10 @@ from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.terrain.ground import agreed_sea_level
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import AeroDaaSError, failure_line
@@ -46,6 +48,7 @@ from aerodaas.types.status import Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import (
     ClockedVehicle,
     PlayedVehicle,
+    SeaLevelVehicle,
     SteppedVehicle,
     VehicleState,
 )
@@ -119,6 +122,7 @@ class VehicleController:
         self._stepped = self.vehicle if isinstance(self.vehicle, SteppedVehicle) else None
         self._played = self.vehicle if isinstance(self.vehicle, PlayedVehicle) else None
         robot, environment = self.spec.robot, self._session.environment
+        sea_level = self._sea_level()
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
         self._planner = self.make_planner(self.spec.scheduler)
@@ -129,11 +133,22 @@ class VehicleController:
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
             obeyed=self.vehicle.capabilities.obeys,
+            clearance=GroundClearance.of(environment, robot.limits, takeoff, sea_level),
+            sea_level=sea_level,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()
         """The newest state used by the loop or a sensor."""
         give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
+
+    def _sea_level(self) -> float | None:
+        """Metres of the local frame's zero above the sea: the environment's word, or the vehicle's.
+
+        Raises ConfigError if they contradict each other.
+        """
+        home = self._session.environment.home
+        told = self.vehicle.sea_level if isinstance(self.vehicle, SeaLevelVehicle) else None
+        return agreed_sea_level(None if home is None else home.above_sea, told)
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
         """Create the planner for `scheduler`; may take seconds to start."""

@@ -43,12 +43,16 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
     aerodaas plan show survey.plan
     """
     from aerodaas.dataflow.plans.reading import flown_plan  # noqa: PLC0415 - slow to load
+    from aerodaas.types.waypoints import HeightReference  # noqa: PLC0415
 
     waypoints, notices = flown_plan(plan, home_altitude)
     for one in waypoints:
         speed = "" if one.speed is None else f", {one.speed:g} m/s"
         hover = f", hovers {one.hover_duration:g} s" if one.hover_duration else ""
-        typer.echo(f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above home{speed}{hover}")
+        above = HeightReference(one.above or HeightReference.HOME).value
+        typer.echo(
+            f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above {above}{speed}{hover}"
+        )
     for notice in notices:
         typer.echo(printable(f"not done: {notice}"))
     typer.echo(f"{plan}: waypoints: {len(waypoints)}, not done: {len(notices)}")

@@ -69,6 +69,10 @@ def add_waypoint(
             "global_relative (a place on the globe, metres above home).",
         ),
     ] = "relative",
+    above: Annotated[
+        str | None,
+        typer.Option(help="What Z is counted from: home, sea or ground. Default: as --type says."),
+    ] = None,
     speed: Annotated[float | None, typer.Option(help="m/s on the way there.")] = None,
     priority: Annotated[int, typer.Option(help="Smaller is more urgent and preempts.")] = 5,
     deadline: Annotated[float | None, typer.Option(help="Seconds of mission time.")] = None,
@@ -92,6 +96,7 @@ def add_waypoint(
         "speed": speed,
         "priority": priority,
         "deadline": deadline,
+        **({"above": above} if above else {}),
     }
     _client(context).add_waypoints([waypoint], index=index)
     typer.echo(f"{waypoint['id']} is on the plan")

@@ -17,6 +17,7 @@ _PACKAGES = {
     "ros": ("rosbags",),
     "routing": ("pyvrp",),
     "supervision": ("supervision",),
+    "terrain": ("tifffile", "imagecodecs"),
 }
 """Packages to import, by extra."""
 
@@ -30,8 +31,8 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service` or
-            `supervision`.
+        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`,
+            `supervision` or `terrain`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

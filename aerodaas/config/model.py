@@ -32,6 +32,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.secrets import HIDDEN, SecretUrl, shown, shown_text
+from aerodaas.config.terrain import TerrainConfig
 from aerodaas.types.identifiers import Identifier, ScopedName
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "SimulationConfig",
     "TaskConfig",
     "TenantConfig",
+    "TerrainConfig",
     "as_runtime_env",
     "validated",
 ]
@@ -109,6 +111,9 @@ class HomeConfig(_Strict):
     latitude: Annotated[float, Field(ge=-90, le=90)]
     longitude: Annotated[float, Field(ge=-180, le=180)]
     altitude: Finite = 0.0
+    """Above the ellipsoid, as GPS counts."""
+    above_sea: Finite | None = None
+    """The same place above mean sea level, for waypoints that are; None: as the vehicle says."""
 
 
 class GeofenceConfig(_Strict):
@@ -491,6 +496,7 @@ class EnvironmentConfig(_Strict):
     schema_url: str | None = Field(default=None, alias="$schema")
     name: str = "environment"
     home: HomeConfig | None = None
+    terrain: TerrainConfig | None = None
     robots: list[RobotConfig] = Field(min_length=1)
     sensors: list[SensorConfig] = Field(default_factory=list)
     """Sensors of the environment that no robot carries."""
@@ -515,6 +521,16 @@ class EnvironmentConfig(_Strict):
             if twice:
                 message = f"more than one {kind} is called {', '.join(twice)}"
                 raise ValueError(message)
+        return self
+
+    @model_validator(mode="after")
+    def _over_ground(self) -> Self:
+        if self.terrain is not None:
+            if self.home is None:
+                message = "a terrain lies around home: give a home with latitude and longitude"
+                raise ValueError(message)
+            for robot in self.robots:
+                self.terrain.check(robot.id, robot.limits.takeoff_height)
         return self
 
     @model_validator(mode="after")

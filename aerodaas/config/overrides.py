@@ -62,6 +62,9 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
             _absolute(package, folder) if package.endswith(".whl") else package
             for package in env["packages"]
         ]
+    if content["terrain"] is not None:
+        files = content["terrain"]["files"]
+        content["terrain"]["files"] = [_absolute(file, folder) for file in files]
     if content["simulation"]["world"].endswith(".json"):
         content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
     return validated(content, "environment")

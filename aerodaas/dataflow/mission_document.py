@@ -18,7 +18,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, Waypoint, WaypointType
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = [
     "HERE_CONDITION",
@@ -94,6 +94,8 @@ class WaypointEntry(BaseModel):
     speed: Annotated[_Number, Field(gt=0)] | None = None
     priority: int = DEFAULT_PRIORITY
     deadline: _Number | None = None
+    above: Literal["home", "sea", "ground"] | None = None
+    """What z is counted from; None: as `waypoint_type` says."""
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:
@@ -102,9 +104,12 @@ class WaypointEntry(BaseModel):
             {
                 one.name: getattr(waypoint, one.name)
                 for one in dataclasses.fields(waypoint)
-                if one.name != "waypoint_type"
+                if one.name not in {"waypoint_type", "above"}
             }
-            | {"waypoint_type": WaypointType(waypoint.waypoint_type).value}
+            | {
+                "waypoint_type": WaypointType(waypoint.waypoint_type).value,
+                "above": HeightReference(waypoint.above).value if waypoint.above else None,
+            }
         )
 
     def waypoint(self) -> Waypoint:

@@ -74,9 +74,11 @@ class AeroNavigation(AeroListData[NavigationItem]):
         Args:
             path: QGroundControl's `.plan`, or Mission Planner's `.waypoints`.
             home_altitude: Metres above the sea of the environment's home, for items whose
-                altitude is so; None for the plan's own.
+                altitude is so; None for the plan's own. Where there is neither, their waypoints
+                are `above="sea"`.
             ground: Height of the ground above the sea at a latitude and longitude, for items
-                whose altitude is above ground.
+                whose altitude is above ground; None makes waypoints `above="ground"`, by the
+                environment's terrain.
 
         Raises:
             ConfigError: If the file is no plan, or an item cannot be flown.

@@ -13,7 +13,7 @@ from aerodaas.schedulers.trajectory.fleet import share_out
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.waypoints import Waypoint, WaypointType
+from aerodaas.types.waypoints import HeightDatum, Waypoint, WaypointType
 
 __all__ = ["shared_waypoints"]
 
@@ -34,7 +34,9 @@ def shared_waypoints(
     home, wind = config.home, np.array(config.simulation.wind, dtype=np.float64)
     origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
     nowhere = np.zeros(3)
-    local = [waypoint.resolve(nowhere, origin) for waypoint in waypoints]
+    # Hills between the places cost next to nothing; the robots' missions know them.
+    level = HeightDatum(home.above_sea if home else None, lambda *_: 0.0)
+    local = [waypoint.resolve(nowhere, origin, level) for waypoint in waypoints]
     fleet = {
         robot.id: PlanningContext(
             now=0.0,
@@ -46,4 +48,6 @@ def shared_waypoints(
         )
         for robot in config.robots
     }
-    return share_out(local, fleet, objective=objective, budget=budget)
+    tours = share_out(local, fleet, objective=objective, budget=budget)
+    asked = {waypoint.id: waypoint for waypoint in waypoints if waypoint.above is not None}
+    return {robot: [asked.get(one.id, one) for one in tour] for robot, tour in tours.items()}

@@ -19,7 +19,7 @@ from aerodaas.mission.navigator import Navigator
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Header
 from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.waypoints import SchedulingType
+from aerodaas.types.waypoints import HeightReference, SchedulingType
 
 __all__ = ["CommandHandler"]
 
@@ -145,9 +145,19 @@ class CommandHandler:
         self._groups += not stream.name
         ordered = navigation.scheduling_type is SchedulingType.ORDERED and stream.ordered
         group = (stream.name or f"group {self._groups}") if ordered else None
+        follows = {
+            asked.id: asked.z
+            for asked in navigation.waypoints
+            if asked.above is HeightReference.GROUND
+        }
         try:
             self._navigator.add(
-                taken, group=group, index=stream.index, source=stream.name, cause=cause
+                taken,
+                group=group,
+                index=stream.index,
+                source=stream.name,
+                cause=cause,
+                above_ground=follows,
             )
         except InvalidWaypointError as error:
             return Answer(accepted=False, text=str(error))

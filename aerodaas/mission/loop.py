@@ -52,6 +52,7 @@ class SetpointLoop:
             mission.limits,
             mission.home,
             position_setpoints=vehicle.capabilities.position_setpoints,
+            clearance=mission.clearance,
         )
         self.state: VehicleState | None = None
         """The newest vehicle state read."""

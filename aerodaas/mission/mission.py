@@ -40,8 +40,9 @@ from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.mission.safety.detour import Detour
+from aerodaas.mission.route import Route
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import Motors, MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
@@ -54,7 +55,7 @@ from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
 from aerodaas.types.status import RECENT, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.types.waypoints import HeightDatum, VelocityCommand
 
 __all__ = ["Mission"]
 
@@ -87,16 +88,20 @@ class Mission:
         origin: GeodeticOrigin | None = None,
         wind: Vector | None = None,
         obeyed: bool = True,
+        clearance: GroundClearance | None = None,
+        sea_level: float | None = None,
     ) -> None:
         """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
 
         `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. `obeyed` is False
-        for a recorded vehicle, which lands when it landed in the recording. Raises ConfigError for
-        an invalid geofence.
+        for a recorded vehicle, which lands when it landed in the recording. `clearance` is kept
+        above the ground; the local frame's zero lies `sea_level` metres above the sea. Raises
+        ConfigError for an invalid geofence.
         """
         self.limits = limits = robot.limits
         self.preflight = robot.preflight
-        self.fence = Geofence(limits.geofence)
+        self.clearance = clearance
+        self.fence = Geofence(limits.geofence, clearance.unknown if clearance else None)
         self.home = takeoff.astype(np.float64)
         self._options = robot.mission
         self._obeyed = obeyed
@@ -105,17 +110,19 @@ class Mission:
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
-        self._supervisor = Supervisor(limits, self.home, self.fence, self._meter)
+        self._supervisor = Supervisor(limits, self.home, self.fence, self._meter, clearance)
         self._navigator = Navigator(
             planner,
             self.fence,
             home=self.home,
             max_range=limits.max_range,
             origin=origin,
+            datum=HeightDatum(sea_level, clearance.ground.height if clearance else None),
+            clearance=clearance,
             command_timeout=limits.command_timeout,
             resume_after=robot.mission.resume_after,
         )
-        self._detour = Detour(self.fence, limits.arrival_radius)
+        self._route = Route(self.fence, limits, self.home, clearance)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
         self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)
@@ -129,7 +136,6 @@ class Mission:
         self._motors = MotorWatch(self.home)
         self._anchor: Vector | None = None
         """Position that the drone holds."""
-        self._return_height: float | None = None
 
     @property
     def state(self) -> MissionState:
@@ -447,7 +453,7 @@ class Mission:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        place = self._detour.towards(stop.waypoint.position, position)
+        place = self._route.towards(stop.waypoint.position, position, stop.above_ground)
         if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
             self._finish(stop, phase)
             return self._fly(state)
@@ -530,11 +536,7 @@ class Mission:
         ):
             return Return()
         position = state.odometry.position
-        if self._return_height is None:
-            lowest = float(self.home[2]) + self.limits.takeoff_height
-            self._return_height = max(float(position[2]), lowest)
-        above = np.array([self.home[0], self.home[1], self._return_height])
-        way = above - position
+        way = (above := self._route.above_home(position)) - position
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
         drift = math.hypot(*state.odometry.velocity[:2])
         arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
@@ -544,7 +546,7 @@ class Mission:
                 MissionState.LANDING, f"the return took too long; {reason}" if late else reason
             )
             return Land()
-        place = self._detour.towards(above, position)
+        place = self._route.towards(above, position)
         if place is None:
             self._to(MissionState.LANDING, "no way inside the geofence leads home")
             return Land()

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from aerodaas.mission.planner import Plan, Planner, PlanRequest
 from aerodaas.mission.queue import QueuedWaypoint, WaypointQueue
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Header
 from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.waypoints import VelocityCommand, Waypoint
+from aerodaas.types.waypoints import (
+    HeightDatum,
+    VelocityCommand,
+    Waypoint,
+)
 
 __all__ = ["LiveCommand", "Navigator"]
 
@@ -38,6 +43,8 @@ class Navigator:
         home: Vector,
         max_range: float,
         origin: GeodeticOrigin | None,
+        datum: HeightDatum,
+        clearance: GroundClearance | None,
         command_timeout: float,
         resume_after: float,
     ) -> None:
@@ -51,6 +58,8 @@ class Navigator:
         self._home = home
         self._max_range = max_range
         self._origin = origin
+        self._datum = datum
+        self._clearance = clearance
         self._command_timeout = command_timeout
         self._resume_after = round(resume_after * NANOSECONDS)
         self._unplanned: set[int] = set()
@@ -67,7 +76,7 @@ class Navigator:
         refused: dict[str, str] = {}
         for asked in waypoints:
             try:
-                waypoint = asked.resolve(self._home, self._origin)
+                waypoint = asked.resolve(self._home, self._origin, self._datum)
             except ValueError as error:
                 refused[asked.id] = str(error)
                 continue
@@ -89,7 +98,9 @@ class Navigator:
         known = self.queue.find(waypoint.id)
         if known is not None and (not source or known.source != source):
             return "a waypoint of this id is already queued; use another id"
-        return self._fence.objection(waypoint.position)
+        if objection := self._fence.objection(waypoint.position):
+            return objection
+        return self._clearance.objection(waypoint.position) if self._clearance else ""
 
     def add(
         self,
@@ -99,9 +110,20 @@ class Navigator:
         index: int | None = None,
         source: str = "",
         cause: Header | None = None,
+        above_ground: Mapping[str, float],
     ) -> None:
-        """Queue admitted waypoints and request a plan; raises InvalidWaypointError."""
-        self.queue.add(waypoints, group=group, index=index, source=source, cause=cause)
+        """Queue admitted waypoints and request a plan; raises InvalidWaypointError.
+
+        `above_ground`, by id, are metres to keep above the ground on the way there.
+        """
+        self.queue.add(
+            waypoints,
+            group=group,
+            index=index,
+            source=source,
+            cause=cause,
+            above_ground=above_ground,
+        )
         if index is None:
             self._unplanned |= {waypoint.priority for waypoint in waypoints}
 

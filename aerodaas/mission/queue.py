@@ -8,7 +8,7 @@ discards interrupted plans too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +17,9 @@ from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["QueuedWaypoint", "WaypointQueue"]
+
+
+_STRAIGHT: Mapping[str, float] = {}
 
 
 @dataclass(slots=True, eq=False)
@@ -38,6 +41,8 @@ class QueuedWaypoint:
     """The drone has set out for it."""
     arrived: bool = False
     """The drone has arrived and hovers there."""
+    above_ground: float | None = None
+    """Metres above the ground to keep on the way there; None flies straight."""
 
     @property
     def id(self) -> str:
@@ -62,8 +67,9 @@ class WaypointQueue:
         index: int | None = None,
         source: str = "",
         cause: Header | None = None,
+        above_ground: Mapping[str, float] = _STRAIGHT,
     ) -> None:
-        """Queue `waypoints`, each in the list of its priority.
+        """Queue `waypoints`, each in the list of its priority; `above_ground` is by their id.
 
         With `index`, they follow that many stops of their list, and stay there. A waypoint with the
         id of one that the same `source` (not the empty one) queued replaces it: its target has
@@ -74,8 +80,15 @@ class WaypointQueue:
         self._check(arriving, index, source)
         offset: dict[int, int] = {}
         for waypoint in arriving:
-            hover = waypoint.hover_duration
-            stop = QueuedWaypoint(waypoint, group, index is not None, source, cause, hover)
+            stop = QueuedWaypoint(
+                waypoint,
+                group,
+                index is not None,
+                source,
+                cause,
+                waypoint.hover_duration,
+                above_ground=above_ground.get(waypoint.id),
+            )
             known = self.find(waypoint.id)
             if known is not None and known.waypoint.priority == waypoint.priority:
                 level = self._levels[waypoint.priority]

@@ -6,18 +6,22 @@ Every error that can be found without the vehicle is reported here, before any a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import AddNavigation, Answer, Command
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import ConfigError, MissionError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.waypoints import Waypoint, WaypointType
+from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 
 __all__ = ["give", "rehearse"]
 
@@ -50,17 +54,32 @@ def rehearse(
     origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
     known = robot.driver == "simulated" or not any(map(_is_relative, commands))
     planner = InlinePlanner(scheduler)
+    sea_level = home.above_sea if home else None
+    clearance = _clearance(robot, environment, takeoff) if known else None
+    later = {
+        # What the vehicle alone knows, or lies with it, its actor checks.
+        HeightReference.SEA: sea_level is None and robot.driver != "simulated",
+        HeightReference.GROUND: clearance is None and environment.terrain is not None,
+    }
+    commands = list(_without(commands, {above for above, unknown in later.items() if unknown}))
     try:
         mission = Mission(
-            robot if known else _unfenced(robot), planner, takeoff=takeoff, origin=origin, wind=wind
+            robot if known else _unfenced(robot),
+            planner,
+            takeoff=takeoff,
+            origin=origin,
+            wind=wind,
+            clearance=clearance,
+            sea_level=sea_level,
         )
     except ConfigError as error:
         raise ConfigError(f"robot {robot.id}: limits.{error}") from None
     give(robot.id, commands, lambda command: mission.handle(command, 0))
+    datum = HeightDatum(sea_level, clearance.ground.height if clearance else None)
     model, limits = EnergyModel(robot.limits.endurance, wind), robot.limits
     for waypoint in _waypoints(commands):
         speed = min(waypoint.speed or limits.cruise_speed, limits.max_speed)
-        place = waypoint.resolve(takeoff, origin).position
+        place = waypoint.resolve(takeoff, origin, datum).position
         back = min(limits.cruise_speed, limits.max_speed)
         needed = model.leg(takeoff, place, speed) + model.way_home(place, takeoff, back)
         if needed > 1.0 - limits.battery_land:
@@ -80,6 +99,35 @@ def _waypoints(commands: Iterable[Command]) -> Iterable[Waypoint]:
     for command in commands:
         if isinstance(command, AddNavigation):
             yield from command.navigation.waypoints
+
+
+def _clearance(
+    robot: RobotConfig, environment: EnvironmentConfig, takeoff: Vector
+) -> GroundClearance | None:
+    """The ground as the mission will know it; None where its files lie with the drone alone."""
+    terrain, home = environment.terrain, environment.home
+    if terrain is None or home is None or not all(Path(file).exists() for file in terrain.files):
+        return None
+    return GroundClearance.of(environment, robot.limits, takeoff, home.above_sea)
+
+
+def _without(commands: Iterable[Command], unknown: set[HeightReference]) -> Iterable[Command]:
+    """The commands without waypoints whose height is above something unknown here."""
+    for command in commands:
+        if isinstance(command, AddNavigation) and command.navigation.waypoints:
+            kept = [
+                one
+                for one in command.navigation
+                if not (isinstance(one, Waypoint) and one.above in unknown)
+            ]
+            if not kept:
+                continue
+            if len(kept) < len(command.navigation):
+                former = command.navigation
+                known = AeroNavigation(former.navigation_type, kept, former.scheduling_type)
+                yield replace(command, navigation=known)
+                continue
+        yield command
 
 
 def _is_relative(command: Command) -> bool:

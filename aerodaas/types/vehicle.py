@@ -21,6 +21,7 @@ __all__ = [
     "FlightEnd",
     "PlayedVehicle",
     "PositionSetpoint",
+    "SeaLevelVehicle",
     "Setpoint",
     "SteppedVehicle",
     "Vehicle",
@@ -186,6 +187,16 @@ class ClockedVehicle(Vehicle, Protocol):
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; called when the mission starts."""
+        ...
+
+
+@runtime_checkable
+class SeaLevelVehicle(Vehicle, Protocol):
+    """A vehicle that knows its height above mean sea level, by its own model of the geoid."""
+
+    @property
+    def sea_level(self) -> float | None:
+        """Metres above mean sea level of our frame's zero; None if it is not known (yet)."""
         ...
 
 

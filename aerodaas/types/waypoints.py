@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
@@ -15,6 +16,8 @@ from aerodaas.types.records import fast_pickle
 
 __all__ = [
     "DEFAULT_PRIORITY",
+    "HeightDatum",
+    "HeightReference",
     "NavigationItem",
     "NavigationType",
     "SchedulingType",
@@ -38,6 +41,31 @@ class WaypointType(str, enum.Enum):
     """Latitude and longitude in WGS84 degrees, altitude in metres above the ellipsoid."""
     GLOBAL_RELATIVE = "global_relative"
     """Latitude and longitude in WGS84 degrees, height in metres above the environment's home."""
+
+
+class HeightReference(str, enum.Enum):
+    """What a waypoint's z is counted from, whatever its x and y are."""
+
+    HOME = "home"
+    """The environment's home."""
+    SEA = "sea"
+    """Mean sea level, as on maps and in the autopilots' altitudes; not the ellipsoid of GPS."""
+    GROUND = "ground"
+    """The ground beneath the waypoint, by the environment's terrain; the way there follows it."""
+
+
+@dataclass(frozen=True)
+class HeightDatum:
+    """What is known of sea and ground where a drone flies."""
+
+    sea_level: float | None = None
+    """Metres of the local frame's zero above mean sea level; None if it is not known."""
+    ground: Callable[[float, float], float] | None = None
+    """Local height of the ground at metres east and north, NaN where it is not known; None without
+    a terrain."""
+
+
+_NO_DATUM = HeightDatum()
 
 
 class NavigationType(str, enum.Enum):
@@ -103,6 +131,8 @@ class Waypoint:
     """Smaller is more urgent; a more urgent waypoint preempts the plan."""
     deadline: float | None = None
     """Seconds of mission time by which to arrive; None for no deadline."""
+    above: HeightReference | str | None = None
+    """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -111,6 +141,8 @@ class Waypoint:
         _require_finite(owner, self, _NUMBERS)
         if type(self.waypoint_type) is not WaypointType:
             object.__setattr__(self, "waypoint_type", self._type_named(owner))
+        if self.above is not None and type(self.above) is not HeightReference:
+            object.__setattr__(self, "above", self._reference_named(owner))
         if self.hover_duration < 0:
             message = f"{owner}: hover_duration must not be negative, not {self.hover_duration}"
             raise InvalidWaypointError(message)
@@ -132,12 +164,30 @@ class Waypoint:
             message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
             raise InvalidWaypointError(message) from None
 
-    def resolve(self, takeoff: Vector, origin: GeodeticOrigin | None) -> Waypoint:
+    def _reference_named(self, owner: str) -> HeightReference:
+        try:
+            return HeightReference(str(self.above))
+        except ValueError:
+            choices = ", ".join(kind.value for kind in HeightReference)
+            message = f"{owner}: above must be one of {choices}, not {self.above!r}"
+            raise InvalidWaypointError(message) from None
+
+    def resolve(
+        self, takeoff: Vector, origin: GeodeticOrigin | None, datum: HeightDatum = _NO_DATUM
+    ) -> Waypoint:
         """The same waypoint in the local ENU frame of the environment.
 
-        `takeoff` is where this robot took off, ENU metres. Raises InvalidWaypointError if a
-        global waypoint meets an environment without a geodetic home.
+        `takeoff` is where this robot took off, ENU metres; `datum` is for heights above sea and
+        ground. Raises InvalidWaypointError if a global waypoint meets an environment without a
+        geodetic home, or one above sea or ground meets one whose own height is not known.
         """
+        if self.above is not None:
+            kind = self.waypoint_type
+            if kind is WaypointType.GLOBAL:
+                kind = WaypointType.GLOBAL_RELATIVE
+            level = replace(self, z=float(takeoff[2]), waypoint_type=kind, above=None)
+            place = level.resolve(takeoff, origin)
+            return replace(place, z=self._local_height(place, datum))
         if self.waypoint_type is WaypointType.LOCAL:
             return self
         if self.waypoint_type is WaypointType.RELATIVE:
@@ -152,6 +202,29 @@ class Waypoint:
             x, y, _ = origin.to_local(self.x, self.y, origin.altitude)
             z = self.z
         return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
+
+    def _local_height(self, place: Waypoint, datum: HeightDatum) -> float:
+        """Metres over the local frame's zero, of a waypoint that says what it is counted from."""
+        if self.above is HeightReference.HOME:
+            return self.z
+        if self.above is HeightReference.SEA:
+            if datum.sea_level is None:
+                raise InvalidWaypointError(
+                    f"waypoint {self.id!r} is above the sea, and home's own height above it is not "
+                    "known: give home.above_sea in the environment file (a map's height; GPS "
+                    "counts from the ellipsoid)"
+                )
+            return self.z - datum.sea_level
+        if datum.ground is None:
+            raise InvalidWaypointError(
+                f"waypoint {self.id!r} is above ground, and the environment file names no terrain"
+            )
+        ground = datum.ground(place.x, place.y)
+        if math.isnan(ground):
+            raise InvalidWaypointError(
+                f"waypoint {self.id!r} is above ground that the terrain does not know"
+            )
+        return ground + self.z
 
     @property
     def position(self) -> Vector:

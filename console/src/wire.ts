@@ -229,6 +229,7 @@ export interface NavigationIn {
  * One waypoint, as in `aerodaas.Waypoint`: metres, seconds, radians, m/s.
  */
 export interface WaypointEntry {
+  above?: ("home" | "sea" | "ground") | null;
   deadline?: number | null;
   hover_duration?: number;
   id: string;

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from aerodaas import (
     AeroListData,
     AeroNavigation,
+    HeightReference,
     NavigationType,
     PriorityQueue,
     SchedulingType,
@@ -23,6 +24,7 @@ from aerodaas import (
 )
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.waypoints import HeightDatum
 
 finite = st.floats(-1e4, 1e4)
 bad = st.sampled_from([math.nan, math.inf, -math.inf])
@@ -45,6 +47,57 @@ waypoints = st.builds(
 def test_waypoints_survive_the_way_to_another_process(waypoint: Waypoint) -> None:
     """Pickling is the identity."""
     assert pickle.loads(pickle.dumps(waypoint)) == waypoint  # noqa: S301 - our own bytes
+
+
+HOME = GeodeticOrigin(47.0, 8.0, 585.0)
+
+
+@given(finite, st.sampled_from(list(WaypointType)), st.floats(-400, 5000))
+def test_a_height_counts_from_what_the_waypoint_says(
+    z: float, kind: WaypointType, sea_level: float
+) -> None:
+    """Whatever its x and y are; the ground's height is asked at its own place."""
+    places: list[tuple[float, float]] = []
+
+    def ground(east: float, north: float) -> float:
+        places.append((east, north))
+        return 33.0
+
+    datum = HeightDatum(sea_level, ground)
+    takeoff = np.array([7.0, -9.0, 2.0])
+    on_globe = kind in {WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE}
+    x, y = (47.001, 8.001) if on_globe else (12.0, 34.0)
+    at: dict[HeightReference, float] = {}
+    plain = Waypoint("a", x, y, z, waypoint_type=kind).resolve(takeoff, HOME)
+    for above in HeightReference:
+        asked = Waypoint("a", x, y, z, waypoint_type=kind, above=above.value)
+        found = asked.resolve(takeoff, HOME, datum)
+        assert found.resolve(takeoff, HOME) == found
+        at[above] = found.z
+    assert at[HeightReference.HOME] == z
+    assert at[HeightReference.SEA] == pytest.approx(z - sea_level)
+    assert at[HeightReference.GROUND] == pytest.approx(z + 33.0)
+    assert places == [pytest.approx((plain.x, plain.y), abs=0.2)]
+
+
+@pytest.mark.parametrize(
+    ("above", "datum", "why"),
+    [
+        ("sea", HeightDatum(ground=lambda *_: 1.0), "give home.above_sea"),
+        ("ground", HeightDatum(sea_level=500.0), "names no terrain"),
+        ("ground", HeightDatum(ground=lambda *_: math.nan), "the terrain does not know"),
+    ],
+)
+def test_a_height_is_never_guessed(above: str, datum: HeightDatum, why: str) -> None:
+    """What it is counted from must be known itself."""
+    with pytest.raises(InvalidWaypointError, match=why):
+        Waypoint("a", 1, 2, 3, above=above).resolve(np.zeros(3), HOME, datum)
+
+
+def test_heights_count_from_home_sea_or_ground_alone() -> None:
+    """Anything else is refused, with the choices."""
+    with pytest.raises(InvalidWaypointError, match="must be one of home, sea, ground, not 'roof'"):
+        Waypoint("a", 1, 2, 3, above="roof")
 
 
 @given(waypoints, st.tuples(finite, finite, finite))

@@ -14,6 +14,8 @@ __all__ = [
     "FRAMES_ABOVE_GROUND",
     "FRAMES_ABOVE_SEA",
     "FRAMES_RELATIVE",
+    "FRAME_ABOVE_GROUND",
+    "FRAME_ABOVE_SEA",
     "FRAME_MISSION",
     "FRAME_RELATIVE",
     "NAV_DELAY",
@@ -50,8 +52,10 @@ FRAME_MISSION = 2
 """Of a command without a place."""
 FRAME_RELATIVE = 3
 FRAMES_RELATIVE = (FRAME_RELATIVE, 6)
-FRAMES_ABOVE_SEA = (0, 5)
-FRAMES_ABOVE_GROUND = (10, 11)
+FRAME_ABOVE_SEA = 0
+FRAMES_ABOVE_SEA = (FRAME_ABOVE_SEA, 5)
+FRAME_ABOVE_GROUND = 10
+FRAMES_ABOVE_GROUND = (FRAME_ABOVE_GROUND, 11)
 
 _CAMERA = "no picture is taken by it; the application's camera streams all the way"
 _GIMBAL = "no gimbal is moved; the camera stays as it is mounted"

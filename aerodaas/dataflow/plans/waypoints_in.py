@@ -29,7 +29,7 @@ from aerodaas.dataflow.plans.numbers import LatLon, finite, place
 from aerodaas.dataflow.plans.plan import Notice, Plan, PlanItem
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import yaw_ned_to_enu
-from aerodaas.types.waypoints import Waypoint, WaypointType
+from aerodaas.types.waypoints import HeightReference, Waypoint, WaypointType
 
 __all__ = ["Ground", "waypoints_of"]
 
@@ -56,11 +56,12 @@ def waypoints_of(
         ground: Height of the ground, for items whose height is above it.
 
     Returns:
-        Waypoints of type `global_relative`, and what they leave out.
+        Waypoints of type `global_relative`, and what they leave out. Heights above sea and ground
+        stay so where nothing here says how high those lie: the mission knows.
 
     Raises:
         ConfigError: If an item cannot be flown: its command leads elsewhere, its place is none, or
-            its height is above something whose own height is not known.
+            its height above ground needs that of home.
     """
     if home_altitude is None and plan.home is not None:
         home_altitude = plan.home.altitude
@@ -146,6 +147,7 @@ class _Flown:
         if here:
             raise ConfigError(f"{where}: {command_name(item.command)} has no place; give it one")
         latitude, longitude = place(item.x, item.y, where)
+        height, above = self._height(item, (latitude, longitude))
         if item.command == NAV_SPLINE_WAYPOINT:
             self._say(item, "flown straight")
         if item.command == NAV_WAYPOINT and (radius or through):
@@ -158,37 +160,32 @@ class _Flown:
                 f"item{item.number}",
                 latitude,
                 longitude,
-                self._height(item, (latitude, longitude)),
+                height,
                 hover_duration=_seconds(hover or 0.0, where),
                 waypoint_type=WaypointType.GLOBAL_RELATIVE,
                 yaw=None if yaw is None else yaw_ned_to_enu(math.radians(yaw)),
                 speed=self._speed,
+                above=above,
             )
         )
 
-    def _height(self, item: PlanItem, at: LatLon) -> float:
-        """Metres above home."""
+    def _height(self, item: PlanItem, at: LatLon) -> tuple[float, HeightReference | None]:
+        """Metres above home, or above what follows."""
         where = f"item {item.number}"
         height = finite(item.z, f"{where}: altitude (param 7)")
         if item.frame in FRAMES_RELATIVE:
-            return height
+            return height, None
         if item.frame not in FRAMES_ABOVE_SEA + FRAMES_ABOVE_GROUND:
             raise ConfigError(
                 f"{where}: frame {item.frame} is not known; take altitudes above home"
             )
         if item.frame in FRAMES_ABOVE_GROUND:
             if self._ground is None:
-                raise ConfigError(
-                    f"{where}: its altitude is above the ground, whose height is not known: give "
-                    "`ground`, or choose altitudes relative to home, or `Calculated above terrain`"
-                )
+                return height, HeightReference.GROUND
             height += finite(self._ground(*at), f"{where}: height of the ground")
         if self._sea is None:
-            raise ConfigError(
-                f"{where}: its altitude is above the sea, and that of home is not known: give "
-                "`home_altitude`, set the planned home's altitude, or choose relative altitudes"
-            )
-        return height - self._sea
+            return height, HeightReference.SEA
+        return height - self._sea, None
 
     def _delay(self, item: PlanItem) -> None:
         seconds, *clock = item.values

@@ -12,6 +12,8 @@ import numpy as np
 
 from aerodaas.dataflow.plans.commands import (
     DO_CHANGE_SPEED,
+    FRAME_ABOVE_GROUND,
+    FRAME_ABOVE_SEA,
     FRAME_MISSION,
     FRAME_RELATIVE,
     NAV_LAST,
@@ -23,7 +25,7 @@ from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon, Notice, Plan
 from aerodaas.dataflow.plans.waypoint_file import HEADER
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin, yaw_enu_to_ned
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, Waypoint, WaypointType
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = ["planned", "write_plan"]
 
@@ -35,6 +37,12 @@ _PX4, _ARDUPILOT = 12, 3
 """MAV_AUTOPILOT, by which the meaning of parameters is known."""
 _COPTER = 2
 """MAV_TYPE."""
+_FRAMES = {
+    HeightReference.SEA: FRAME_ABOVE_SEA,
+    HeightReference.GROUND: FRAME_ABOVE_GROUND,
+}
+_ALTITUDE_MODES = {FRAME_RELATIVE: 1, FRAME_ABOVE_SEA: 2, FRAME_ABOVE_GROUND: 4}
+"""QGroundControl's, by frame."""
 
 
 def planned(
@@ -77,7 +85,7 @@ def write_plan(path: str | Path, plan: Plan) -> list[Notice]:
 
 
 def _place(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, float]:
-    """Latitude, longitude, and metres above home."""
+    """Latitude, longitude, and metres above home, or what else the waypoint names."""
     if waypoint.waypoint_type is WaypointType.RELATIVE:
         raise ConfigError(
             f"waypoint {waypoint.id!r} is relative to a take-off that no plan knows; "
@@ -86,8 +94,8 @@ def _place(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, floa
     if waypoint.waypoint_type is WaypointType.LOCAL:
         latitude, longitude, _ = home.to_geodetic(np.array([waypoint.x, waypoint.y, 0.0]))
         return latitude, longitude, waypoint.z
-    above = home.altitude if waypoint.waypoint_type is WaypointType.GLOBAL else 0.0
-    return waypoint.x, waypoint.y, waypoint.z - above
+    ellipsoid = waypoint.waypoint_type is WaypointType.GLOBAL and waypoint.above is None
+    return waypoint.x, waypoint.y, waypoint.z - (home.altitude if ellipsoid else 0.0)
 
 
 def _items(
@@ -95,7 +103,9 @@ def _items(
     places: Sequence[tuple[float, float, float]],
     home: GeodeticOrigin,
 ) -> Iterator[PlanItem]:
-    climb = max(places[0][2], _LOWEST_TAKEOFF) if places else _LOWEST_TAKEOFF
+    # How high a place above the sea lies above home, the plan need not know.
+    above_home = places and waypoints[0].above is not HeightReference.SEA
+    climb = max(places[0][2], _LOWEST_TAKEOFF) if above_home else _LOWEST_TAKEOFF
     start = (home.latitude, home.longitude, climb)
     yield PlanItem(1, NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
     number, speed = 2, None
@@ -107,7 +117,9 @@ def _items(
             number += 1
         yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
         held = (waypoint.hover_duration, 0.0, 0.0, yaw)
-        yield PlanItem(number, NAV_WAYPOINT, FRAME_RELATIVE, held, *at)
+        above = HeightReference(waypoint.above or HeightReference.HOME)
+        frame = _FRAMES.get(above, FRAME_RELATIVE)
+        yield PlanItem(number, NAV_WAYPOINT, frame, held, *at)
         number += 1
     still = (0.0, 0.0, 0.0, 0.0)
     yield PlanItem(number, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
@@ -210,6 +222,7 @@ def _entry(item: PlanItem) -> dict[str, Any]:
         "frame": item.frame,
         "params": [*item.values, item.x, item.y, item.z],
     }
-    if item.frame == FRAME_RELATIVE:
-        entry |= {"AMSLAltAboveTerrain": None, "Altitude": item.z, "AltitudeMode": 1}
+    mode = _ALTITUDE_MODES.get(item.frame)
+    if mode is not None:
+        entry |= {"AMSLAltAboveTerrain": None, "Altitude": item.z, "AltitudeMode": mode}
     return entry

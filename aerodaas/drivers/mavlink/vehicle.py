@@ -246,6 +246,12 @@ class MavlinkVehicle:
             link, now = self._connected().link, time.monotonic()
             return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
 
+    @property
+    def sea_level(self) -> float | None:
+        """Metres above mean sea level of our frame's zero, by its altitude; None: not known."""
+        with self._lock:
+            return None if self._connection is None else self._connection.alignment.sea_level
+
     def health(self) -> HealthReadings:
         """What it tells about itself; raises VehicleError if not connected."""
         with self._lock:

@@ -34,7 +34,7 @@ from aerodaas.types.errors import (
     SourceError,
 )
 from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.types.waypoints import HeightDatum, Waypoint
 
 if TYPE_CHECKING:
     from aerodaas.environment.document.compiling import WrittenMission
@@ -271,9 +271,11 @@ class ProvidedRun:
         home, found = self.config.home, {}
         origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
         starts = {robot.id: np.array(robot.start) for robot in self.config.robots}
+        # How high sea and ground lie, the provider may know alone, and a map does not show.
+        level = HeightDatum(0.0, lambda *_: 0.0)
         for edge in self.graph.navigation:
             for waypoint in edge.navigation.waypoints:
-                found[waypoint.id] = waypoint.resolve(starts[edge.robot], origin)
+                found[waypoint.id] = waypoint.resolve(starts[edge.robot], origin, level)
         return found
 
     def _come_home(self, seconds: float) -> None:

@@ -23,8 +23,9 @@ class Geofence:
     Raises ConfigError for self-intersecting outlines and for a fence that its margin fills.
     """
 
-    def __init__(self, config: GeofenceConfig) -> None:
-        """Build the polygons."""
+    def __init__(self, config: GeofenceConfig, unknown: BaseGeometry | None = None) -> None:
+        """Build the polygons; nothing flies over `unknown` ground."""
+        self._unknown = unknown
         self.floor = config.floor
         self.ceiling = config.ceiling
         self.margin = config.margin
@@ -35,7 +36,7 @@ class Geofence:
         """From each edge's start to its end."""
         self._squared: NDArray[np.float64] = np.empty(0)
         """Their lengths squared; 1 for an edge without length."""
-        if not (config.polygon or config.no_fly):
+        if not (config.polygon or config.no_fly or unknown is not None):
             return
         unbounded = 1e6
         area: BaseGeometry = (
@@ -45,6 +46,8 @@ class Geofence:
         )
         for number, outline in enumerate(config.no_fly):
             area = area.difference(_polygon(outline, f"no_fly.{number}"))
+        if unknown is not None:
+            area = area.difference(unknown)
         inner = area.buffer(-config.margin, join_style="mitre")
         if inner.is_empty:
             raise ConfigError(
@@ -79,8 +82,11 @@ class Geofence:
             return ""
         place = shapely.Point(east, north)
         if not shapely.covers(self.area, place):
-            distance = shapely.distance(self.area, place)
-            return f"({east:.1f}, {north:.1f}) lies {distance:.1f} m outside the geofence"
+            if self._unknown is not None and shapely.covers(self._unknown, place):
+                why = "over ground that the terrain does not know"
+            else:
+                why = f"{shapely.distance(self.area, place):.1f} m outside the geofence"
+            return f"({east:.1f}, {north:.1f}) lies {why}"
         tolerance = 1e-6
         if shapely.distance(self.inner, place) > tolerance:
             return f"({east:.1f}, {north:.1f}) lies within {self.margin:g} m of the geofence's edge"

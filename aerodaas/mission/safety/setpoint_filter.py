@@ -1,9 +1,9 @@
 """The final safety filter on every setpoint: limits that clamp, boundaries to stop before.
 
-Boundaries (geofence, range, other drones) bound the speed towards them by the remaining braking
-distance, a control barrier: whatever the previous setpoints, the drone can still stop in time, and
-standing still is always allowed. Motion along a boundary or away from it is left alone, so that a
-drone that was blown outside can come back.
+Boundaries (geofence, range, ground, other drones) bound the speed towards them by the remaining
+braking distance, a control barrier: whatever the previous setpoints, the drone can still stop in
+time, and standing still is always allowed. Motion along a boundary or away from it is left alone,
+so that a drone that was blown outside can come back.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ import numpy as np
 
 from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView
 from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector, is_close, is_finite, length
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
 __all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
+
+_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,15 +56,22 @@ class SetpointFilter:
     """Clamps the setpoints of one drone to its limits."""
 
     def __init__(
-        self, limits: LimitsConfig, home: Vector, *, position_setpoints: bool = True
+        self,
+        limits: LimitsConfig,
+        home: Vector,
+        *,
+        position_setpoints: bool = True,
+        clearance: GroundClearance | None = None,
     ) -> None:
         """Guard a drone that took off at `home` (ENU metres).
 
         Without `position_setpoints`, position setpoints become velocities towards their targets.
+        With a `clearance`, the drone keeps above the ground, and away from where it is unknown.
         """
         self.limits = limits
         self.home = home
-        self.fence = Geofence(limits.geofence)
+        self._clearance = clearance
+        self.fence = Geofence(limits.geofence, clearance.unknown if clearance else None)
         self._position_setpoints = position_setpoints
         self._yaw_rate = math.radians(limits.max_yaw_rate)
         self._last: Vector | None = None
@@ -108,6 +118,10 @@ class SetpointFilter:
         target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
         if not is_close(target, asked.position):
             names.append("max_range")
+        if self._clearance is not None:
+            raised = self._clearance.raised(target)
+            names += ["ground"] if raised is not target else []
+            target = raised
         # What the fence allows nearest to a place in range may itself be out of range.
         inside = self.fence.nearest_within(target, self.home, self.limits.max_range)
         if inside is None:
@@ -172,6 +186,14 @@ class SetpointFilter:
     ) -> tuple[Vector, list[str]]:
         bounds = self._bounds(odometry, neighbours)
         names: list[str] = []
+        if self._clearance is not None:
+            view = self._clearance.view(odometry.position, odometry.velocity, velocity)
+            bounds.append(self._bound("ground", _DOWN, view.room_below(), odometry))
+            slowed = self._over_ground(velocity, view, odometry)
+            if slowed is not velocity:
+                # The other boundaries have the last word: it climbs through no ceiling.
+                velocity = slowed
+                names.append("ground")
         sweeps = 4  # alternating projections; scaling down below removes the remainder
         for _ in range(sweeps):
             before = velocity
@@ -205,6 +227,19 @@ class SetpointFilter:
             if self.limits.separation > 0.0 and distance > 0.0:
                 bounds.append(self._bound("separation", way / distance, room, odometry))
         return bounds
+
+    def _over_ground(self, velocity: Vector, view: GroundView, odometry: Odometry) -> Vector:
+        """`velocity`, slowed down before higher ground, and climbing to pass over it."""
+        share = 1.0
+        for way, room in view.walls():
+            closing = float(velocity @ way)
+            speed = self._bound("ground", way, room, odometry).speed
+            if closing > speed:
+                share = min(share, speed / closing)
+        climb = max(float(velocity[2]), view.climb())
+        if share == 1.0 and climb == velocity[2]:
+            return velocity
+        return np.array([share * velocity[0], share * velocity[1], climb])
 
     def _fence_bounds(self, odometry: Odometry) -> list[_Bound]:
         fence, position = self.fence, odometry.position

@@ -6,8 +6,11 @@ import enum
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.types.clock import seconds
 from aerodaas.types.energy import EnergyMeter
 from aerodaas.types.geometry import Vector, is_finite
@@ -61,6 +64,9 @@ class Assessment:
         return self.gravest.demand
 
 
+_SLACK = 0.5
+"""Metres below the clearance from which people are told: a position's noise and lag are less."""
+
 CALM = Assessment(Fault(FailsafeAction.NOTHING, "", ""))
 """An assessment without faults."""
 
@@ -72,9 +78,15 @@ class Supervisor:
     """Age in seconds from which a vehicle's state no longer shows its position."""
 
     def __init__(
-        self, limits: LimitsConfig, home: Vector, fence: Geofence, meter: EnergyMeter
+        self,
+        limits: LimitsConfig,
+        home: Vector,
+        fence: Geofence,
+        meter: EnergyMeter,
+        clearance: GroundClearance | None = None,
     ) -> None:
         """Watch a vehicle that took off at `home` (ENU metres)."""
+        self._clearance = clearance
         self._limits = limits
         self._home = home
         self._fence = fence
@@ -92,6 +104,7 @@ class Supervisor:
             self._position(state, now),
             self._battery(state),
             self._place(state),
+            self._ground(state),
         )
         self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
@@ -180,6 +193,17 @@ class Supervisor:
             text = f"the drone is outside its geofence, at {_place(position)}"
             return Fault(FailsafeAction.NOTHING, "geofence", text)
         return None
+
+    def _ground(self, state: VehicleState) -> Fault | None:
+        """Tell of a drone that follows setpoints nearer to the ground than it may be."""
+        if self._clearance is None or state.mode is not VehicleMode.GUIDED:
+            return None
+        if not has_position(state):
+            return None
+        position = state.odometry.position
+        slack = np.array([0.0, 0.0, _SLACK])
+        objection = self._clearance.objection(position + slack)
+        return Fault(FailsafeAction.NOTHING, "ground", objection) if objection else None
 
 
 def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:

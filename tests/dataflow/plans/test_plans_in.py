@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from plan_files import item, lines, mavwp, plan, survey, waypoint
 
-from aerodaas import AeroNavigation, WaypointType
+from aerodaas import AeroNavigation, HeightReference, WaypointType
 from aerodaas.dataflow.plans.commands import NAV_LAST, command_name
 from aerodaas.dataflow.plans.plan import Plan, PlanItem
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
@@ -203,15 +203,15 @@ def test_what_leads_elsewhere_is_refused(tmp_path: Path, command: int) -> None:
 
 @pytest.mark.parametrize("frame", [0, 5])
 def test_heights_above_the_sea(tmp_path: Path, frame: int) -> None:
-    """Less that of home: the plan's own, or the given; with neither, refused with the remedy."""
+    """Less that of home: the plan's own, or the given; with neither, for the mission to say."""
     path = plan(tmp_path / "a.plan", waypoint(0.001, 500.0, frame))
     assert flown_plan(path)[0][0].z == pytest.approx(12.0)
     assert flown_plan(path, home_altitude=480.0)[0][0].z == pytest.approx(20.0)
     unknown = [[None, None, None], [0, 0, 0], [47.0, 8.0, None], [47.0, 8.0], [47.0, 8.0, 0]]
     for home in (None, *unknown):
         path = plan(tmp_path / "b.plan", waypoint(0.001, 500.0, frame), home=home)
-        with pytest.raises(ConfigError, match="above the sea, and that of home is not known: give"):
-            flown_plan(path)
+        (one,) = flown_plan(path)[0]
+        assert (one.z, one.above) == (500.0, HeightReference.SEA)
         assert flown_plan(path, home_altitude=480.0)[0][0].z == pytest.approx(20.0)
 
 
@@ -224,10 +224,10 @@ def test_heights_above_home_need_nothing(tmp_path: Path, frame: int) -> None:
 
 @pytest.mark.parametrize("frame", [10, 11])
 def test_heights_above_ground(tmp_path: Path, frame: int) -> None:
-    """Refused where the ground is not known; else above its height there."""
+    """Above its height there; where that is not given, the environment's terrain is to know."""
     path = plan(tmp_path / "a.plan", waypoint(0.001, 20.0, frame))
-    with pytest.raises(ConfigError, match="above the ground, whose height is not known: give"):
-        flown_plan(path)
+    (one,) = flown_plan(path)[0]
+    assert (one.z, one.above) == (20.0, HeightReference.GROUND)
     asked: list[tuple[float, float]] = []
 
     def ground(latitude: float, longitude: float) -> float:
@@ -378,8 +378,7 @@ def test_a_plan_of_mission_planner_becomes_waypoints(tmp_path: Path) -> None:
 def test_a_home_of_zeros_is_none(tmp_path: Path, home: str) -> None:
     """Some writers know no home, or not its altitude: then the sea's level is not known either."""
     path = lines(tmp_path / "a.waypoints", *ROWS, home=home)
-    with pytest.raises(ConfigError, match="item 3: its altitude is above the sea"):
-        flown_plan(path)
+    assert [one.above for one in flown_plan(path)[0]] == [None, HeightReference.SEA]
 
 
 @pytest.mark.parametrize(

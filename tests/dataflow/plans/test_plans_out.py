@@ -20,7 +20,7 @@ from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.dataflow.plans.writing import write_plan
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin, wrap_angle
-from aerodaas.types.waypoints import WaypointType
+from aerodaas.types.waypoints import HeightReference, WaypointType
 
 HOME = GeodeticOrigin(-35.363262, 149.165237, 584.0)
 metres = st.floats(-2000.0, 2000.0)
@@ -117,6 +117,37 @@ def test_a_height_above_the_ellipsoid_is_written_above_home(tmp_path: Path) -> N
     (one,) = flown_plan(tmp_path / "a.plan")[0]
     assert (one.x, one.y) == (-35.36, 149.16)
     assert one.z == pytest.approx(16.0)
+
+
+@pytest.mark.parametrize("suffix", [".plan", ".waypoints"])
+def test_a_waypoints_height_keeps_what_it_is_counted_from(tmp_path: Path, suffix: str) -> None:
+    """Home, sea and ground come back as they were written."""
+    asked = [
+        Waypoint("a", 10, 0, 12, waypoint_type="local", above="home"),
+        Waypoint("b", -35.36, 149.16, 650.0, waypoint_type="global", above="sea"),
+        Waypoint("c", -35.36, 149.161, 30.0, waypoint_type="global_relative", above="ground"),
+    ]
+    path = tmp_path / f"a{suffix}"
+    AeroNavigation(data=asked).to_plan(path, HOME)
+    read = flown_plan(path)[0]
+    assert [(one.z, one.above) for one in read] == [
+        (12.0, None),
+        (650.0, HeightReference.SEA),
+        (30.0, HeightReference.GROUND),
+    ]
+
+
+def test_a_ground_station_shows_heights_by_their_reference(tmp_path: Path) -> None:
+    """QGroundControl's modes: absolute and terrain frame, beside their MAVLink frames."""
+    asked = [
+        Waypoint("b", -35.36, 149.16, 650.0, waypoint_type="global", above="sea"),
+        Waypoint("c", -35.36, 149.161, 30.0, waypoint_type="global", above="ground"),
+    ]
+    AeroNavigation(data=asked).to_plan(tmp_path / "a.plan", HOME)
+    items = json.loads((tmp_path / "a.plan").read_text())["mission"]["items"]
+    found = [(one["frame"], one["AltitudeMode"]) for one in items if one["command"] == 16]
+    assert found == [(0, 2), (10, 4)]
+    assert items[0]["params"][6] == 1.5
 
 
 def test_what_a_ground_station_finds(tmp_path: Path) -> None:

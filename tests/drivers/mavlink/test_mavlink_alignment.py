@@ -60,6 +60,12 @@ class Flying:
         self.move(0.1, *metres)
 
 
+def test_the_frame_knows_how_high_it_lies_above_the_sea() -> None:
+    """By the autopilot's own altitude, which is none of GPS's above the ellipsoid."""
+    assert Flying().alignment.sea_level == pytest.approx(488.0)
+    assert Flying(altitude=None).alignment.sea_level is None
+
+
 def test_zero_lies_where_the_globe_says() -> None:
     """As far south and west of the vehicle as it is north and east of zero."""
     origin = Flying().alignment.origin

@@ -56,7 +56,8 @@ class Alignment:
         self._reboots = telemetry.reboots
         self.origin = global_origin(telemetry, frame)
         """Geodetic origin of our frame."""
-        self._sea_level = _sea_level(telemetry, frame)
+        self.sea_level = _sea_level(telemetry, frame)
+        """Metres above mean sea level of our frame's origin, by the autopilot; None: not known."""
         self._last: _Sample | None = None
         self._candidates: list[tuple[float, Vector]] = []
         self._stood_at: Vector | None = None
@@ -99,13 +100,13 @@ class Alignment:
             return
         known = telemetry.place is not None and telemetry.altitude is not None
         fresh = telemetry.knows_place(now)
-        if not (known and fresh and sure and last is not None and self._sea_level is not None):
+        if not (known and fresh and sure and last is not None and self.sea_level is not None):
             self._candidates.clear()
             return
         assert telemetry.place is not None  # noqa: S101 - just asked
         assert telemetry.altitude is not None  # noqa: S101 - the same
         east, north, _ = self.origin.to_local(*telemetry.place, self.origin.altitude)
-        there = np.array([east, north, telemetry.altitude - self._sea_level])
+        there = np.array([east, north, telemetry.altitude - self.sea_level])
         self._candidates.append((now, there - ned_to_enu(last.position)))
         self._try(now)
 

@@ -1,0 +1,30 @@
+"""Settings of the terrain: elevation files, and how near to the ground a drone may come."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["TerrainConfig"]
+
+
+class TerrainConfig(BaseModel):
+    """The ground around home. Drones keep away from it, and never fly where it is not known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    files: Annotated[list[str], Field(min_length=1, max_length=400)]
+    """SRTM's `.hgt` or GeoTIFF (EPSG:4326), metres above the sea; they lie where drones are flown
+    from, too."""
+    clearance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 5.0
+    """Metres kept above the ground in flight, from the end of the take-off to the landing."""
+
+    def check(self, robot: str, takeoff_height: float) -> None:
+        """Raise ValueError for a take-off that would end too near to the ground."""
+        if takeoff_height < self.clearance:
+            message = (
+                f"{robot}: limits.takeoff_height ({takeoff_height:g} m) must be at least "
+                f"terrain.clearance ({self.clearance:g} m): raise the one or lower the other"
+            )
+            raise ValueError(message)

@@ -1,0 +1,1 @@
+"""Terrain: heights of the ground from elevation files, and the ground beneath a flight."""
