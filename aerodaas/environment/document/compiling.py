@@ -203,7 +203,7 @@ class _Compiler:
 
     def _waypoints(self, edge: NavigationEdge) -> Iterator[dict[str, Any]]:
         for waypoint in edge.navigation.waypoints:
-            yield WaypointEntry.of(waypoint).model_dump()
+            yield WaypointEntry.of(waypoint).model_dump(exclude_defaults=True)
 
     def _trajectory(self) -> dict[str, Any] | None:
         scheduler = self._environment.chosen_trajectory
