@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection
 
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access import Principal, Quotas, sees
 from aerodaas.service.errors import RefusedError
@@ -145,7 +145,8 @@ class Bookings:
         for robot in self._config.robots:
             state = states[robot.id]
             place = state.position or robot.start
-            usable = None if state.battery is None else state.battery - robot.limits.battery_return
+            charge = _charge(robot, state.battery)
+            usable = None if charge is None else charge - robot.limits.battery_return
             minutes = robot.limits.endurance / 60.0
             fleet[robot.id] = Candidate(
                 robot.id,
@@ -156,3 +157,10 @@ class Bookings:
                 busy=robot.id in busy,
             )
         return fleet
+
+
+def _charge(robot: RobotConfig, known: float | None) -> float | None:
+    """Charge of a drone, 0 to 1: that of the simulation's settings for one that has yet to fly."""
+    if known is None and robot.driver == "simulated":
+        return float(robot.settings.get("battery", 1.0))
+    return known

@@ -87,9 +87,16 @@ class Link:
 class Provider:
     """A desk with two drones, in whose flights a test is the process."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        folder: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        *,
+        drone: dict[str, Any] | None = None,
+        **settings: Any,  # noqa: ANN401
+    ) -> None:
         path = folder / "fleet.json"
-        robots = robot("one"), robot("two", 10)
+        robots = [one | (drone or {}) for one in (robot("one"), robot("two", 10))]
         for one in robots:
             one["sensors"] += [{"id": name, "type": "camera"} for name in ("cam", "belly")]
         path.write_text(json.dumps(fleet(*robots)), encoding="utf-8")

@@ -107,11 +107,26 @@ def test_the_end_of_a_flight_is_of_its_own_time(provider: Provider, clock: Clock
     assert (seen(provider).battery, seen(provider).heard) == (0.4, T0)
 
 
-def test_a_charge_that_nobody_knows_lasts_for_no_minute(provider: Provider) -> None:
+def test_a_charge_that_nobody_knows_lasts_for_no_minute(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A lease with charge for so long waits until a drone is known to have it."""
+    provider = Provider(tmp_path, monkeypatch, drone={"driver": "tello", "settings": {}})
     lease = provider.bookings.request(PILOT, LeaseIn(battery_minutes=1.0, minutes=5.0))
     assert lease.state is LeaseState.QUEUED
     provider.monitor.see("two", battery=0.9)
     provider.bookings.tick()
     granted = provider.bookings.lease(lease.id)
     assert (granted.state, granted.robots) == (LeaseState.GRANTED, ("two",))
+    provider.desk.close()
+
+
+@pytest.mark.parametrize(("battery", "state"), [(1.0, "granted"), (0.31, "queued")])
+def test_a_simulated_drone_has_its_settings_charge_before_it_flies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, battery: float, state: str
+) -> None:
+    """Nobody watches it between missions."""
+    provider = Provider(tmp_path, monkeypatch, drone={"settings": {"battery": battery}})
+    lease = provider.bookings.request(PILOT, LeaseIn(battery_minutes=2.0, minutes=5.0))
+    assert lease.state.value == state
+    provider.desk.close()
