@@ -62,6 +62,10 @@ LOCAL_ALONE = {
     "compute.endpoint.token_header",
     "compute.settings",
     "runtime_env",
+    # Paths of files, and what belongs to them.
+    "terrain.files",
+    "terrain.clearance",
+    "home.above_sea",
     "recording.application_source",
     "recording.enabled",
     "recording.path",
