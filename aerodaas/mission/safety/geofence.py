@@ -82,11 +82,12 @@ class Geofence:
             return ""
         place = shapely.Point(east, north)
         if not shapely.covers(self.area, place):
-            if self._unknown is not None and shapely.covers(self._unknown, place):
-                why = "over ground that the terrain does not know"
-            else:
-                why = f"{shapely.distance(self.area, place):.1f} m outside the geofence"
-            return f"({east:.1f}, {north:.1f}) lies {why}"
+            distance = shapely.distance(self.area, place)
+            return (
+                f"({east:.1f}, {north:.1f}) lies over ground that the terrain does not know"
+                if self._unknown is not None and shapely.covers(self._unknown, place)
+                else f"({east:.1f}, {north:.1f}) lies {distance:.1f} m outside the geofence"
+            )
         tolerance = 1e-6
         if shapely.distance(self.inner, place) > tolerance:
             return f"({east:.1f}, {north:.1f}) lies within {self.margin:g} m of the geofence's edge"
