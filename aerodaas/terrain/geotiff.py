@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.config.extras import require_extra
@@ -28,9 +27,6 @@ _ABOVE_SEA = (None, 3855, 5773, 5798, 5714)
 """Vertical datums: none said, EGM2008, EGM96, EGM84, mean sea level."""
 _METRE = (None, 9001)
 _PIXEL_IS_POINT = 2
-_HIGHEST = 9000.0
-_DEEPEST = -500.0
-"""Metres between which all land lies; what lies beyond is as good as a hole."""
 
 
 def geotiff_tile(path: Path) -> Tile:
@@ -54,11 +50,7 @@ def geotiff_tile(path: Path) -> Tile:
     def read() -> NDArray[Any]:
         return _samples(path, grid)
 
-    def is_void(samples: NDArray[Any]) -> NDArray[np.bool_]:
-        unknown: NDArray[np.bool_] = ~((samples >= _DEEPEST) & (samples <= _HIGHEST))
-        return unknown if void is None else unknown | (samples == void)
-
-    return Tile(path.name, grid, read, is_void)
+    return Tile(path.name, grid, read, void)
 
 
 def _samples(path: Path, grid: Grid) -> NDArray[Any]:

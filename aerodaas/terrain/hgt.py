@@ -22,9 +22,6 @@ _NAME = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
 _SIDES = (1201, 3601)
 """Samples a side at 3 and at 1 arc second."""
 _VOID = -32768
-_HIGHEST = 9000
-_DEEPEST = -500
-"""Metres between which all land lies; what lies beyond is as good as a hole."""
 
 
 def hgt_tile(path: Path) -> Tile:
@@ -55,9 +52,4 @@ def hgt_tile(path: Path) -> Tile:
     def read() -> NDArray[Any]:
         return np.memmap(path, dtype=">i2", mode="r", shape=(side, side))
 
-    return Tile(path.name, Grid(south + 1.0, float(west), step, step, side, side), read, _is_void)
-
-
-def _is_void(samples: NDArray[Any]) -> NDArray[np.bool_]:
-    unknown: NDArray[np.bool_] = (samples == _VOID) | (samples > _HIGHEST) | (samples < _DEEPEST)
-    return unknown
+    return Tile(path.name, Grid(south + 1.0, float(west), step, step, side, side), read, _VOID)

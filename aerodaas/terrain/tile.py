@@ -14,6 +14,8 @@ __all__ = ["MOST_SAMPLES", "Grid", "Tile"]
 
 MOST_SAMPLES = 30_000_000
 """Most samples of a file, or of an area cut out of several: 120 MB as 32-bit numbers."""
+_HIGHEST, _DEEPEST = 9000.0, -500.0
+"""Metres between which all land lies; what lies beyond is as good as a hole."""
 _ALIGNED = 1e-3
 """Share of a step by which grids may be out of line: more than rounding in any file."""
 
@@ -71,8 +73,8 @@ class Tile:
     grid: Grid
     read: Callable[[], NDArray[Any]]
     """Reads the samples, shape (rows, columns); a memory map where the format allows it."""
-    is_void: Callable[[NDArray[Any]], NDArray[np.bool_]]
-    """Which samples mean that nothing is known."""
+    void: float | None
+    """The sample that means that nothing is known, if the file says one."""
 
     @cached_property
     def _samples(self) -> NDArray[Any]:
@@ -82,5 +84,6 @@ class Tile:
         """Heights of a part in metres; NaN where nothing is known."""
         part = np.asarray(self._samples[rows, columns])
         heights = part.astype(np.float32)
-        heights[self.is_void(part) | ~np.isfinite(heights)] = np.nan
+        unknown = ~((part >= _DEEPEST) & (part <= _HIGHEST))
+        heights[unknown if self.void is None else unknown | (part == self.void)] = np.nan
         return heights
