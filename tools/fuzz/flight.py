@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import queue
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -22,6 +22,7 @@ from aerodaas.types.geometry import Vector
 from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, Vehicle, VehicleState
 from aerodaas.types.waypoints import VelocityCommand, Waypoint, WaypointType
+from tools.fuzz.records import LONGEST_REST
 
 __all__ = [
     "LIMITS",
@@ -94,6 +95,26 @@ class FuzzedFlight:
     def state(self) -> MissionState:
         """State of the mission."""
         return self.mission.state
+
+    def fly(
+        self,
+        turn: Callable[[], None],
+        hear: Callable[[int, bytes], None],
+        heard: Iterable[tuple[int, int, bytes]],
+        *,
+        climb: int,
+        by_hand: bool,
+    ) -> None:
+        """Take off in at most `climb` turns, then hear records, each with its turns after it."""
+        for _ in range(climb):
+            turn()
+            if self.state is MissionState.ENROUTE:
+                break
+        self.by_hand = by_hand
+        for kind, rest, body in heard:
+            hear(kind, body)
+            for _ in range(1 + rest % LONGEST_REST):
+                turn()
 
     def turn(self) -> None:
         """Turn once, and check what was sent and what is believed."""

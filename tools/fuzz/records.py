@@ -10,12 +10,14 @@ from collections import deque
 from collections.abc import Iterator
 from itertools import takewhile
 
-__all__ = ["EARLY", "QUIET", "early", "record", "records"]
+__all__ = ["EARLY", "LONGEST_REST", "QUIET", "early", "record", "records"]
 
 EARLY = 0x40
 """Bit of the first records: heard while the driver connects and takes off, one each turn."""
 QUIET = 0x80
 """Bit of a record: the vehicle itself says nothing until the next one."""
+LONGEST_REST = 40
+"""Most turns until the next record, whatever is said."""
 
 _HEAD = struct.Struct(">BBH")
 """What it is, turns until the next one, length of its body."""

@@ -21,7 +21,6 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import ned_to_enu
-from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
     START,
@@ -33,7 +32,7 @@ from tools.fuzz.flight import (
     replaced,
     require,
 )
-from tools.fuzz.records import EARLY, QUIET, early, record, records
+from tools.fuzz.records import EARLY, LONGEST_REST, QUIET, early, record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
@@ -52,7 +51,6 @@ _KINDS = sorted(link._WANTED)  # noqa: SLF001 - every message that the driver re
 _LONGEST_BODY = 600
 _BYTES, _MESSAGE, _FORGED, _OTHER = range(4)
 """Bytes as they are; a message of the vehicle, of a stranger, of another system: kind, payload."""
-_LONGEST_REST = 40
 _FIRST = 3
 """Turns in each of which the vehicle says everything, so that it is soon met."""
 _WORD = 4
@@ -219,15 +217,7 @@ def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> No
         return  # it was a stranger who was met first
     rig.connected = True
     flight = FuzzedFlight(rig.vehicle, _ROBOT)
-    for _ in range(40):
-        _turn(rig, flight)
-        if flight.state is MissionState.ENROUTE:
-            break
-    flight.by_hand = by_hand
-    for kind, rest, body in heard:
-        rig.hear_record(kind, body)
-        for _ in range(1 + rest % _LONGEST_REST):
-            _turn(rig, flight)
+    flight.fly(lambda: _turn(rig, flight), rig.hear_record, heard, climb=40, by_hand=by_hand)
 
 
 def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
@@ -327,7 +317,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
                 del found[index]
             case 3:
                 kind = rng.choice((kind ^ EARLY, kind ^ QUIET, kind & ~3 | rng.randrange(4)))
-                found[index] = (kind, rng.choice((rest, 0, _LONGEST_REST - 1)), body)
+                found[index] = (kind, rng.choice((rest, 0, LONGEST_REST - 1)), body)
             case _:
                 place = rng.randrange(1, max(2, len(body) - _WORD + 1))
                 found[index] = (kind, rest, body[:place] + _value(rng) + body[place + _WORD :])

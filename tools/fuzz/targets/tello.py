@@ -17,7 +17,6 @@ from aerodaas.drivers.tello import handshake, link, vehicle
 from aerodaas.drivers.tello.link import TelloLink
 from aerodaas.drivers.tello.vehicle import TelloVehicle
 from aerodaas.types.errors import VehicleError
-from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
     START,
@@ -29,7 +28,7 @@ from tools.fuzz.flight import (
     replaced,
     require,
 )
-from tools.fuzz.records import EARLY, QUIET, early, record, records
+from tools.fuzz.records import EARLY, LONGEST_REST, QUIET, early, record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
@@ -40,7 +39,6 @@ _OWN = ("192.168.10.1", 8889)
 _STICKS = re.compile(r"rc (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3})")
 _LONGEST_BODY = 2000
 _REPLY, _STATE, _STRANGERS_REPLY, _STRANGERS_STATE = range(4)
-_LONGEST_REST = 40
 _FULL = 100
 """Percent."""
 _FIELDS = tuple("pitch roll yaw vgx vgy vgz templ temph tof h bat baro time".split())  # noqa: SIM905
@@ -160,15 +158,7 @@ def run(data: bytes) -> None:
 
 def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
     flight = FuzzedFlight(rig.vehicle, _ROBOT)
-    for _ in range(60):
-        _turn(rig, flight)
-        if flight.state is MissionState.ENROUTE:
-            break
-    flight.by_hand = by_hand
-    for kind, rest, body in heard:
-        rig.hear_record(kind, body)
-        for _ in range(1 + rest % _LONGEST_REST):
-            _turn(rig, flight)
+    flight.fly(lambda: _turn(rig, flight), rig.hear_record, heard, climb=60, by_hand=by_hand)
 
 
 def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
@@ -229,7 +219,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
                 del found[index]
             case 3:
                 kind = rng.choice((kind ^ EARLY, kind ^ QUIET, kind & ~3 | rng.randrange(4)))
-                found[index] = (kind, rng.choice((rest, 0, _LONGEST_REST - 1)), body)
+                found[index] = (kind, rng.choice((rest, 0, LONGEST_REST - 1)), body)
             case _:
                 place = rng.randrange(len(body) + 1)
                 found[index] = (kind, rest, body[:place] + _value(rng) + body[place + 1 :])
