@@ -9,9 +9,10 @@ import pytest
 from aerodaas.drivers.pin import Peer, Pin
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.types.geometry import Vector
+from aerodaas.types.status import MissionState
 from tools.fuzz.flight import ViolationError
 from tools.fuzz.records import record
-from tools.fuzz.targets import mavlink, tello
+from tools.fuzz.targets import http, mavlink, tello
 
 _SECOND = 20
 """Turns."""
@@ -24,6 +25,10 @@ def _flown(target: Any, then: bytes) -> None:  # noqa: ANN401 - a module
     target.run(record(0, _SECOND, b"-") + then)
 
 
+def _unbounded(_: object, velocity: Vector, *__: object) -> tuple[Vector, list[str]]:
+    return velocity, []
+
+
 @pytest.mark.parametrize("target", [mavlink, tello])
 def test_a_filter_that_does_not_stop_at_the_fence_is_told(
     monkeypatch: pytest.MonkeyPatch,
@@ -32,13 +37,21 @@ def test_a_filter_that_does_not_stop_at_the_fence_is_told(
     """Where somebody who flies by hand wants to leave it."""
     for then in (_BY_HAND, _BY_PLAN):
         _flown(target, then)
-
-    def unbounded(_: object, velocity: Vector, *__: object) -> tuple[Vector, list[str]]:
-        return velocity, []
-
-    monkeypatch.setattr(SetpointFilter, "_stop_before_boundaries", unbounded)
+    monkeypatch.setattr(SetpointFilter, "_stop_before_boundaries", _unbounded)
     with pytest.raises(ViolationError, match="out of the fence"):
         _flown(target, _BY_HAND)
+
+
+def test_so_it_is_where_requests_command_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever they ask: the flight is on its way before the first of them."""
+    by_plan, by_hand = b"", b"\n"
+    for data in (by_plan, by_hand):
+        http.run(data)
+    assert http._on_its_way()[2].state is MissionState.ENROUTE
+    monkeypatch.setattr(SetpointFilter, "_stop_before_boundaries", _unbounded)
+    http.run(by_plan)
+    with pytest.raises(ViolationError, match="out of the fence"):
+        http.run(by_hand)
 
 
 def test_a_link_that_follows_a_stranger_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
