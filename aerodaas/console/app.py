@@ -53,7 +53,13 @@ def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool 
 
 def build_page(routes: APIRouter, *, framed: bool = False) -> FastAPI:
     """The application with the page, and the routes that it asks; a guard stands before it."""
-    app = FastAPI(title="AeroDaaS console", docs_url=None, redoc_url=None, openapi_url=None)
+    app = FastAPI(
+        title="AeroDaaS console",
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+        redirect_slashes=False,
+    )
     for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
         app.add_exception_handler(kind, _refused)
     app.include_router(page_routes(framed=framed))

@@ -86,6 +86,7 @@ def build_service(
         version="1",
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,
         lifespan=lifespan,
         openapi_url="/v1/openapi.json",
     )

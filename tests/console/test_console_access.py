@@ -143,6 +143,7 @@ def test_a_pilot_flies_and_people_are_told(flying: tuple[ConsoleServer, Run]) ->
         ("/v1/missions/own/commands", {**HOVER, "command": "loop"}, 422, "command"),
         ("/v1/missions/own/navigation", {"robot": "drone", "waypoints": []}, 422, "waypoints"),
         ("/v1/nothing", None, 404, "Not Found"),
+        ("/v1/missions/", None, 404, "Not Found"),
     ],
 )
 def test_refusals_have_their_reason(

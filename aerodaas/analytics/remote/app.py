@@ -44,7 +44,9 @@ _COMMANDS: dict[str, tuple[Command, str]] = {
 
 def build_app(mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> FastAPI:
     """Build the service that commands `mission` and serves its camera's newest image."""
-    app = FastAPI(title="AeroDaaS remote control", docs_url=None, redoc_url=None)
+    app = FastAPI(
+        title="AeroDaaS remote control", docs_url=None, redoc_url=None, redirect_slashes=False
+    )
     app.add_exception_handler(RequestValidationError, _malformed)
     app.add_exception_handler(AnyHTTPException, _failed)
     desk = _Desk(mission, newest_frame)
