@@ -40,13 +40,13 @@ from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.records import shown
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
+from aerodaas.service.trouble import TroubleLog
 from aerodaas.types.errors import AeroDaaSError, MissionError
 from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["MissionDesk"]
 
-_log = logging.getLogger(__name__)
 _OPEN = frozenset(phase for phase in MissionPhase if not phase.over)
 _TURN_SECONDS = 0.1
 _HEARD_SECONDS = 1.0
@@ -80,6 +80,7 @@ class MissionDesk:
         self._briefing = Briefing(settings, store, bookings, garage)
         self._lock = threading.RLock()
         self._closed = threading.Event()
+        self._trouble = TroubleLog(logging.getLogger(__name__))
         self._heard: dict[str, float] = {}
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
@@ -341,10 +342,13 @@ class MissionDesk:
     def _try(self) -> None:
         try:
             self.turn()
-        except Exception:  # noqa: BLE001 - see below
-            # The database may be gone for a while. Whatever it is: without this thread, no lease
-            # and no mission would ever move on again.
-            _log.exception("the desk could not move on")
+        except StoreError as error:
+            self._trouble.tell("the desk", error)
+        except Exception as error:  # noqa: BLE001 - see below
+            # Without this thread, no lease and no mission would ever move on again.
+            self._trouble.tell("the desk", error, trace=True)
+        else:
+            self._trouble.over("the desk")
 
     def turn(self) -> None:
         """Move every mission on by what has happened."""
@@ -381,7 +385,9 @@ class MissionDesk:
                 self._end(one, MissionPhase.REFUSED, str(error))
             else:
                 # The flight goes on by itself; the next turn looks again.
-                _log.warning("%s: %s", one.row.id, error)
+                self._trouble.tell(one.row.id, error)
+        else:
+            self._trouble.over(one.row.id)
 
     def _step(self, one: ActiveMission) -> None:
         steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {

@@ -226,3 +226,46 @@ def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.Mo
     assert ticks
     one.turns(1)
     assert one.phase(mission) is MissionPhase.FLYING
+
+
+def test_what_fails_each_turn_is_logged_once(
+    one: Desk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """And again once it is something else; its end, too. A fault of ours has its traceback."""
+    failures = iter([StoreError("no room"), StoreError("no room"), StoreError("gone")])
+
+    def failing() -> None:
+        raise next(failures, KeyError("ours"))
+
+    with monkeypatch.context() as broken:
+        broken.setattr(one.bookings, "tick", failing)
+        for _ in range(5):
+            one.desk._try()
+    for _ in range(2):
+        one.desk._try()
+    said = [(line.getMessage(), bool(line.exc_info)) for line in caplog.records]
+    assert said == [
+        ("the desk: no room", False),
+        ("the desk: gone", False),
+        ("the desk: 'ours'", True),
+        ("the desk: goes on", False),
+    ]
+
+
+def test_so_is_a_flight_that_cannot_be_heard(
+    one: Desk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It flies on by itself."""
+    mission = one.submit("one")
+    one.turns()
+    with monkeypatch.context() as broken:
+        broken.setattr(one.desk._missions[mission.id], "flown", _unreadable)
+        one.turns(3)
+    one.turns(2)
+    assert one.phase(mission) is MissionPhase.FLYING
+    said = [line.getMessage() for line in caplog.records]
+    assert said == [f"{mission.id}: unreadable", f"{mission.id}: goes on"]
+
+
+def _unreadable() -> None:
+    raise OSError("unreadable")
