@@ -27,7 +27,7 @@ __all__ = ["run", "seeds"]
 
 _ENVIRONMENT = EnvironmentConfig.model_validate(
     {
-        # In the fence's corner, yet not so near that the estimate's noise is beyond it: no take-off.
+        # In the fence's corner; nearer, the estimate's noise is beyond it, and nothing takes off.
         "robots": [{"id": "drone", "limits": LIMITS, "start": (7.9, 7.9, 0.0)}],
         "simulation": {"world": "empty"},
     }
