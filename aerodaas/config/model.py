@@ -7,31 +7,26 @@ rates Hz, times seconds.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PlainSerializer,
-    PrivateAttr,
-    SecretStr,
-    SerializationInfo,
-    SerializerFunctionWrapHandler,
-    field_serializer,
-    model_serializer,
-    model_validator,
-)
+from pydantic import ConfigDict, Field, SecretStr, field_serializer, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
+from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
+from aerodaas.config.home import HomeConfig
 from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.config.preflight import PreflightConfig
-from aerodaas.config.secrets import HIDDEN, SecretUrl, shown, shown_text
+from aerodaas.config.robot import (
+    CameraConfig,
+    GeofenceConfig,
+    LimitsConfig,
+    MissionConfig,
+    RobotConfig,
+    SensorConfig,
+)
+from aerodaas.config.strict import Finite, NotNegative, Positive, Strict
 from aerodaas.config.terrain import TerrainConfig
 from aerodaas.types.identifiers import Identifier, ScopedName
 
@@ -59,335 +54,8 @@ __all__ = [
     "validated",
 ]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-
-def _shown_settings(settings: dict[str, Any]) -> dict[str, Any]:
-    return dict(shown(settings))
-
-
-Settings = Annotated[dict[str, Any], PlainSerializer(_shown_settings, when_used="json")]
-"""Settings of a plug-in, which may hold secrets."""
-
-
-def _without_logins(value: Any) -> Any:  # noqa: ANN401 - as nested as its input
-    """URLs in texts without user, password and parameters, in any setting."""
-    if isinstance(value, str):
-        return shown_text(value)
-    if isinstance(value, list):
-        return [_without_logins(one) for one in value]
-    if isinstance(value, dict):
-        return {key: _without_logins(one) for key, one in value.items()}
-    return value
-
-
-class _Strict(BaseModel):
-    """Unknown keys are mistakes, not wishes.
-
-    Neither `repr` nor JSON holds a secret; `model_dump()` keeps them, for a copy.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_serializer(mode="wrap")
-    def _serialized(
-        self, dump: SerializerFunctionWrapHandler, info: SerializationInfo
-    ) -> dict[str, Any]:
-        content: dict[str, Any] = dump(self)
-        return _without_logins(content) if info.mode == "json" else content
-
-    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
-        for name, value in super().__repr_args__():
-            # Which settings of a plug-in are secrets, its own model alone knows.
-            hidden = dict.fromkeys(value, HIDDEN) if name == "settings" else value
-            yield name, _without_logins(hidden)
-
-
-class HomeConfig(_Strict):
-    """Where the local ENU frame is pinned on WGS84: degrees and metres."""
-
-    latitude: Annotated[float, Field(ge=-90, le=90)]
-    longitude: Annotated[float, Field(ge=-180, le=180)]
-    altitude: Finite = 0.0
-    """Above the ellipsoid, as GPS counts."""
-    above_sea: Finite | None = None
-    """The same place above mean sea level, for waypoints that are; None: as the vehicle says."""
-
-
-class GeofenceConfig(_Strict):
-    """Where the drone may be: a polygon in ENU metres, a floor and a ceiling above home."""
-
-    polygon: list[tuple[Finite, Finite]] = Field(default_factory=list)
-    """Corners (east, north); empty for no polygon."""
-    floor: Finite = 0.3
-    ceiling: Finite = 120.0
-    margin: NotNegative = 0.5
-    """Metres that the drone keeps from the polygon's edge and from no-fly zones."""
-    no_fly: list[list[tuple[Finite, Finite]]] = Field(default_factory=list)
-    """Polygons (east, north) inside the fence where the drone may not be, at any height."""
-
-    @model_validator(mode="after")
-    def _closed(self) -> Self:
-        corners = 3
-        outlines = [self.polygon, *self.no_fly] if self.polygon else self.no_fly
-        if any(len(outline) < corners for outline in outlines):
-            message = "a geofence polygon needs at least three corners"
-            raise ValueError(message)
-        if self.ceiling <= self.floor:
-            message = "a geofence's ceiling must lie above its floor"
-            raise ValueError(message)
-        return self
-
-
-class LimitsConfig(_Strict):
-    """What the drone's actor clamps to, and how long it waits before it protects the drone."""
-
-    cruise_speed: Positive = 1.0
-    max_speed: Positive = 5.0
-    max_climb: Positive = 1.5
-    max_yaw_rate: Positive = 90.0
-    """Degrees per second."""
-    max_acceleration: Positive = 3.0
-    max_range: Positive = 1000.0
-    """Metres from the place of take-off that the drone may go."""
-    reaction_time: Positive = 0.3
-    """Seconds from a setpoint to the vehicle's answer, kept free before every boundary."""
-    separation: NotNegative = 2.0
-    """Metres kept from the other drones of the environment; 0 for none."""
-    takeoff_height: Positive = 1.5
-    takeoff_timeout: Positive = 30.0
-    """A take-off that takes longer ends in a landing."""
-    preflight_timeout: Positive = 5.0
-    """Time given to the vehicle's own objections to go away before take-off is refused."""
-    arrival_radius: Positive = 0.3
-    command_timeout: Positive = 1.0
-    """Silence of the navigation after which the drone holds."""
-    silence_return: Positive = 20.0
-    """Further silence after which it returns home."""
-    link_timeout: Positive = 3.0
-    """Loss of the vehicle's word or of its position after which the flight is cut short."""
-    return_timeout: Positive = 300.0
-    """A return that takes longer ends in a landing there; a vehicle unheard for so long is lost."""
-    endurance: Positive = 900.0
-    """Seconds that a full battery hovers; the energy model's scale."""
-    battery_return: Annotated[float, Field(ge=0, le=1)] = 0.25
-    """Charge at which the drone returns, earlier where the way home needs more."""
-    battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
-    """Charge at which it lands where it is, and that a return keeps in reserve."""
-    geofence: GeofenceConfig = GeofenceConfig()
-
-    @model_validator(mode="after")
-    def _agree(self) -> Self:
-        fence = self.geofence
-        contradictions = {
-            f"battery_return ({self.battery_return:g}) must be at least battery_land "
-            f"({self.battery_land:g}): raise the one or lower the other": (
-                self.battery_return < self.battery_land
-            ),
-            f"cruise_speed ({self.cruise_speed:g} m/s) must not exceed max_speed "
-            f"({self.max_speed:g} m/s): lower the one or raise the other": self.cruise_speed
-            > self.max_speed,
-            f"takeoff_height ({self.takeoff_height:g} m) must lie between the geofence's floor "
-            f"({fence.floor:g} m) and ceiling ({fence.ceiling:g} m)": not (
-                fence.floor <= self.takeoff_height <= fence.ceiling
-            ),
-        }
-        found = [text for text, wrong in contradictions.items() if wrong]
-        if found:
-            raise ValueError("; ".join(found))
-        return self
-
-
-class MissionConfig(_Strict):
-    """How a mission behaves where the application does not say."""
-
-    on_complete: Literal["return", "land", "hold"] = "return"
-    """What follows the last waypoint when no live stream feeds navigation."""
-    resume_after: NotNegative = 2.0
-    """Silence of urgent velocity commands after which the interrupted plan resumes."""
-    plan_timeout: Positive = 5.0
-    """Wait for a scheduler's first plan before flying the order given."""
-    stall_timeout: Positive = 60.0
-    """A waypoint that comes no nearer for so long is given up."""
-
-
-class SensorConfig(_Strict):
-    """One sensor. `driver` names a camera or reading; further settings go to that driver."""
-
-    id: Identifier
-    type: Literal["camera", "odometry", "gps", "battery", "status"] = "camera"
-    driver: str | None = None
-    """None: a camera of its robot's own kind (see `EnvironmentConfig.camera_driver`)."""
-    rate: Positive = Field(default=15.0, le=1000.0)
-    """Items per second."""
-    settings: Settings = Field(default_factory=dict)
-    _robot: str | None = PrivateAttr(default=None)
-
-    @property
-    def robot(self) -> str | None:
-        """The robot that carries it; None for one of the environment's own."""
-        return self._robot
-
-    @property
-    def full_id(self) -> str:
-        """`robot/sensor`, which no other sensor of the file is called; also its stream."""
-        return self.id if self._robot is None else f"{self._robot}/{self.id}"
-
-    def carried_by(self, robot: str) -> SensorConfig:
-        """The same sensor on board of `robot`."""
-        sensor = self.model_copy()
-        sensor._robot = robot  # noqa: SLF001 - of this class
-        return sensor
-
-
-class CameraConfig(_Strict):
-    """The settings of a camera, from `SensorConfig.settings`."""
-
-    width: Annotated[int, Field(ge=16, le=8192)] = 640
-    height: Annotated[int, Field(ge=16, le=8192)] = 360
-    horizontal_fov: Annotated[float, Field(gt=1, lt=179)] = 82.6
-    """Degrees; the Tello's by default."""
-    mount: tuple[Finite, Finite, Finite] = (0.1, 0.0, 0.08)
-    """Metres forward, left and up of the body's centre."""
-    pitch: Annotated[float, Field(ge=-90, le=90)] = 0.0
-    """Degrees downwards."""
-    yaw: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """Degrees to the left."""
-    depth_range: Annotated[float, Field(ge=3, le=60)] | None = None
-    """Metres up to which a simulated camera measures depth as well; None: it measures none."""
-    path: SecretUrl | None = None
-    """Folder of pictures, video file or URL, for the drivers that read one. User, password and
-    parameters of a URL are shown, logged and recorded nowhere."""
-    topic: str | None = None
-    """Channel of the recording at `path`; None where it holds one camera's pictures only."""
-    loop: bool = False
-
-
-class RobotConfig(_Strict):
-    """One drone: its driver, its sensors and its limits."""
-
-    id: Identifier
-    driver: str = "simulated"
-    settings: Settings = Field(default_factory=dict)
-    """Settings of the driver, such as `url` for MAVLink."""
-    sensors: list[SensorConfig] = Field(default_factory=list)
-    limits: LimitsConfig = LimitsConfig()
-    preflight: PreflightConfig = PreflightConfig()
-    mission: MissionConfig = MissionConfig()
-    edge: Identifier | None = None
-    """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
-    start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
-    """Where it stands before take-off, ENU metres."""
-    start_yaw: Finite = 0.0
-    """Degrees counter-clockwise from east."""
-
-    @model_validator(mode="after")
-    def _carry(self) -> Self:
-        self.sensors[:] = [sensor.carried_by(self.id) for sensor in self.sensors]
-        return self
-
-
-_HTTP = re.compile(r"^https?://[^\s@]+$")
-
-
-def _plain_http(url: SecretUrl) -> SecretUrl:
-    if not _HTTP.match(url.get_secret_value()):
-        message = "must be http://… or https://…, without spaces and without user and password"
-        raise ValueError(message)
-    return url
-
-
-class EndpointConfig(_Strict):
-    """How an inference endpoint is called; the calls come from the edge node."""
-
-    url: Annotated[
-        SecretUrl, AfterValidator(_plain_http), Field(json_schema_extra={"pattern": _HTTP.pattern})
-    ]
-    """Without a password: a secret belongs into `token_env`."""
-    protocol: Literal["v2", "function"] = "v2"
-    """`v2`: the Open Inference Protocol; `function`: JPEG in, JSON detections out."""
-    models: dict[Identifier, str] = Field(default_factory=dict)
-    """Name there by analysis. An analytics scheduler may send the analyses named here."""
-    timeout: Positive = 2.0
-    """Seconds for one frame, all attempts together."""
-    retries: Annotated[int, Field(ge=0, le=10)] = 2
-    """Further attempts after a refused connection or a busy server, while there is time."""
-    cost: NotNegative | None = None
-    """Utility that a call costs; None: the analysis' `cloud_cost`."""
-    token_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
-    """Environment variable of the edge node that holds the secret to send along."""
-    token_header: Annotated[str, Field(pattern=r"^[A-Za-z0-9\-]+$")] = "Authorization"  # noqa: S105
-    """As `Bearer …` where it is `Authorization`, else the bare secret."""
-
-
-class RuntimeEnvConfig(_Strict):
-    """What one analysis has for itself: packages, environment variables, or a container."""
-
-    packages: list[str] = Field(default_factory=list)
-    """Requirements such as `torch==2.4.1`, or paths of wheels, laid over the node's own."""
-    env_vars: dict[str, SecretStr] = Field(default_factory=dict)
-    """Environment variables of its process. Their values are shown, logged and recorded nowhere."""
-    image_uri: str | None = None
-    """Container image, for nodes that have podman; it brings its own packages."""
-
-    @model_validator(mode="after")
-    def _makes_sense(self) -> Self:
-        if self.image_uri is not None and self.packages:
-            message = "an image_uri brings its own packages; build them into the image"
-            raise ValueError(message)
-        for package in self.packages:
-            _check_requirement(package)
-        for name in self.env_vars:
-            if not name.isidentifier() or name.startswith("RAY_"):
-                message = f"{name!r} cannot be set: a letter first, and not one of Ray's (RAY_…)"
-                raise ValueError(message)
-        return self
-
-
-def _check_requirement(package: str) -> None:
-    from packaging.requirements import InvalidRequirement, Requirement  # noqa: PLC0415 - rarely used
-
-    if package.endswith(".whl"):
-        return
-    try:
-        Requirement(package)
-    except InvalidRequirement as error:
-        reason = shown_text(str(error).splitlines()[0])
-        package = shown_text(package)
-        message = f"{package!r} is neither a requirement such as name==1.0 nor a wheel: {reason}"
-        raise ValueError(message) from None
-
-
-class ComputeConfig(_Strict):
-    """One compute resource: a class of Ray nodes by their custom resource, or an endpoint."""
-
-    id: Identifier
-    kind: Literal["edge", "cloud", "http"] = "edge"
-    node: str | None = None
-    """A named node's address, where the kind alone does not say."""
-    executors: Annotated[int, Field(ge=1, le=256)] = 1
-    """Inferences that may run at once."""
-    compression: Literal["jpeg", "png", "none"] = "jpeg"
-    """Of frames that an analytics scheduler sends to a cloud node; `png` is lossless."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
-    endpoint: EndpointConfig | None = None
-    """Of the kind `http`."""
-    settings: Settings = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _endpoint_of_http(self) -> Self:
-        if (self.kind == "http") != (self.endpoint is not None):
-            message = 'the kind "http" needs an endpoint, and no other kind has one'
-            raise ValueError(message)
-        if self.kind == "http" and self.node is not None:
-            message = 'the kind "http" has no node; its address is endpoint.url'
-            raise ValueError(message)
-        return self
-
-
-class TaskConfig(_Strict):
+class TaskConfig(Strict):
     """What a scheduler is told of one analysis, by its name; times in milliseconds.
 
     Benefit and costs are in one unit of the user's choice.
@@ -413,7 +81,7 @@ class TaskConfig(_Strict):
     """Length of the windows, seconds."""
 
 
-class TenantConfig(_Strict):
+class TenantConfig(Strict):
     """One tenant that shares edge and cloud with others, for the scheduler `sfq_dems`."""
 
     analyses: list[ScopedName] = Field(default_factory=list)
@@ -422,7 +90,7 @@ class TenantConfig(_Strict):
     """Its share is its weight over the sum of all tenants' that have tasks."""
 
 
-class SchedulersConfig(_Strict):
+class SchedulersConfig(Strict):
     """Default plug-ins: a registered name or `module:Class`."""
 
     trajectory: str = "ordered"
@@ -443,7 +111,7 @@ class SchedulersConfig(_Strict):
         return self
 
 
-class RecordingConfig(_Strict):
+class RecordingConfig(Strict):
     """What is written to the MCAP file."""
 
     enabled: bool = True
@@ -459,7 +127,7 @@ class RecordingConfig(_Strict):
     """Record the application's source as well; by default its file's name and SHA-256 only."""
 
 
-class RemoteConfig(_Strict):
+class RemoteConfig(Strict):
     """Where `RemoteAnalytics` listens for a remote user, and who may command."""
 
     host: str = "127.0.0.1"
@@ -474,7 +142,7 @@ class RemoteConfig(_Strict):
         """Leave it out: asterisks in its place would be a token that everybody knows."""
 
 
-class SimulationConfig(_Strict):
+class SimulationConfig(Strict):
     """The world of the simulated drones."""
 
     world: str = "field"
@@ -488,7 +156,7 @@ class SimulationConfig(_Strict):
     """Scales the noise of the simulated odometry and GPS; 0 for none."""
 
 
-class EnvironmentConfig(_Strict):
+class EnvironmentConfig(Strict):
     """A whole environment file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, title="AeroDaaS environment")

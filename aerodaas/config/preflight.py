@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from aerodaas.config.strict import Finite, Positive, Strict
 
 __all__ = ["PreflightConfig", "PreflightLevel"]
 
 PreflightLevel: TypeAlias = Literal["ignore", "warn", "refuse", "require"]
 """What a finding means: nothing, a warning, no take-off, or none unless it is known to be good."""
 
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-_Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-
-class PreflightConfig(BaseModel):
+class PreflightConfig(Strict):
     """The health of the vehicle and its surroundings before take-off.
 
     Each item is at one of the levels `ignore`, `warn`, `refuse` (no take-off) and `require` (nor if
     it is not known). Whether the battery, the geofence and the vehicle's own checks allow a
     take-off is no matter of policy.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     cells: PreflightLevel = "warn"
     """Voltage of each cell of the battery."""
@@ -49,23 +46,23 @@ class PreflightConfig(BaseModel):
     """Whether it comes home by itself once this process is gone."""
     remote_id: PreflightLevel = "ignore"
     """Whether a Remote ID transmitter says that it is ready."""
-    cell_voltage: _Positive = 3.5
+    cell_voltage: Positive = 3.5
     """Volts of a cell at least."""
-    cell_spread: _Positive = 0.15
+    cell_spread: Positive = 0.15
     """Volts between the best and the worst cell at most."""
     battery_cycles: Annotated[int, Field(ge=1)] = 300
     """Charging cycles at most."""
-    most_vibration: _Positive = 15.0
+    most_vibration: Positive = 15.0
     """m/s² at most."""
-    misfit: _Positive = 0.8
+    misfit: Positive = 0.8
     """Share at most, of 1, from which the estimator rejects a sensor."""
     satellites: Annotated[int, Field(ge=4)] = 6
     """Satellites at least."""
-    gps_accuracy: _Positive = 5.0
+    gps_accuracy: Positive = 5.0
     """Metres of the GPS' standard deviation along the ground at most."""
-    wind_speed: _Positive = 10.0
+    wind_speed: Positive = 10.0
     """m/s at most."""
-    sun_elevation: _Finite = -6.0
+    sun_elevation: Finite = -6.0
     """Degrees of the sun above the horizon at least; -6 is the end of civil twilight."""
-    silence: _Positive = 1.5
+    silence: Positive = 1.5
     """Seconds since the vehicle's last word at most."""

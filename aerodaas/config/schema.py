@@ -7,7 +7,7 @@ import inspect
 import json
 from typing import Any
 
-from aerodaas.config import model, preflight, terrain
+from aerodaas.config import compute, home, model, preflight, robot, terrain
 from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["environment_schema"]
@@ -30,7 +30,8 @@ def _docstrings() -> dict[str, dict[str, str]]:
     of the time that its imports of the project take.
     """
     found: dict[str, dict[str, str]] = {}
-    sources = map(inspect.getsource, (preflight, terrain, model))
+    modules = (home, terrain, preflight, robot, compute, model)
+    sources = map(inspect.getsource, modules)
     for node in (node for source in sources for node in ast.parse(source).body):
         if isinstance(node, ast.ClassDef):
             inherited: dict[str, Any] = {}

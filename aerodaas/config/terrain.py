@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from aerodaas.config.strict import Positive, Strict
 
 __all__ = ["TerrainConfig"]
 
 
-class TerrainConfig(BaseModel):
+class TerrainConfig(Strict):
     """The ground around home. Drones keep away from it, and never fly where it is not known."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     files: Annotated[list[str], Field(min_length=1, max_length=400)]
     """SRTM's `.hgt` or GeoTIFF (EPSG:4326), metres above the sea; they lie where drones are flown
     from, too."""
-    clearance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 5.0
+    clearance: Positive = 5.0
     """Metres kept above the ground in flight, from the end of the take-off to the landing."""
 
     def check(self, robot: str, takeoff_height: float) -> None:

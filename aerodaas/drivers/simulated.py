@@ -19,7 +19,6 @@ from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
@@ -52,7 +51,7 @@ class SimulatedVehicle:
         limits, simulation, home = robot.limits, environment.simulation, environment.home
         self._name = robot.id
         self._airframe = airframe
-        self._origin = home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+        self._origin = home and home.origin
         self._limits = FlightLimits(
             min(limits.max_speed, airframe.max_speed),
             min(limits.max_climb, airframe.max_climb),

@@ -12,7 +12,6 @@ from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.schedulers.trajectory.fleet import share_out
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.waypoints import HeightDatum, Waypoint, WaypointType
 
 __all__ = ["shared_waypoints"]
@@ -32,7 +31,7 @@ def shared_waypoints(
                 'share out waypoints with waypoint_type "local" or "global"'
             )
     home, wind = config.home, np.array(config.simulation.wind, dtype=np.float64)
-    origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+    origin = home.origin if home else None
     nowhere = np.zeros(3)
     # Hills between the places cost next to nothing; the robots' missions know them.
     level = HeightDatum(home.above_sea if home else None, lambda *_: 0.0)

@@ -20,7 +20,7 @@ from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import ConfigError, MissionError
-from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.geometry import Vector
 from aerodaas.types.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 
 __all__ = ["give", "rehearse"]
@@ -51,7 +51,7 @@ def rehearse(
     commands = list(commands)
     home = environment.home
     takeoff, wind = np.array(robot.start), np.array(environment.simulation.wind)
-    origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+    origin = home.origin if home else None
     known = robot.driver == "simulated" or not any(map(_is_relative, commands))
     planner = InlinePlanner(scheduler)
     sea_level = home.above_sea if home else None

@@ -95,7 +95,12 @@ class SitlFlight:
         self.vehicle.connect(60.0)
         self.clock = ScaledClock()
         takeoff = self.vehicle.read().odometry.position
-        self.mission = Mission(robot, InlinePlanner(NearestNeighborScheduler()), takeoff=takeoff)
+        self.mission = Mission(
+            robot,
+            InlinePlanner(NearestNeighborScheduler()),
+            takeoff=takeoff,
+            sea_level=self.vehicle.sea_level,
+        )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.states: list[MissionState] = []
         self.modes: list[VehicleMode] = []

@@ -22,11 +22,11 @@ from aerodaas.drivers.mavlink.microservices.fence import upload_fence
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.mission.commands import End, OpenStream, Pause, Resume, StreamItem
+from aerodaas.mission.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState as S
 from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
+from aerodaas.types.waypoints import HeightReference, NavigationType, VelocityCommand, Waypoint
 from sitl.autopilot import Autopilot
 from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 
@@ -80,6 +80,20 @@ def test_sensor_driven_flight(autopilot: Autopilot) -> None:
         finish(flight)
     finally:
         flight.close()
+
+
+def test_a_height_above_the_sea(autopilot: Autopilot) -> None:
+    """By the autopilot's own altitude, and the simulator's truth of how high it went."""
+    with SitlFlight(autopilot.url) as flight:
+        sea = flight.vehicle.sea_level
+        assert sea is not None
+        place = Waypoint("high", 5.0, 0.0, 8.0 + sea, hover_duration=2.0, above=HeightReference.SEA)
+        answer = flight.tell(AddNavigation(AeroNavigation(data=[place])))
+        assert answer.accepted, answer.text
+        finish(flight)
+        assert list(flight.status.visited) == ["high"]
+        assert 7.0 < flight.relay.witness.highest < 9.0
+        flight.tell_outcome(f"8 m up, said as {place.z:.1f} m above the sea")
 
 
 def test_pause_and_resume(autopilot: Autopilot) -> None:

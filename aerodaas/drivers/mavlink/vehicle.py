@@ -36,7 +36,7 @@ from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.geometry import Vector
 from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
@@ -75,7 +75,7 @@ class MavlinkVehicle:
         self._name = robot.id
         self._settings = settings = mavlink_settings(robot)
         home = environment.home
-        self._home = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+        self._home = home.origin if home else None
         if settings.frame == "home" and self._home is None:
             raise ConfigError(f'{robot.id}: "frame": "home" needs a home in the environment file')
         self._clock: Clock = ScaledClock()

@@ -33,7 +33,6 @@ from aerodaas.types.errors import (
     RecordingError,
     SourceError,
 )
-from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.waypoints import HeightDatum, Waypoint
 
 if TYPE_CHECKING:
@@ -269,7 +268,7 @@ class ProvidedRun:
     def _places(self) -> dict[str, Waypoint]:
         """The application's own waypoints by id, in local ENU; the map shows them."""
         home, found = self.config.home, {}
-        origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+        origin = home.origin if home else None
         starts = {robot.id: np.array(robot.start) for robot in self.config.robots}
         # How high sea and ground lie, the provider may know alone, and a map does not show.
         level = HeightDatum(0.0, lambda *_: 0.0)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig
 from aerodaas.terrain.ground import Ground
 from aerodaas.types.braking import braking_speed
-from aerodaas.types.geometry import GeodeticOrigin, Vector, wrap_angle
+from aerodaas.types.geometry import Vector, wrap_angle
 
 __all__ = ["GroundClearance"]
 
@@ -61,7 +61,7 @@ class GroundClearance:
         home, terrain = environment.home, environment.terrain
         if home is None or terrain is None:
             return None
-        origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+        origin = home.origin
         ground = Ground.of(terrain, origin, takeoff, limits.max_range, sea_level)
         return cls(ground, terrain.clearance, limits)
 

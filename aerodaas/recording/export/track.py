@@ -149,7 +149,7 @@ def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, fl
 
 def _home(recording: Recording) -> GeodeticOrigin | None:
     home = recorded_home(recording)
-    return GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+    return home.origin if home else None
 
 
 def _gpx_point(parent: ET.Element, kind: str, place: _Place) -> None:
