@@ -14,7 +14,7 @@ from rich.progress import Progress
 
 from aerodaas.analytics.models import DETECTOR
 from tools.training import gestures
-from tools.training.rendering import HELD_OUT, render_shards
+from tools.training.rendering import CALIBRATION, HELD_OUT, render_shards
 from tools.training.sheet import contact_sheet
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
@@ -32,6 +32,16 @@ _Start = Annotated[
 _Processes = Annotated[
     int, typer.Option(min=1, help="Processes that share each step, one per core at best.")
 ]
+_Examples = Annotated[int, typer.Option(help="Augmented pictures whose features are cached.")]
+_HeadsSteps = Annotated[
+    int, typer.Option(help="Steps of the heads' training, of 32 examples each.")
+]
+_Frozen = Annotated[
+    Path, typer.Option(help="File with the frozen part: Megvii's YOLOX-nano, or a detector of it.")
+]
+_Network = Annotated[
+    Path | None, typer.Option(help="A detector whose network is taken over instead of trained.")
+]
 _Photographs = Annotated[Path | None, typer.Option(help="Photographs to try the detector on.")]
 _Labels = Annotated[
     Path | None, typer.Option(help="Their vests: JSON, {file: [left, top, right, bottom]}.")
@@ -40,9 +50,15 @@ _WORK, _OUT = Path("runs/training"), DETECTOR.parent
 
 
 @app.command()
-def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 30) -> None:
-    """Render the pictures, those to train on and those held out; resumes."""
-    for name, first, count in (("train", 0, worlds), ("held-out", HELD_OUT, held_out)):
+def render(
+    work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 30, calibration: int = 20
+) -> None:
+    """Render the pictures, to train on, to measure with and to calibrate by; resumes."""
+    for name, first, count in (
+        ("train", 0, worlds),
+        ("held-out", HELD_OUT, held_out),
+        ("calibration", CALIBRATION, calibration),
+    ):
         with Progress(console=_console) as bar:
             task = bar.add_task(f"rendering {name}", total=count)
             for done in render_shards(work / name, first, count):
@@ -65,18 +81,29 @@ def detector(
     seed: _Seed = 1,
     start: _Start = None,
     processes: _Processes = 1,
+    examples: _Examples = 14400,
+    heads_steps: _HeadsSteps = 2800,
+    frozen: _Frozen = DETECTOR,
+    network: _Network = None,
     photographs: _Photographs = None,
     labels: _Labels = None,
 ) -> None:
     """Render, train, export and measure the detector of vests, people, cars and towers."""
     _require_torch()
-    from tools.training import pipeline, train  # noqa: PLC0415 - they need PyTorch
+    from tools.training import heads_train, pipeline, train  # noqa: PLC0415 - they need PyTorch
 
     render(work, worlds)
-    places = pipeline.Places(work, out, photographs, labels)
+    places = pipeline.Places(work, out, photographs, labels, frozen, network)
     recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start, processes=processes)
-    _watch(pipeline.trained(places, recipe), steps)
-    _console.print(pipeline.make_detector(places, recipe).figures)
+    if network is None:
+        _watch(pipeline.trained(places, recipe), steps)
+    with Progress(console=_console) as bar:
+        task = bar.add_task("caching features", total=examples)
+        for done in pipeline.cached(places, examples):
+            bar.update(task, completed=done)
+    heads_recipe = heads_train.HeadsRecipe(steps=heads_steps, seed=seed)
+    _watch(pipeline.trained_heads(places, heads_recipe), heads_steps)
+    _console.print(pipeline.make_detector(places, recipe, heads_recipe).figures)
 
 
 @app.command()

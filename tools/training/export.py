@@ -2,56 +2,73 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import onnx
 import torch
+from onnx import ModelProto, compose, numpy_helper
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from tools.training.network import STRIDES, DetectorNetwork, anchors_of, decode_boxes
+from tools.training.fusion import FusedDetector
+from tools.training.heads import DetectorHeads
+from tools.training.network import STRIDES, DetectorNetwork
+from tools.training.yolox import FEATURES, OWN, SIZE, frozen_part
 
-__all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "fused", "save_onnx"]
+__all__ = ["Parts", "export_detector", "fused", "heads_of", "network_in", "network_of", "save_onnx"]
 
-SIZE = 320
-"""Pixels of the square input."""
-
-NOMINAL_SCORE = 0.3
-"""What a score at the best threshold is turned into, so that one threshold suits all classes."""
-
-
-class _Detector(nn.Module):
-    """Boxes (centre, size) and class scores, (1, 4 + classes, n)."""
-
-    def __init__(self, network: DetectorNetwork, thresholds: list[float]) -> None:
-        super().__init__()
-        self.network = network
-        self.centres, self.strides = anchors_of((SIZE, SIZE))
-        shifts = [_logit(NOMINAL_SCORE) - _logit(threshold) for threshold in thresholds]
-        self.shifts = torch.tensor(shifts)[None, :, None]
-
-    def forward(self, pixels: Tensor) -> Tensor:
-        """Find things."""
-        maps = self.network.maps(pixels)
-        raw = _joined(self.network.boxes, maps)
-        logits = _joined(self.network.kinds, maps)
-        boxes = _centred(decode_boxes(raw, self.centres, self.strides))
-        return torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
+_PREFIX = "learnt/"
+_NETWORK = "network."
+_OUTPUT = "output0"
 
 
-def _logit(share: float) -> float:
-    return math.log(share / (1 - share))
+@dataclass(frozen=True)
+class Parts:
+    """What the detector consists of."""
+
+    network: DetectorNetwork
+    """What learnt from renders alone, its batch norms folded."""
+    heads: DetectorHeads
+    """What learnt from renders on frozen features, likewise."""
+    source: ModelProto
+    """Megvii's YOLOX-nano, or a detector made of it."""
 
 
-def _joined(heads: nn.ModuleList, maps: list[Tensor]) -> Tensor:
-    return torch.cat([head(m).flatten(2) for head, m in zip(heads, maps, strict=True)], 2)
+def network_of(weights: Path) -> DetectorNetwork:
+    """Read a trained network."""
+    network = DetectorNetwork()
+    network.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+    fused(network.eval())
+    return network
 
 
-def _centred(boxes: Tensor) -> Tensor:
-    low, high = boxes[:, :2], boxes[:, 2:]
-    return torch.cat([(low + high) / 2, high - low], 1)
+def network_in(path: Path) -> DetectorNetwork:
+    """Take the network out of an exported detector."""
+    network = DetectorNetwork()
+    fused(network.eval())
+    names = {
+        tensor.name.removeprefix(_PREFIX): tensor for tensor in onnx.load(path).graph.initializer
+    }
+    network.load_state_dict(
+        {
+            name.removeprefix(_NETWORK): torch.tensor(numpy_helper.to_array(tensor))
+            for name, tensor in names.items()
+            if name.startswith(_NETWORK)
+        }
+    )
+    return network
+
+
+def heads_of(weights: Path) -> DetectorHeads:
+    """Read trained heads."""
+    heads = DetectorHeads()
+    heads.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+    fused(heads.eval())
+    return heads
 
 
 def fused(module: nn.Module) -> nn.Module:
@@ -65,25 +82,55 @@ def fused(module: nn.Module) -> nn.Module:
     return module
 
 
-def export_detector(weights: Path, path: Path, thresholds: list[float]) -> None:
-    """Write the detector; `thresholds` are the classes' best scores, made `NOMINAL_SCORE`."""
-    names = dict(enumerate(DETECTOR_CLASSES))
-    metadata = {
+def export_detector(
+    parts: Parts, path: Path, thresholds: Mapping[str, float], *, released: bool = True
+) -> None:
+    """Write the detector; `thresholds` and `released` as `FusedDetector` takes them."""
+    frozen = frozen_part(parts.source)
+    names = [*FEATURES, *OWN]
+    ports = [f"frozen{number}" for number in range(len(names))]
+    shapes = [
+        [axis.dim_value for axis in output.type.tensor_type.shape.dim]
+        for output in frozen.graph.output
+    ]
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "learnt.onnx")
+        torch.onnx.export(
+            FusedDetector(parts.network, parts.heads, thresholds, released=released).eval(),
+            (torch.zeros(1, 3, *SIZE), *(torch.zeros(shape) for shape in shapes)),
+            str(file),
+            input_names=["images", *ports],
+            output_names=[_OUTPUT],
+            opset_version=frozen.opset_import[0].version,
+            dynamo=False,
+        )
+        learnt = compose.add_prefix(onnx.load(str(file)), _PREFIX)
+    learnt.ir_version = frozen.ir_version
+    links = [(name, _PREFIX + port) for name, port in zip(names, ports, strict=True)]
+    whole = compose.merge_models(frozen, learnt, io_map=links)
+    _rename(whole, {f"{_PREFIX}images": "images", _PREFIX + _OUTPUT: _OUTPUT})
+    properties = {
+        "description": "AeroDaaS, trained on rendered pictures, beside Megvii's YOLOX-nano",
+        "author": "AeroDaaS",
+        "license": "Apache-2.0",
         "task": "detect",
-        "names": str(names),
+        "names": str(dict(enumerate(DETECTOR_CLASSES))),
         "stride": str(max(STRIDES)),
         "batch": "1",
-        "imgsz": str([SIZE, SIZE]),
+        "imgsz": str(list(SIZE)),
     }
-    picture = torch.zeros(1, 3, SIZE, SIZE)
-    save_onnx(_Detector(_load(weights), thresholds), path, ("images", "output0"), picture, metadata)
+    _save(whole, path, properties)
 
 
-def _load(weights: Path) -> DetectorNetwork:
-    network = DetectorNetwork()
-    network.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
-    fused(network.eval())
-    return network
+def _rename(model: ModelProto, names: Mapping[str, str]) -> None:
+    """Give tensors other names; of inputs that become one, the first stays."""
+    for node in model.graph.node:
+        node.input[:] = [names.get(name, name) for name in node.input]
+        node.output[:] = [names.get(name, name) for name in node.output]
+    model.graph.output[0].name = names.get(model.graph.output[0].name, model.graph.output[0].name)
+    for port in list(model.graph.input):
+        if port.name in names:
+            model.graph.input.remove(port)
 
 
 def save_onnx(
@@ -92,12 +139,10 @@ def save_onnx(
     ports: tuple[str, str],
     example: Tensor,
     metadata: dict[str, str],
-    *,
-    varying: bool = False,
 ) -> None:
     """Write `model` with one input and one output, called `ports`, and `metadata`.
 
-    `varying`: the first axis of both is free.
+    The first axis of both is free.
     """
     torch.onnx.export(
         model.eval(),
@@ -105,17 +150,20 @@ def save_onnx(
         str(path),
         input_names=[ports[0]],
         output_names=[ports[1]],
-        dynamic_axes={port: {0: "count"} for port in ports} if varying else None,
+        dynamic_axes={port: {0: "count"} for port in ports},
         opset_version=17,
         dynamo=False,
     )
-    file = onnx.load(str(path))
     properties = {
         "description": "AeroDaaS, trained on rendered pictures",
         "author": "AeroDaaS",
         "license": "Apache-2.0",
         **metadata,
     }
-    onnx.helper.set_model_props(file, properties)
-    onnx.checker.check_model(file)
-    onnx.save(file, str(path))
+    _save(onnx.load(str(path)), path, properties)
+
+
+def _save(model: ModelProto, path: Path, properties: dict[str, str]) -> None:
+    onnx.helper.set_model_props(model, properties)
+    onnx.checker.check_model(model)
+    onnx.save(model, str(path))

@@ -7,32 +7,38 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import onnx
 import torch
 
+from aerodaas.analytics.models import DETECTOR, DETECTOR_CLASSES
 from tools.training.card import Card, write_card
 from tools.training.data_parallel import in_processes
 from tools.training.dataset import Pictures, Sample
 from tools.training.evaluate import SMALLEST, milliseconds, rankings, sightings, thresholds
-from tools.training.export import NOMINAL_SCORE, SIZE, export_detector
+from tools.training.export import Parts, export_detector, heads_of, network_in, network_of
+from tools.training.features import Examples, cache_features
+from tools.training.fusion import NOMINAL_SCORE
+from tools.training.heads_train import HeadsRecipe, train_heads
 from tools.training.loop import Progress
 from tools.training.metrics import Ranking
 from tools.training.rendering import HELD_OUT, render_world
 from tools.training.train import Recipe, train
+from tools.training.yolox import SIZE, FeatureExtractor
 
-__all__ = ["Places", "make_detector", "spent", "trained"]
+__all__ = ["Places", "cached", "make_detector", "spent", "trained", "trained_heads"]
 
-_FALSE_PER_PICTURE = 0.1
+_FALSE_PER_PICTURE = 0.04
 """Boxes of each class beside everything, in rendered pictures, that the threshold allows."""
-
-_HIGHEST = 0.95
 
 _SIZES = (16.0, 32.0)
 """Pixels between small, medium and large vests: COCO's limits, of pictures twice as wide."""
 
 _PLAIN_WORLDS = 12
-_UNCALIBRATED = [NOMINAL_SCORE] * 4
+_UNCALIBRATED = 0.03
+"""Two that must agree score low before they are calibrated."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,10 @@ class Places:
     photographs: Path | None = None
     labels: Path | None = None
     """JSON, {file: [left, top, right, bottom]} of the vest in each photograph."""
+    frozen: Path = DETECTOR
+    """The file with the frozen part: Megvii's YOLOX-nano, or a detector made of it."""
+    network: Path | None = None
+    """A detector whose network is taken over; by default one is trained."""
 
     def run(self, name: str) -> Path:
         """Folder of the checkpoints of the model called `name`."""
@@ -61,20 +71,41 @@ def _course(places: Places, recipe: Recipe) -> Iterator[Progress]:
     return train(Pictures(places.work / "train"), recipe, places.run("detector"))
 
 
-def make_detector(places: Places, recipe: Recipe) -> Card:
+def cached(places: Places, examples: int) -> Iterator[int]:
+    """Cache the frozen part's features of so many examples; yields how many there are."""
+    extract = FeatureExtractor(onnx.load(str(places.frozen)))
+    yield from cache_features(Pictures(places.work / "train"), extract, _features(places), examples)
+
+
+def _features(places: Places) -> Path:
+    return places.work / "features"
+
+
+def trained_heads(places: Places, recipe: HeadsRecipe) -> Iterator[Progress]:
+    """Train the heads on cached features, unless they have been for that many steps already."""
+    yield from train_heads(Examples(_features(places)), recipe, places.run("heads"))
+
+
+def make_detector(places: Places, recipe: Recipe, heads_recipe: HeadsRecipe) -> Card:
     """Export the detector and write its card."""
-    calibration, test = _held_out(places)
+    calibration, test = (_samples(places.work / name) for name in ("calibration", "held-out"))
     path = places.out / "detector.onnx"
-    weights = places.run("detector") / "weights.pt"
-    export_detector(weights, path, _UNCALIBRATED)
+    own = places.run("detector") / "weights.pt"
+    parts = Parts(
+        network_of(own) if places.network is None else network_in(places.network),
+        heads_of(places.run("heads") / "weights.pt"),
+        onnx.load(str(places.frozen)),
+    )
+    export_detector(parts, path, dict.fromkeys(DETECTOR_CLASSES, _UNCALIBRATED), released=False)
     chosen = thresholds(path, calibration, _FALSE_PER_PICTURE)
-    export_detector(weights, path, [min(score, _HIGHEST) for score in chosen.values()])
+    export_detector(parts, path, {name: _uncalibrated(score) for name, score in chosen.items()})
     card = Card(
         "Detector",
         "Finds hazard vests, people, cars and lattice towers. Ultralytics layout, detect: "
-        f"1 x 8 x 2100 for {SIZE} x {SIZE} pixels. Scores are shifted, class by class, so that "
-        f"{NOMINAL_SCORE} leaves one box in ten rendered pictures beside everything.",
-        _recipe_rows(places, recipe),
+        f"1 x 8 x 3801 for {SIZE[1]} x {SIZE[0]} pixels. Scores of what is learnt from renders are "
+        f"shifted, class by class, so that {NOMINAL_SCORE} leaves four boxes in a hundred rendered "
+        "pictures beside everything.",
+        {**_network_rows(places, recipe), **_heads_rows(places, heads_recipe)},
     )
     card.figures["Held-out pictures"] = f"{len(test)}, of other worlds; things of 8 pixels and more"
     plain = rankings(path, _plain())
@@ -100,20 +131,26 @@ def _plain() -> list[Sample]:
     return [sample for seed in seeds for sample in render_world(seed, 10, plain=True)]
 
 
-def _held_out(places: Places) -> tuple[list[Sample], list[Sample]]:
-    """Pictures to choose thresholds by, and pictures to measure with: other worlds each."""
-    pictures = Pictures(places.work / "held-out")
-    samples = [pictures[index] for index in range(len(pictures))]
-    third = len(samples) // 3
-    return samples[:third], samples[third:]
+def _samples(folder: Path) -> list[Sample]:
+    pictures = Pictures(folder)
+    return [pictures[index] for index in range(len(pictures))]
 
 
 def _precision(ranking: Ranking) -> str:
     return f"{ranking.average_precision:.3f} ({ranking.things} things)"
 
 
-def _recipe_rows(places: Places, recipe: Recipe) -> dict[str, str]:
-    kept = torch.load(places.run("detector") / "training.pt", weights_only=True, map_location="cpu")
+def _uncalibrated(score: float) -> float:
+    """What `score` was before it was shifted with the threshold `_UNCALIBRATED`."""
+    odds = score / (1 - score) * (1 - NOMINAL_SCORE) / NOMINAL_SCORE
+    odds *= _UNCALIBRATED / (1 - _UNCALIBRATED)
+    return odds / (1 + odds)
+
+
+def _network_rows(places: Places, recipe: Recipe) -> dict[str, str]:
+    if places.network is not None:
+        return {"Network": f"taken over from {places.network.name}"}
+    kept = _kept(places.run("detector"))
     halved = min(recipe.halved, kept["step"])
     return {
         "Pictures": f"{len(Pictures(places.work / 'train'))}, rendered; no photograph",
@@ -121,6 +158,23 @@ def _recipe_rows(places: Places, recipe: Recipe) -> dict[str, str]:
         "Steps": f"{kept['step']} of {recipe.batch} pictures, {halved} of them on halved ones",
         "Time": spent(kept["seconds"]),
     }
+
+
+def _heads_rows(places: Places, recipe: HeadsRecipe) -> dict[str, str]:
+    kept = _kept(places.run("heads"))
+    examples, pictures = len(Examples(_features(places))), len(Pictures(places.work / "train"))
+    return {
+        "Heads, frozen below": "backbone and neck of YOLOX-nano (Megvii, Apache-2.0)",
+        "Heads, examples": f"{examples}, augmented, of {pictures} rendered pictures",
+        "Heads, seed": str(recipe.seed),
+        "Heads, steps": f"{kept['step']} of {recipe.batch} examples",
+        "Heads, time": spent(kept["seconds"]),
+    }
+
+
+def _kept(folder: Path) -> dict[str, Any]:
+    kept: dict[str, Any] = torch.load(folder / "training.pt", weights_only=True, map_location="cpu")
+    return kept
 
 
 def spent(seconds: float) -> str:

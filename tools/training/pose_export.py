@@ -38,5 +38,4 @@ def export_pose(weights: Path, path: Path) -> None:
         ("cuts", "keypoints"),
         torch.zeros(1, 3, CUT, CUT),
         {"task": "keypoints", "imgsz": str([CUT, CUT])},
-        varying=True,
     )

@@ -16,13 +16,16 @@ from tools.training.labelling import LabellingRenderer
 from tools.training.looks import VariousLooks
 from tools.training.scenes import draw_camera, draw_view, draw_world
 
-__all__ = ["HELD_OUT", "VIEWS", "render_shards", "render_world"]
+__all__ = ["CALIBRATION", "HELD_OUT", "VIEWS", "render_shards", "render_world"]
 
 VIEWS = 20
 """Pictures of one world."""
 
 HELD_OUT = 1_000_000
 """First seed of the worlds that are never trained on."""
+
+CALIBRATION = HELD_OUT + 2000
+"""First seed of the worlds that thresholds are chosen by."""
 
 _WORLDS_PER_SHARD = 10
 
@@ -33,7 +36,7 @@ _AS_FLOWN = 3
 def render_world(
     seed: int, views: int = VIEWS, *, plain: bool = False, looks: Looks | None = None
 ) -> Iterator[Sample]:
-    """Pictures of the world of this seed, 320 pixels wide; `plain` leaves them as rendered."""
+    """Pictures of the world of this seed, 416 pixels wide; `plain` leaves them as rendered."""
     rng = np.random.default_rng([seed, 1])
     world, camera = draw_world(seed), draw_camera(rng)
     renderer = LabellingRenderer(world, camera, looks or VariousLooks())
