@@ -5,6 +5,7 @@ from .commanding import MissionLink as MissionLink
 from .conditions import Above as Above
 from .conditions import Below as Below
 from .conditions import Near as Near
+from .detection.combined import CombinedDetector as CombinedDetector
 from .detection.detector import OnnxDetector as OnnxDetector
 from .detection.supervision_adapter import from_supervision as from_supervision
 from .detection.supervision_adapter import to_supervision as to_supervision

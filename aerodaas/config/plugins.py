@@ -54,6 +54,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         for name in (
             "BodyPoseEmergencyAnalytics",
             "CarFollowAnalytics",
+            "CombinedDetector",
             "CrowdDensityAnalytics",
             "DistanceAnalytics",
             "FollowAnalytics",

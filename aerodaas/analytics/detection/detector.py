@@ -183,6 +183,13 @@ class OnnxDetector(Analytics[Detections]):
         return self.postprocess(frames, self.infer(self.preprocess(frames)))
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the classes that it keeps, in the model's order."""
+        if self._wanted is None:
+            return self.names
+        return tuple(self.names[number] for number in self._wanted)
+
+    @property
     def model_name(self) -> str:
         """Default name of the model at an endpoint: its file name without suffix."""
         return Path(self.path).stem

@@ -347,7 +347,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     def _tell_who_comes(self, item: Detections, context: Context) -> None:
         self._alarm.update(item.header.stamp, self.controller.guard.alarming)
         if self._alarm.began:
-            text = "Somebody comes at the drone; it gives way."
+            text = "Somebody comes at the drone; while it follows, it gives way."
             context.alert(Alert(item.header, "person_close", text))
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:

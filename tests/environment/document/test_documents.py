@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from aerodaas import AeroNavigation, Analytics, Environment, NavigationType, VelocityCommand
 from aerodaas.analytics import (
     BodyPoseEmergencyAnalytics,
+    CombinedDetector,
     FollowAnalytics,
     GpsLoggerAnalytics,
     MonitoringAnalytics,
@@ -173,8 +174,9 @@ def test_settings_of_every_kind_come_back(
         lost=LostPolicy(hold=2.0),
         area=[(0, 0), (9, 0), (9, 9)],
     ).deploy(edge).analyse(vests)
+    eyes = CombinedDetector([OnnxDetector(classes=["tower"]), OnnxDetector(own, classes=["vest"])])
     TowerInspectionAnalytics(
-        env, pictures=tmp_path / "anywhere" / "pictures", detector=OnnxDetector(classes=["tower"])
+        env, pictures=tmp_path / "anywhere" / "pictures", detector=eyes
     ).deploy(edge).analyse(camera(env))
     pose = BodyPoseEmergencyAnalytics(lands=False).deploy(edge)
     pose.analyse(camera(env))
@@ -193,6 +195,8 @@ def test_settings_of_every_kind_come_back(
     follow = works["drone/follow"]
     assert follow.given_settings()["gains"] == FollowGains(height=0.5)
     assert works["drone/tower_inspection"].folder == Path("runs/pictures")
+    finders = works["drone/tower_inspection"].detector.detectors
+    assert [one.labels for one in finders] == [("tower",), ("vest",)]
     assert works["drone/vip_detection"].min_score == 0.4
     (trigger,) = works["drone/monitoring"].node.triggers
     assert trigger.when == Near((1.5, 2.0), metres=3.0)
