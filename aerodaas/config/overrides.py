@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -71,8 +72,9 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
 
 
 def _absolute(path: str, folder: Path) -> str:
-    found = (place.resolve() for place in (folder / path, Path(path)) if place.exists())
-    return str(next(found, path))
+    places = (folder / path, Path(path))
+    there = (place for place in places if os.path.exists(place))  # noqa: PTH110 - it fails for none
+    return str(next((place.resolve() for place in there), path))
 
 
 def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:

@@ -137,7 +137,7 @@ def test_relative_paths_lead_where_the_file_lies(
         folder.mkdir(parents=True)
     monkeypatch.chdir(here)
     wanted = {"both": str(beside / "both"), "only": str(here / "only")}
-    for path in ("both", "only", "nowhere", "rtsp://camera/1", str(here)):
+    for path in ("both", "only", "nowhere", "rtsp://camera/1", "too long" * 50, str(here)):
         content = {"robots": [{"id": "d", "sensors": [{"id": "c", "settings": {"path": path}}]}]}
         settings = located(validated(content, "here"), beside).robots[0].sensors[0].settings
         assert settings["path"] == wanted.get(path, path)
