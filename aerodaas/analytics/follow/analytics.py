@@ -341,7 +341,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._blocked.update(item.header.stamp, self.controller.blocked)
         if self._blocked.began:
             what = " or ".join(self.labels)
-            text = f"Something stands in the way to the {what}; the drone waits."
+            text = f"Something stands in the way to the {what}; while it follows, the drone waits."
             context.alert(Alert(item.header, "way_blocked", text))
 
     def _tell_who_comes(self, item: Detections, context: Context) -> None:
