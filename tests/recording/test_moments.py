@@ -13,6 +13,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import Band, RecordedDetection, RecordedFlight, RobotFlight
 from aerodaas.recording.report.moments import Moment, MomentPicture, key_moments, picture_moments
+from aerodaas.recording.report.overlay import draw_detections
 from aerodaas.types.data import Detection, Detections, Frame, Header
 from aerodaas.types.status import Message
 
@@ -194,3 +195,13 @@ def test_pictures_are_fetched_and_what_was_found_is_drawn(tmp_path: Path) -> Non
     plain, drawn = (picture.image for picture in pictures)
     assert np.abs(plain.astype(int) - 100).max() < 5
     assert np.abs(drawn.astype(int) - 100).max() > 50
+
+
+def test_a_joint_that_nobody_knows_is_not_drawn() -> None:
+    """A recording may hold gaps for numbers, whatever the confidence says; the others are drawn."""
+    joints = np.array([[float("nan"), 20.0, 0.9], [30.0, float("inf"), 0.9], [40.0, 40.0, 0.9]])
+    image = np.zeros((80, 80, 3), np.uint8)
+    body = Detection((10.0, 10.0, 70.0, 70.0), "person", 0.9, keypoints=joints.astype(np.float32))
+    draw_detections(image, [body])
+    assert image[40, 40].any()
+    assert not image[20:36, 20:36].any()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 import cv2
@@ -33,7 +34,7 @@ def draw_detections(image: Image, found: Iterable[Detection]) -> None:
         cv2.rectangle(image, (left, top), (right, bottom), colour, width)
         if item.keypoints is not None:
             for u, v, confidence in item.keypoints.tolist():
-                if confidence >= VISIBLE:
+                if confidence >= VISIBLE and math.isfinite(u + v):
                     cv2.circle(image, (round(u), round(v)), 2 * width, colour, -1)
         track = f" #{item.track_id}" if item.track_id is not None else ""
         text = f"{item.label}{track} {item.score:.2f}"
