@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 import time
 from pathlib import Path
@@ -57,6 +58,8 @@ def main(
         load_target(name)  # a wrong name is told before an hour has passed
     if inputs is None and seconds is None:
         inputs = _DEFAULT
+    # A shell has what it starts in the background ignore Ctrl-C: `kill -INT` ends that, too.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     summary = {}
     for name in names:
         limits = Limits(limit, 5 * limit, memory * 2**20)

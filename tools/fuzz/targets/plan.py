@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from aerodaas.dataflow.plans.commands import command_name
 from aerodaas.dataflow.plans.fences import geofence_of
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.types.errors import AeroDaaSError
@@ -16,6 +17,7 @@ __all__ = ["run", "seeds"]
 
 _HOME = GeodeticOrigin(47.0, 8.0, 488.0)
 _FILE = scratch_file(".plan")
+command_name(16)  # loads MAVLink's names, which takes longer than any input may
 
 
 def seeds() -> Iterable[bytes]:
