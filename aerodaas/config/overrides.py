@@ -72,9 +72,10 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
 
 
 def _absolute(path: str, folder: Path) -> str:
-    places = (folder / path, Path(path))
-    there = (place for place in places if os.path.exists(place))  # noqa: PTH110 - it fails for none
-    return str(next((place.resolve() for place in there), path))
+    for place in (folder / path, Path(path)):
+        if os.path.exists(place):  # noqa: PTH110 - Path.exists raises for a name too long
+            return str(place.resolve())
+    return path
 
 
 def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
