@@ -10,8 +10,8 @@ fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
 # One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
-# continuous integration does; those that go by the wall clock afterwards, in two halves that leave
-# each other time (tests/conftest.py). There one that met a busy machine is run once more, named, and
+# continuous integration does; those that go by the wall clock afterwards, in an order that leaves
+# them time (tests/conftest.py). There one that met a busy machine is run once more, named, and
 # counted as a rerun. Each half ends with its slowest tests, before one of them meets its time-out.
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not (slow and wall_clock),not slow)" $(SLOWEST)

@@ -37,14 +37,34 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(databases)
 
 
+_EMULATED = ("tests/drivers/", "tests/testing/", "tests/missions/")
+_BY_THE_CLOCK = (
+    "tests/drivers/tello/test_tello_applications.py",
+    *_EMULATED,
+    "tests/cluster/",
+    "tests/service/test_service_flights.py",
+    "tests/service/",
+)
+"""Turns of slow tests that go by the wall clock; all others follow.
+
+Two flights by the shipped models, which take most of a core, have those beside them that wait most
+of the time: emulated vehicles in real time, and a service's flights. (A worker that has two tests
+left is given its next share already: tests/cluster follows them.) Then the longest come first.
+"""
+
+
+def _by_the_clock(config: pytest.Config) -> bool:
+    return bool(config.getoption("markexpr") == "slow and wall_clock")
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401
-    """Share tests out by file, so that fixtures are made once; slow wall-clock tests by halves."""
+    """Share tests out by file, so that fixtures are made once."""
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
 
     scheduler = LoadScopeScheduling(config, log)
-    by_halves = config.getoption("markexpr") == "slow and wall_clock"
-    scheduler._split_scope = _half if by_halves else _worker_share  # as its own subclasses do
+    share = _share_by_the_clock if _by_the_clock(config) else _worker_share
+    scheduler._split_scope = share  # as its own subclasses do
     return scheduler
 
 
@@ -57,19 +77,14 @@ def _worker_share(nodeid: str) -> str:
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
-def _half(nodeid: str) -> str:
-    """Name one of two halves that may run at once without keeping each other waiting.
-
-    Emulated vehicles fly in real time and take a tenth of a core; what starts many processes or
-    runs models goes one after the other, last of all the flights that need the whole machine.
-    """
-    file = nodeid.partition("::")[0]
-    light = file.startswith(("tests/drivers/", "tests/testing/", "tests/missions/"))
-    return "vehicles" if light and not file.endswith("_applications.py") else "machines"
+def _share_by_the_clock(nodeid: str) -> str:
+    """The same, and emulated vehicles all one after the other."""
+    share = _worker_share(nodeid)
+    return "vehicles" if share.startswith(_EMULATED) and share != _BY_THE_CLOCK[0] else share
 
 
 @pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Files without Ray come first, so that a mistake in a function is told within seconds.
 
     Where slow ones run, they come before, so that no worker is left alone with one at the end.
@@ -82,6 +97,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.flaky(reruns=1))
 
     def turn(name: str) -> int:
+        if _by_the_clock(config):
+            starts = [name.startswith(start) for start in (*_BY_THE_CLOCK, "")]
+            return starts.index(True)
         if any(item.get_closest_marker("slow") for item in files[name]):
             return 0
         ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
