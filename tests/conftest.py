@@ -37,24 +37,8 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(databases)
 
 
-_EMULATED = ("tests/drivers/", "tests/testing/", "tests/missions/")
-_BY_THE_CLOCK = (
-    "tests/drivers/tello/test_tello_applications.py",
-    *_EMULATED,
-    "tests/cluster/",
-    "tests/service/test_service_flights.py",
-    "tests/service/",
-)
-"""Turns of slow tests that go by the wall clock; all others follow.
-
-Two flights by the shipped models, which take most of a core, have those beside them that wait most
-of the time: emulated vehicles in real time, and a service's flights. (A worker that has two tests
-left is given its next share already: tests/cluster follows them.) Then the longest come first.
-"""
-
-
-def _by_the_clock(config: pytest.Config) -> bool:
-    return bool(config.getoption("markexpr") == "slow and wall_clock")
+_LONGEST = ("tests/apps/", "tests/cluster/", "tests/service/")
+"""Slow tests of minutes on one worker, which come first of all."""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -63,8 +47,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # n
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
 
     scheduler = LoadScopeScheduling(config, log)
-    share = _share_by_the_clock if _by_the_clock(config) else _worker_share
-    scheduler._split_scope = share  # as its own subclasses do
+    scheduler._split_scope = _worker_share  # as its own subclasses do
     return scheduler
 
 
@@ -77,17 +60,12 @@ def _worker_share(nodeid: str) -> str:
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
-def _share_by_the_clock(nodeid: str) -> str:
-    """The same, and emulated vehicles all one after the other."""
-    share = _worker_share(nodeid)
-    return "vehicles" if share.startswith(_EMULATED) and share != _BY_THE_CLOCK[0] else share
-
-
 @pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files without Ray come first, so that a mistake in a function is told within seconds.
 
-    Where slow ones run, they come before, so that no worker is left alone with one at the end.
+    Where slow ones run, they come before, the longest first, so that no worker is left alone with
+    one at the end.
     What goes by the wall clock and met a busy machine is run once more, in CI only.
     """
     files: dict[str, list[pytest.Item]] = {}
@@ -97,13 +75,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.flaky(reruns=1))
 
     def turn(name: str) -> int:
-        if _by_the_clock(config):
-            starts = [name.startswith(start) for start in (*_BY_THE_CLOCK, "")]
-            return starts.index(True)
         if any(item.get_closest_marker("slow") for item in files[name]):
-            return 0
+            return 0 if name.startswith(_LONGEST) else 1
         ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
-        return 2 if ray else 1
+        return 3 if ray else 2
 
     items[:] = [item for name in sorted(files, key=turn) for item in files[name]]
 
