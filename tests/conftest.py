@@ -37,14 +37,17 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(databases)
 
 
+_LONGEST = ("tests/apps/", "tests/cluster/", "tests/service/")
+"""Slow tests of minutes on one worker, which come first of all."""
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401
-    """Share tests out by file, so that fixtures are made once; slow wall-clock tests by halves."""
+    """Share tests out by file, so that fixtures are made once."""
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
 
     scheduler = LoadScopeScheduling(config, log)
-    by_halves = config.getoption("markexpr") == "slow and wall_clock"
-    scheduler._split_scope = _half if by_halves else _worker_share  # as its own subclasses do
+    scheduler._split_scope = _worker_share  # as its own subclasses do
     return scheduler
 
 
@@ -57,22 +60,12 @@ def _worker_share(nodeid: str) -> str:
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
-def _half(nodeid: str) -> str:
-    """Name one of two halves that may run at once without keeping each other waiting.
-
-    Emulated vehicles fly in real time and take a tenth of a core; what starts many processes or
-    runs models goes one after the other, last of all the flights that need the whole machine.
-    """
-    file = nodeid.partition("::")[0]
-    light = file.startswith(("tests/drivers/", "tests/testing/", "tests/missions/"))
-    return "vehicles" if light and not file.endswith("_applications.py") else "machines"
-
-
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files without Ray come first, so that a mistake in a function is told within seconds.
 
-    Where slow ones run, they come before, so that no worker is left alone with one at the end.
+    Where slow ones run, they come before, the longest first, so that no worker is left alone with
+    one at the end.
     What goes by the wall clock and met a busy machine is run once more, in CI only.
     """
     files: dict[str, list[pytest.Item]] = {}
@@ -83,9 +76,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     def turn(name: str) -> int:
         if any(item.get_closest_marker("slow") for item in files[name]):
-            return 0
+            return 0 if name.startswith(_LONGEST) else 1
         ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
-        return 2 if ray else 1
+        return 3 if ray else 2
 
     items[:] = [item for name in sorted(files, key=turn) for item in files[name]]
 

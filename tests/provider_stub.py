@@ -95,6 +95,8 @@ class Stub:
     models: set[str] = field(default_factory=set)
     cuts: int = 0
     """Live connections that end after one message."""
+    denied: int = 0
+    """Live connections that were refused."""
     on_cancel: Callable[[], None] = lambda: None
     slow: threading.Event | None = None
     """What each answer waits for."""
@@ -197,6 +199,7 @@ class Stub:
     async def _follow(self, socket: WebSocket, streams: str = "") -> None:
         if "/v1/missions" in self.refusals:
             code, content = self.refusals["/v1/missions"]
+            self.denied += 1
             await socket.send_denial_response(JSONResponse(content, code))
             return
         await socket.accept()

@@ -51,3 +51,4 @@ def test_an_idle_application_looks_once_a_second_and_leaves_no_records(
         assert 0 < calls["poll"] <= 1.5 * elapsed + 2, "the heartbeats' included"
         recorded = {str(event["name"]) for event in ray.timeline() or ()}
         assert not recorded & {"robots", "await_change", "heard", "report", "vitals"}
+        env.get_robot_by_id("drone").end_mission()

@@ -20,7 +20,12 @@ ROOT = Path(__file__).parents[3]
 FLIGHT = 560.0
 """Seconds that an application may take, its start and end included."""
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(FLIGHT + 60), pytest.mark.wall_clock]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.timeout(FLIGHT + 60),
+    pytest.mark.wall_clock,
+    pytest.mark.whole_machine,
+]
 
 
 def fly(application: str, tello: EmulatedTello, folder: Path) -> Path:
