@@ -29,7 +29,8 @@ from rich.progress import track
 from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import NANOSECONDS
 
-_APPS = Path(__file__).parents[1] / "apps"
+_CHECKOUT = Path(__file__).resolve().parents[1]
+_APPS = _CHECKOUT / "apps"
 APPLICATION = _APPS / "farm_survey.py"
 _ACTORS = {"drone": "drone", "sensor": "camera", "analytics": "analyses", "recorder": "recorder"}
 """Name of an actor's figure, by the first part of its own."""
@@ -42,13 +43,14 @@ _SIDE_BY_SIDE = "side by side"
 def run(checkout: Path | None, folder: Path, *words: str) -> str:
     """Run Farm Survey, by another checkout's code if there is one; returns what it prints."""
     command = [sys.executable, "-m", "aerodaas", "run", str(APPLICATION), "--speed", "max"]
-    environment = {**os.environ, **({"PYTHONPATH": str(checkout)} if checkout else {})}
     done = subprocess.run(  # noqa: S603 - ours
         [*command, "--record", str(folder), *words],
         capture_output=True,
         text=True,
         check=False,
-        env=environment,
+        # In a checkout, `-m` would find that one's code before the path's.
+        cwd=folder.parent,
+        env=_environment(checkout),
     )
     if done.returncode:
         sys.exit(f"the flight failed:\n{done.stdout}\n{done.stderr}")
@@ -83,12 +85,15 @@ def processor(recording: Path) -> dict[str, float]:
 
 def turn(checkout: Path | None) -> float:
     """Microseconds of the processor that a turn of a drone takes, by itself."""
-    environment = {**os.environ, **({"PYTHONPATH": str(checkout)} if checkout else {})}
     command = [sys.executable, str(Path(__file__).with_name("_turns.py"))]
     done = subprocess.run(  # noqa: S603 - ours
-        command, capture_output=True, text=True, check=True, env=environment
+        command, capture_output=True, text=True, check=True, env=_environment(checkout)
     )
     return float(done.stdout)
+
+
+def _environment(checkout: Path | None) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(checkout or _CHECKOUT)}
 
 
 def fly_seeds(folder: Path, seeds: int) -> dict[str, float]:

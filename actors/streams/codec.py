@@ -1,5 +1,7 @@
 """Codec of messages: pickle 5 with large arrays out of band, so that a reader copies nothing.
 
+Vectors of a few numbers are in the pickle itself: apart, each would cost several times as much.
+
 Layout: u32 number of buffers, u32 length of the envelope, u32 length of the item's pickle, u64
 length of each buffer, envelope, pickle, then each buffer, aligned to 64 bytes. Little-endian. The
 envelope is separate so that it can be read even if the item cannot. It is of numbers and strings
@@ -9,12 +11,17 @@ ends run one version of Python, as Ray requires of a cluster.
 
 from __future__ import annotations
 
+import copyreg
+import io
 import marshal
 import pickle
 import struct
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.actors.streams import definitions as _definitions
 from aerodaas.actors.streams.pickling_errors import culprit
@@ -26,6 +33,9 @@ __all__ = ["Encoded", "UnreadableError", "UnsendableError", "decode", "encode"]
 
 _ALIGNMENT = 64
 _HEAD = struct.Struct("<III")
+_FLOAT = np.dtype(np.float64)
+_LONGEST_VECTOR = 256
+"""Bytes up to which an array of one dimension of floats is in the pickle."""
 _defined: set[str] = set()
 """Streams with items of classes that pickle cannot refer to by name."""
 
@@ -142,7 +152,11 @@ def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
     buffers: list[pickle.PickleBuffer] = []
     if message.stream not in _defined:
         try:
-            return pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append), buffers
+            file = io.BytesIO()
+            pickler = pickle.Pickler(file, protocol=5, buffer_callback=buffers.append)
+            pickler.dispatch_table = {**copyreg.dispatch_table, np.ndarray: _reduced}
+            pickler.dump(message.item)
+            return file.getvalue(), buffers
         except Exception:  # noqa: BLE001 - the attempt below reports the reason
             buffers = []
     try:
@@ -151,3 +165,10 @@ def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
         raise UnsendableError(culprit(message.item, error)) from error
     _defined.add(message.stream)
     return data, buffers
+
+
+def _reduced(array: NDArray[Any]) -> Any:  # noqa: ANN401 - pickle's
+    """Reduce an array for pickle: a short vector to its bytes, any other as NumPy does."""
+    if array.ndim == 1 and array.dtype is _FLOAT and 0 < array.nbytes <= _LONGEST_VECTOR:
+        return np.frombuffer, (array.tobytes(),)
+    return array.__reduce_ex__(5)

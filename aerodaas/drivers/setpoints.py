@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, is_finite
 from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
 
 __all__ = ["require_finite"]
@@ -21,7 +21,7 @@ def require_finite(name: str, setpoint: Setpoint) -> None:
     else:
         vector = setpoint.position
         scalars = {"yaw": setpoint.yaw, "speed": setpoint.speed}
-    if np.shape(vector) != (3,) or not np.isfinite(vector).all():
+    if np.shape(vector) != (3,) or not is_finite(vector):
         raise InvalidWaypointError(f"{name}: a setpoint needs three finite numbers, not {vector}")
     for key, value in scalars.items():
         if value is not None and not math.isfinite(value):

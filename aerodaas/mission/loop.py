@@ -12,6 +12,7 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
 from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Header
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import is_close
 from aerodaas.types.status import MissionState, SetpointRecord
@@ -99,8 +100,7 @@ class SetpointLoop:
         neighbours: Iterable[Neighbour],
     ) -> SetpointRecord:
         if isinstance(action, Fly):
-            record = self._send(action.setpoint, state, now, neighbours)
-            return replace(record, cause=action.cause)
+            return self._send(action.setpoint, state, now, neighbours, action.cause)
         if isinstance(action, Hold):
             stay: Setpoint = VelocitySetpoint(np.zeros(3))
             if action.position is not None and self.vehicle.capabilities.position_setpoints:
@@ -131,6 +131,7 @@ class SetpointLoop:
         state: VehicleState,
         now: int,
         neighbours: Iterable[Neighbour],
+        cause: Header | None = None,
     ) -> SetpointRecord:
         duration = _PERIOD if self._before is None else seconds(now - self._before)
         clamped = self.guard.clamp(asked, state.odometry, duration, neighbours)
@@ -138,7 +139,7 @@ class SetpointLoop:
         names = clamped.clipped_by
         if sent is not clamped.setpoint and not _same(sent, clamped.setpoint):
             names = (*names, "vehicle")
-        return SetpointRecord(now, asked, sent, names)
+        return SetpointRecord(now, asked, sent, names, cause)
 
 
 def _same(one: Setpoint, other: Setpoint) -> bool:

@@ -58,6 +58,9 @@ class Renderer:
     def __init__(self, world: World, camera: CameraModel, looks: Looks | None = None) -> None:
         """Build the scene and an offscreen buffer of the camera's size."""
         load_prc_file_data("aerodaas", _SETTINGS)
+        # OpenCV has two small things to do for a picture. Its other threads, which wait for more by
+        # spinning, take a tenth of what the whole picture takes.
+        cv2.setNumThreads(1)
         self._camera = camera
         self._optical = camera.body_from_optical
         pipe = GraphicsPipeSelection.get_global_ptr().make_pipe(

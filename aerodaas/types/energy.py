@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -68,8 +69,13 @@ class EnergyModel:
 
         A climb adds the work against gravity; a descent is counted as level flight.
         """
-        east, north, up = (float(axis) for axis in velocity - self.wind)
+        air: list[float] = (velocity - self.wind).tolist()
+        east, north, up = air
         return _power(east * east + north * north, up, math.sqrt)
+
+    @cached_property
+    def _hover_power(self) -> float:
+        return self.power(np.zeros(3))
 
     def powers(self, velocities: NDArray[np.float64]) -> NDArray[np.float64]:
         """`power` of many velocities, (..., 3) to (...)."""
@@ -78,7 +84,7 @@ class EnergyModel:
 
     def hover(self, duration: float) -> float:
         """Charge for `duration` seconds in one place."""
-        return self.power(np.zeros(3)) * duration / self.endurance
+        return self._hover_power * duration / self.endurance
 
     def leg(self, start: Vector, end: Vector, speed: float) -> float:
         """Charge for the straight way from `start` to `end` (ENU metres) at `speed` m/s."""

@@ -62,7 +62,7 @@ def is_finite(vector: Vector) -> bool:
     For three numbers this takes a fifth of the time of `numpy.isfinite`, and the setpoint loop
     asks it a dozen times a turn.
     """
-    return all(map(math.isfinite, vector))
+    return all(map(math.isfinite, np.asarray(vector).tolist()))
 
 
 def length(vector: Vector) -> float:
@@ -72,7 +72,7 @@ def length(vector: Vector) -> float:
 
 def is_close(vector: Vector, other: Vector) -> bool:
     """Whether two finite vectors are equal as `numpy.allclose` has it, in a tenth of its time."""
-    pairs = zip(vector, other, strict=True)
+    pairs = zip(np.asarray(vector).tolist(), np.asarray(other).tolist(), strict=True)
     return all(abs(one - two) <= _ABSOLUTE + _RELATIVE * abs(two) for one, two in pairs)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -168,6 +169,17 @@ def test_two_renderers_do_not_disturb_each_other() -> None:
     one.close()
     assert other.render(1.0, pose(0, 0, 5.0)).shape == (48, 64, 3)
     other.close()
+
+
+def test_a_picture_occupies_no_second_thread() -> None:
+    """OpenCV's others would spin beside the renderer, on a core that other actors need."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(4)
+    try:
+        Renderer(world(), CAMERAS["plain"]).close()
+        assert cv2.getNumThreads() == 1
+    finally:
+        cv2.setNumThreads(before)
 
 
 def test_sky_above_and_meadow_below() -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections import deque
-
-import numpy as np
 
 from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.types.clock import NANOSECONDS
@@ -94,7 +93,7 @@ class MotorWatch:
 
     def _note_sinking(self, state: VehicleState, now: int) -> None:
         speed = -float(state.odometry.velocity[2])
-        if np.isfinite(speed):
+        if math.isfinite(speed):
             self._sinking.append((now, speed))
         while self._sinking and now - self._sinking[0][0] > _LOOKED_AT:
             self._sinking.popleft()
