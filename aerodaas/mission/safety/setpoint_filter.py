@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -133,7 +133,7 @@ class SetpointFilter:
         limits = self.limits
         wished = asked.speed or limits.cruise_speed
         velocity = velocity_towards(
-            PositionSetpoint(target, asked.yaw, asked.speed),
+            replace(asked, position=target),
             odometry.position,
             odometry.yaw,
             speed=wished,
