@@ -15,7 +15,7 @@ from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.tracking import Tracker
 from aerodaas.analytics.people.arms import raised_arm
 from aerodaas.analytics.people.debounce import Debounce
-from aerodaas.analytics.people.downfall import Downfall
+from aerodaas.analytics.people.falls import FallDetector
 from aerodaas.analytics.people.gestures import GESTURE_MODEL, GestureClassifier
 from aerodaas.analytics.people.joints import POINTS
 from aerodaas.analytics.people.lying import lies
@@ -125,7 +125,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.tracker = Tracker(max_age=1.0, min_hits=1)
         self.person: int | None = None
         """Track id of the monitored person."""
-        self._downfall = Downfall(min_confidence)
+        self._falls = FallDetector(min_confidence)
         self._events = {
             "fallen": Debounce(needed, of, hold),
             "hand_raised": Debounce(needed + _SURER, of + _SURER, 2 * hold),
@@ -202,8 +202,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         people = self._people(found)
         chosen = self._choose(people)
         gesture = self._gesture(chosen, found)
-        upright = gesture is not None and gesture[0] == "upright"
-        down = self._downfall.shows(chosen, people, upright=upright)
+        down = self._falls.shows(chosen, people)
         if down:
             gesture = "fallen", self.min_probability
         for name, event in self._events.items():
@@ -223,7 +222,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
 
     def _with_missing(self, people: Detections) -> Detections:
         """Add a person who fell out of the image, as last detected, once the fall is confirmed."""
-        last = self._downfall.last
+        last = self._falls.last
         if last is None or not self._events["fallen"].active:
             return people
         return replace(people, items=(*people.items, replace(last, label="fallen")))

@@ -1,9 +1,9 @@
-"""Fall detection for a person close to the camera, whose feet are below the image.
+"""Fall detection by the height of a body's top above the ground that it stands on.
 
-With a narrow lens, a person who has fallen nearby is cut off by the lower edge, or out of the
-image. The person's last standing position is still known, and that the top of the body sank
-faster than by bending. Heights are computed above that position, from the drone's odometry at
-capture, so that a drone that climbs, brakes or turns does not cause an apparent fall.
+A box says more surely than joints how tall a body appears: one that has fallen hides its own
+joints, but still ends at its feet and begins at its highest part. Heights are computed from the
+drone's odometry at capture, so that a drone that climbs, brakes or turns does not cause an
+apparent fall.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Detection, Detections
 from aerodaas.types.geometry import body_to_enu, enu_to_body
 
-__all__ = ["Downfall"]
+__all__ = ["FallDetector"]
 
 _STANDS = (1.3, 2.3)
 """Least and greatest height of a standing body's top, metres."""
 
-_LOWER = 0.05
-"""Least height of the head above the camera in metres: in the image of a camera at its height, or
-higher, a person who walks up to it sinks, too."""
+_LOW = 1.1
+"""Greatest apparent height in metres of a body that has fallen: it appears tallest if it lies
+lengthwise before the camera, as its far end is above its near end in the image."""
 
 _SEEN, _GONE = (0.5, 1.3), (0.2, 1.0)
 """Least drop of a falling body's top in metres, and its speed in m/s: sitting down or bending is
 slower than 1.3 m/s (Bourke, O'Donovan and O'Laighin, Medical Engineering & Physics 30, 2008). Less
 suffices for a person who is out of the image in the next frame."""
 
+_FLAT = 0.48
+"""Share of the standing height below which a body lies, however slowly it sank, or between however
+few frames: who sits on the ground is 0.52 of it tall (Drillis and Contini, 1966)."""
+
 _SPAN = (0.15, 1.0)
 """Seconds between two compared observations; shorter spans would measure the noise of boxes."""
-
-_LOW = 1.1
-"""Greatest apparent height in metres, above the standing position, of the top of a body that lies
-farther away."""
 
 _CHEST = 1.2
 """Height in metres of the part of a standing body that must be within the image."""
@@ -47,9 +47,12 @@ _CHEST = 1.2
 _CUT = 0.03
 """Distance of a box from the lower or upper edge, in image heights, within which it is cut off."""
 
-_NEAR = 3.5
-"""Range of this detection in metres; farther away the whole body is in the image, and its posture
-decides."""
+_FASTEST = 2.0
+"""Greatest speed in m/s at which a person whose feet are below the image may come nearer: who
+walks up to a camera above their head sinks in the image, too."""
+
+_NEAREST = 0.3
+"""Metres from the camera nearer than which nobody stands."""
 
 _MOMENT, _FORGOTTEN = 1.5, 3.0
 """Seconds after standing within which a fall must begin, and after the last observation until which
@@ -57,6 +60,9 @@ a fall is remembered."""
 
 _REACH, _LONGEST = 1.5, 2.5
 """Metres from the standing position within which a standing person is the same, and a body lies."""
+
+_TALLER = 0.1
+"""Error in metres of a standing body's height."""
 
 _KEPT = 12
 """Number of observations kept."""
@@ -68,11 +74,15 @@ Array = NDArray[np.float64]
 class _Look:
     stamp: int
     top: float
-    """Height of the body's top above the standing position, metres."""
+    """Height of the body's top above its feet, metres."""
 
 
-class Downfall:
-    """Fall detector for one person, taller than 1.3 m, from standing to lying."""
+class FallDetector:
+    """Fall detector for one person, taller than 1.3 m, from standing to lying.
+
+    The ground is flat and the camera at most about 2 m above it: from higher up a body that lies
+    lengthwise before the camera appears as tall as one that stands.
+    """
 
     def __init__(self, min_confidence: float) -> None:
         """Treat keypoints below `min_confidence` (0 to 1) as missing."""
@@ -82,48 +92,49 @@ class Downfall:
         self._places: deque[Array] = deque(maxlen=_KEPT // 2)
         """Recent standing positions, metres east, north and up of home."""
         self._looks: deque[_Look] = deque(maxlen=_KEPT)
+        self._stature = 0.0
+        """Height of the body's top when it last stood, metres."""
         self._stood = 0
         self._fell = False
 
-    def shows(self, person: Detection | None, seen: Detections, *, upright: bool) -> bool:
+    def shows(self, person: Detection | None, seen: Detections) -> bool:
         """Process a frame of people; returns whether the person has fallen.
 
-        `person` is None if not detected; `upright` is the result of the gesture classifier. Always
-        False for a camera of unknown height or calibration.
+        `person` is None if not detected. Always False for a camera of unknown height or
+        calibration.
         """
         try:
             view = GroundView(seen)
         except ValueError:
             return False
-        self._forget_by(seen.header.stamp)
-        if person is not None and upright and self._stands(person, seen, view):
+        stamp = seen.header.stamp
+        self._forget_by(stamp)
+        if person is not None and self._stands(person, seen, view):
             self._fell = False
             return False
         if not self._places:
             return False
         feet = self._feet(seen)
         there = [one for one in seen if _is_there(one, seen, feet, view)]
-        if np.hypot(*feet) > _NEAR or any(_is_headless(one, seen) for one in there):
+        if any(_is_headless(one, seen) for one in there):
             return False
         if not there:
             self._fell = self._fell or self._sinks(*_GONE)
             return self._fell and view.sees(np.array([*feet, _CHEST]))
         # A falling body changes too much for a tracker, so the nearest body is accepted as well.
         body = max(there, key=lambda one: (one is person, one.area))
-        top = view.height_above(feet, _crown(body))
-        self._look(body, seen.header.stamp, top)
-        self._fell = self._fell or self._sinks(*_SEEN)
+        top = self._top(body, feet, seen, view)
+        self._look(body, stamp, top)
+        self._fell = self._fell or self._sinks(*_SEEN) or top <= _FLAT * self._stature
         return self._fell and top <= _LOW
 
     def _stands(self, body: Detection, seen: Detections, view: GroundView) -> bool:
         """Store the standing position; False if not standing, or if it is another person."""
-        if body.keypoints is None or seen.odometry is None:
+        feet = self._standing_at(body, seen, view)
+        if feet is None or seen.odometry is None:
             return False
-        feet = feet_below(body.keypoints, view, self._least)
-        if feet is None:
-            return False
-        top, least = view.height_above(feet, _crown(body)), max(_STANDS[0], view.height + _LOWER)
-        if not least <= top <= _STANDS[1]:
+        top = view.height_above(feet, _crown(body))
+        if not _STANDS[0] <= top <= _STANDS[1]:
             return False
         place = body_to_enu(np.array([*feet, 0.0]), seen.odometry.yaw) + seen.odometry.position
         if self._places and np.hypot(*(place - self._places[-1])[:2]) > _REACH:
@@ -132,14 +143,39 @@ class Downfall:
             top = max(top, self._looks[-1].top)
         self._stood = seen.header.stamp
         self._places.append(place)
+        self._stature = top
         self._look(body, self._stood, top)
         return True
+
+    def _standing_at(self, body: Detection, seen: Detections, view: GroundView) -> Array | None:
+        """Where a body stands, metres forward and left, if it does; None if that is unknown."""
+        if not _is_cut(body, seen):
+            ends = _end_of(body, view)
+            return ends if np.isfinite(ends).all() else None
+        if body.keypoints is None:
+            return None
+        return feet_below(body.keypoints, view, self._least)
 
     def _feet(self, seen: Detections) -> Array:
         """Median standing position, metres in the level body frame (forward, left)."""
         assert seen.odometry is not None  # noqa: S101 - a view has one
         way = np.median(self._places, axis=0) - seen.odometry.position
         return enu_to_body(way, seen.odometry.yaw)[:2]
+
+    def _top(self, body: Detection, feet: Array, seen: Detections, view: GroundView) -> float:
+        """Height of a body's top that stands, or fell, at `feet`."""
+        ends = _end_of(body, view)
+        if not _is_cut(body, seen):
+            return view.height_above(ends, _crown(body))
+        # Feet below the image are no farther than the lowest part that is seen.
+        away = min(np.hypot(*feet), np.hypot(*ends))
+        top = _top_at(body, feet, away, view)
+        if not self._fell:
+            walked = _FASTEST * seconds(seen.header.stamp - self._stood)
+            nearest = _top_at(body, feet, max(_NEAREST, away - walked), view)
+            if nearest >= self._stature - _TALLER:
+                return max(top, self._stature)
+        return top
 
     def _look(self, body: Detection, stamp: int, top: float) -> None:
         self._looks.append(_Look(stamp, top))
@@ -163,18 +199,32 @@ class Downfall:
             self._fell = False
 
 
+def _top_at(body: Detection, way: Array, away: float, view: GroundView) -> float:
+    """Height of a body's top if it is `away` metres in the direction of `way`."""
+    return view.height_above(way * (away / max(np.hypot(*way), _NEAREST)), _crown(body))
+
+
 def _crown(body: Detection) -> Array:
     """Pixel at the middle of the box's upper edge."""
     left, top, right, _ = body.box
     return np.array([(left + right) / 2, top])
 
 
+def _end_of(body: Detection, view: GroundView) -> Array:
+    """Ground point at the middle of the box's lower edge; NaN above the horizon."""
+    left, _, right, bottom = body.box
+    (point,) = view.points(np.array([[(left + right) / 2, bottom]]))
+    return np.asarray(point)
+
+
 def _is_there(body: Detection, seen: Detections, feet: Array, view: GroundView) -> bool:
     """Whether a body is at the person's standing position, rather than a false detection."""
-    left, _, right, bottom = body.box
-    (lowest,) = view.points(np.array([[(left + right) / 2, bottom]]))
-    cut = bottom >= (1 - _CUT) * seen.height
-    return cut or bool(np.hypot(*(lowest - feet)) <= _LONGEST)
+    return _is_cut(body, seen) or bool(np.hypot(*(_end_of(body, view) - feet)) <= _LONGEST)
+
+
+def _is_cut(body: Detection, seen: Detections) -> bool:
+    """Whether the image's lower edge cuts the body."""
+    return body.box[3] >= (1 - _CUT) * seen.height
 
 
 def _is_headless(body: Detection, seen: Detections) -> bool:
