@@ -239,6 +239,17 @@ def test_who_gets_up_is_down_no_more() -> None:
     assert [time for time in told if time > 8.7] != []
 
 
+def test_who_got_up_and_bends_has_not_fallen_again() -> None:
+    """A fall is over with it."""
+    scene = Scene(WIDE)
+    scene.place = lambda _: (4.0, 0.0)
+    scene.posture = lambda time: falling(time, forward=True) if time < 5.0 else Posture()
+    scene.sink = lambda time: 0.75 * min(max((time - 6.0) / 1.5, 0.0), 1.0)
+    told = scene.play(9.0)
+    assert told != []
+    assert told[-1] < 5.0
+
+
 @LENSES
 @pytest.mark.parametrize("seconds", [0.9, 1.5, 3.0])
 def test_bending_and_crouching_is_no_fall(camera: CameraModel, seconds: float) -> None:
