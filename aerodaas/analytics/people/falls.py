@@ -164,16 +164,15 @@ class FallDetector:
 
     def _top(self, body: Detection, feet: Array, seen: Detections, view: GroundView) -> float:
         """Height of a body's top that stands, or fell, at `feet`."""
-        ends = _end_of(body, view)
+        crown = _crown(body)
         if not _is_cut(body, seen):
-            return view.height_above(ends, _crown(body))
-        # Feet below the image are no farther than the lowest part that is seen.
-        away = min(np.hypot(*feet), np.hypot(*ends))
-        top = _top_at(body, feet, away, view)
+            return view.height_above(_end_of(body, view), crown)
+        top = view.height_above(feet, crown)
         if not self._fell:
+            away = max(_NEAREST, np.hypot(*feet))
             walked = _FASTEST * seconds(seen.header.stamp - self._stood)
-            nearest = _top_at(body, feet, max(_NEAREST, away - walked), view)
-            if nearest >= self._stature - _TALLER:
+            nearest = feet * max(_NEAREST, away - walked) / away
+            if view.height_above(nearest, crown) >= self._stature - _TALLER:
                 return max(top, self._stature)
         return top
 
@@ -197,11 +196,6 @@ class FallDetector:
             self._places.clear()
             self._looks.clear()
             self._fell = False
-
-
-def _top_at(body: Detection, way: Array, away: float, view: GroundView) -> float:
-    """Height of a body's top if it is `away` metres in the direction of `way`."""
-    return view.height_above(way * (away / max(np.hypot(*way), _NEAREST)), _crown(body))
 
 
 def _crown(body: Detection) -> Array:
