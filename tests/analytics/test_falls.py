@@ -239,6 +239,26 @@ def test_who_gets_up_is_down_no_more() -> None:
     assert [time for time in told if time > 8.7] != []
 
 
+@LENSES
+@pytest.mark.parametrize("far", [12.0, 20.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_who_is_taken_for_another_one_far_away_has_not_fallen(
+    camera: CameraModel, far: float, seed: int
+) -> None:
+    """Somebody cut off by the lower edge is near, and no part of who stood far away."""
+    scene = Scene(camera)
+    random = np.random.default_rng(seed)
+    scene.noise = lambda: random.normal(0, 0.02, 4)
+    scene.place = lambda time: (far if time < TURN_OFF else 1.75, 0.0)
+
+    def braking(time: float) -> Odometry:
+        since = time - TURN_OFF
+        return hovering(pitch=0.3 * min(max((since - 0.6) / 0.3, 0.0), 1.0))
+
+    scene.drone = braking
+    assert scene.play() == []
+
+
 def test_who_got_up_and_bends_has_not_fallen_again() -> None:
     """A fall is over with it."""
     scene = Scene(WIDE)

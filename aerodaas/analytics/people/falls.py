@@ -212,8 +212,14 @@ def _end_of(body: Detection, view: GroundView) -> Array:
 
 
 def _is_there(body: Detection, seen: Detections, feet: Array, view: GroundView) -> bool:
-    """Whether a body is at the person's standing position, rather than a false detection."""
-    return _is_cut(body, seen) or bool(np.hypot(*(_end_of(body, view) - feet)) <= _LONGEST)
+    """Whether a body is at the person's standing position, rather than a false detection.
+
+    One cut off by the lower edge is at most as far away as the ground there.
+    """
+    ends = _end_of(body, view)
+    if _is_cut(body, seen):
+        return not np.hypot(*feet) > np.hypot(*ends) + _LONGEST
+    return bool(np.hypot(*(ends - feet)) <= _LONGEST)
 
 
 def _is_cut(body: Detection, seen: Detections) -> bool:
