@@ -259,6 +259,26 @@ def test_who_is_taken_for_another_one_far_away_has_not_fallen(
     assert scene.play() == []
 
 
+@pytest.mark.parametrize("rate", [5.0, 10.0])
+@pytest.mark.parametrize("tops", [[91, 145], [80, 110, 140, 170], [145, 145]])
+def test_who_leaves_by_the_side_leaves_an_arm_and_a_leg_and_has_not_fallen(
+    rate: float, tops: list[int]
+) -> None:
+    """As a detector boxes what remains of them, which is low, and then nothing."""
+    falls, told = FallDetector(0.35), []
+    for step in range(30):
+        box = (566.0, 70.0, 620.0, 226.0)
+        if 10 <= step < 10 + len(tops):
+            box = (606.0, float(tops[step - 10]), 639.0, 240.0)
+        gone = step >= 10 + len(tops)
+        body = Detection(box, "person", 0.8, keypoints=np.zeros((17, 3), np.float32))
+        header = Header(step, round(step / rate * NANOSECONDS), "drone/cam")
+        items = () if gone else (body,)
+        seen = Detections(header, items, 640, 360, WIDE, hovering(1.57))
+        told.append(falls.shows(None if gone else body, seen))
+    assert not any(told)
+
+
 def test_who_got_up_and_bends_has_not_fallen_again() -> None:
     """A fall is over with it."""
     scene = Scene(WIDE)

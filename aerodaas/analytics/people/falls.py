@@ -45,7 +45,7 @@ _CHEST = 1.2
 """Height in metres of the part of a standing body that must be within the image."""
 
 _CUT = 0.03
-"""Distance of a box from the lower or upper edge, in image heights, within which it is cut off."""
+"""Distance of a box from an edge, in heights or widths of the image, within which it is cut off."""
 
 _FASTEST = 2.0
 """Greatest speed in m/s at which a person whose feet are below the image may come nearer: who
@@ -116,7 +116,7 @@ class FallDetector:
             return False
         feet = self._feet(seen)
         there = [one for one in seen if _is_there(one, seen, feet, view)]
-        if any(_is_headless(one, seen) for one in there):
+        if any(_hides_top(one, seen) for one in there):
             return False
         if not there:
             self._fell = self._fell or self._sinks(*_GONE)
@@ -139,7 +139,7 @@ class FallDetector:
         place = body_to_enu(np.array([*feet, 0.0]), seen.odometry.yaw) + seen.odometry.position
         if self._places and np.hypot(*(place - self._places[-1])[:2]) > _REACH:
             return False
-        if _is_headless(body, seen) and self._looks:
+        if _hides_top(body, seen) and self._looks:
             top = max(top, self._looks[-1].top)
         self._stood = seen.header.stamp
         self._places.append(place)
@@ -227,6 +227,14 @@ def _is_cut(body: Detection, seen: Detections) -> bool:
     return body.box[3] >= (1 - _CUT) * seen.height
 
 
-def _is_headless(body: Detection, seen: Detections) -> bool:
-    """Whether the image's upper edge cuts the body, so that its top is unknown."""
-    return body.box[1] <= _CUT * seen.height
+def _hides_top(body: Detection, seen: Detections) -> bool:
+    """Whether the image cuts off the body's top, so that it is unknown.
+
+    The upper edge does; and a side does, of a body that is upright: an arm and a leg remain.
+    """
+    left, top, right, bottom = body.box
+    if top <= _CUT * seen.height:
+        return True
+    edge = _CUT * seen.width
+    beside = left <= edge or right >= seen.width - edge
+    return beside and bottom - top > right - left
