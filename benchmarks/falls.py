@@ -1,32 +1,37 @@
 """How surely a fall before the camera is told, and how often one that was none.
 
 python benchmarks/falls.py --lens tello
+python benchmarks/falls.py --eyes boxes --falls 100
 """
 
 from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from _report import Report
+from numpy.typing import NDArray
 
 from aerodaas.analytics.base import ComputeKind, Context
+from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
 from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
 from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.simulation.scenario import Scenario
-from aerodaas.simulation.world import World
+from aerodaas.simulation.world import Thing, World
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel
+from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 from aerodaas.types.vehicle import VehicleState
 from tools.tuning.chase import Chase
-from tools.tuning.perception import DetectorPerception, TruthPerception
+from tools.tuning.perception import DetectorPerception, Perception, TruthPerception
 from tools.tuning.walk import PERSON, walk
 
 TILT = math.radians(12)
@@ -54,6 +59,30 @@ LENSES = {
 }
 
 
+class Eyes(str, enum.Enum):
+    """What finds the body: models on renders, or its true box with noise."""
+
+    MODELS = "models"
+    BOXES = "boxes"
+
+
+SEES = {
+    Eyes.MODELS: "models look at renders",
+    Eyes.BOXES: "true boxes with noise of 3 % and 5 % misses, joints only before the fall",
+}
+
+
+@dataclass(frozen=True)
+class Watched:
+    """By what a person is watched, and from where."""
+
+    lens: Lens
+    eyes: Eyes
+    detector: Path | None
+    rate: float
+    distance: float
+
+
 @dataclass
 class Onlooker:
     """What the analysis asks of its actor."""
@@ -75,14 +104,41 @@ class Onlooker:
         self.alerts.append(alert)
 
 
-class Watching(DetectorPerception):
-    """Follows by true boxes, while the shipped models watch the body on renders."""
+class StandingJoints(TruthPerception):
+    """The body's true box with noise; its joints only while it stands, none once it falls."""
 
-    def __init__(self, world: World, camera: CameraModel, seed: int, begin: float) -> None:
-        """Watch from `begin` seconds on."""
-        super().__init__(world, camera, PoseAnalytics())
-        self._follow_by = TruthPerception(world.thing(PERSON), "vest", camera, seed=seed)
-        self._begin = begin
+    def __init__(self, person: Thing, camera: CameraModel, seed: int) -> None:
+        """See `person`."""
+        super().__init__(person, "person", camera, seed=seed, noise=0.03, misses=0.05)
+        self._person, self._lens = person, camera
+        self._jitter = np.random.default_rng(seed)
+
+    def look(
+        self, header: Header, pose: Odometry, believed: Odometry, context: Context
+    ) -> Detections:
+        """Return the box, unless it is missed, with its joints."""
+        found = super().look(header, pose, believed, context)
+        joints = self._joints(seconds(header.stamp), pose)
+        return replace(found, items=tuple(replace(one, keypoints=joints) for one in found))
+
+    def _joints(self, time: float, pose: Odometry) -> NDArray[np.float32]:
+        turn = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+        places = (self._person.keypoints(time) - pose.position) @ turn
+        pixels = np.array([self._lens.project(place) for place in places])
+        size = (self._lens.width, self._lens.height)
+        inside = ((pixels[:, :2] > 0) & (pixels[:, :2] < size)).all(axis=1) & (pixels[:, 2] > 0)
+        if self._person.state(time).posture.fallen > 0:
+            inside[:] = False
+        noise = 0.02 * np.ptp(pixels[:, 1]) * self._jitter.normal(size=(len(pixels), 2))
+        return np.column_stack([pixels[:, :2] + noise, 0.9 * inside]).astype(np.float32)
+
+
+class Watching:
+    """Follows by true boxes, while `eyes` watch the body from `begin` seconds on."""
+
+    def __init__(self, follow_by: TruthPerception, eyes: Perception, begin: float) -> None:
+        """Open the analysis."""
+        self._follow_by, self._eyes, self._begin = follow_by, eyes, begin
         self._body = BodyPoseEmergencyAnalytics()
         self._body.open()
         self.onlooker = Onlooker()
@@ -93,25 +149,41 @@ class Watching(DetectorPerception):
         """Watch the body; return the vest."""
         if seconds(header.stamp) >= self._begin:
             self.onlooker.stamp = header.stamp
-            found = super().look(header, pose, believed, context)
+            found = self._eyes.look(header, pose, believed, context)
             self._body.process(found, self.onlooker)
         return self._follow_by.look(header, pose, believed, context)
 
 
-def alarms(
-    world: World, lens: Lens, rate: float, seed: int, begin: float, end: float
-) -> list[float]:
+@contextmanager
+def eyes_for(watched: Watched, world: World, seed: int) -> Iterator[Perception]:
+    """What watches the body in `world`."""
+    camera = LENSES[watched.lens]
+    if watched.eyes is Eyes.BOXES:
+        yield StandingJoints(world.thing(PERSON), camera, seed)
+        return
+    detector = watched.detector and OnnxDetector(watched.detector, classes=["person", "vest"])
+    eyes = DetectorPerception(world, camera, PoseAnalytics(detector=detector or None))
+    try:
+        yield eyes
+    finally:
+        eyes.close()
+
+
+def alarms(world: World, watched: Watched, seed: int, begin: float, end: float) -> list[float]:
     """Follow the person until `end` seconds; when a fall was told."""
-    camera = LENSES[lens]
-    eyes = Watching(world, camera, seed, begin)
-    chase = Chase(world.thing(PERSON), "vest", rate, camera=camera, seed=seed)
-    chase.fly(VipFollowAnalytics(), eyes, end)
-    eyes.close()
-    return [seconds(alert.header.stamp) for alert in eyes.onlooker.alerts if alert.kind == "fallen"]
+    person, camera = world.thing(PERSON), LENSES[watched.lens]
+    follow_by = TruthPerception(person, "vest", camera, seed=seed)
+    chase = Chase(person, "vest", watched.rate, camera=camera, seed=seed)
+    follow = VipFollowAnalytics(distance=watched.distance)
+    with eyes_for(watched, world, seed) as eyes:
+        watching = Watching(follow_by, eyes, begin)
+        chase.fly(follow, watching, end)
+    alerts = watching.onlooker.alerts
+    return [seconds(alert.header.stamp) for alert in alerts if alert.kind == "fallen"]
 
 
 def scene(heading: float, seed: int) -> World:
-    """A person who falls two metres before the drone with the head towards `heading` degrees.
+    """A person who falls before the drone with the head towards `heading` degrees.
 
     Every other one walks until then, and so do all who fall to their back.
     """
@@ -138,16 +210,24 @@ def main(
     walks: Annotated[int, typer.Option(help="Without a fall.", min=0)] = 10,
     duration: Annotated[float, typer.Option(help="Seconds of each walk.", min=10)] = 60.0,
     rate: Annotated[float, typer.Option(help="Frames a second.", min=1)] = 5.0,
+    distance: Annotated[float, typer.Option(help="Of the drone, metres.", min=1.5)] = 2.0,
+    eyes: Annotated[Eyes, typer.Option(help="What finds the body.")] = Eyes.MODELS,
+    detector: Annotated[
+        Path | None, typer.Option(help="ONNX file of another detector of people and vests.")
+    ] = None,
+    first_seed: Annotated[int, typer.Option(help="Of the scenes.", min=0)] = 0,
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
-    """Follow people who fall two metres ahead, and people who walk; count what is told.
+    """Follow people who fall, and people who walk; count what is told.
 
     Walks are at 0.3 to 1.5 m/s, with turns and in wind.
     """
     report = Report("falls", UNITS, packages=["onnxruntime"])
+    watched = Watched(lens, eyes, detector, rate, distance)
     for name, heading in HEADINGS.items():
         told = [
-            alarms(scene(heading, seed), lens, rate, seed, STARTS, ENDS) for seed in range(falls)
+            alarms(scene(heading, seed), watched, seed, STARTS, ENDS)
+            for seed in range(first_seed, first_seed + falls)
         ]
         late = [
             min(at - FALLS for at in one if at > FALLS) for one in told if one and one[-1] > FALLS
@@ -158,15 +238,15 @@ def main(
         report.row(name, {"scenes": falls, "told": share, "after": after, "false": early})
     speeds = np.linspace(0.3, 1.5, 5)
     flown = [
-        alarms(walk(float(speeds[seed % 5]), duration, seed), lens, rate, seed, 5.0, duration)
-        for seed in range(walks)
+        alarms(walk(float(speeds[seed % 5]), duration, seed), watched, seed, 5.0, duration)
+        for seed in range(first_seed, first_seed + walks)
     ]
     wrong = sum(map(len, flown))
     none = math.nan
     report.row("walks", {"scenes": walks, "told": none, "after": none, "false": wrong})
     report.note(
-        f"{lens.value} lens, {rate:g} frames a second; walks of {duration:g} s. The shipped models "
-        "look at renders; the follower is given true boxes with noise."
+        f"{lens.value} lens, {rate:g} frames a second, {distance:g} m away; walks of "
+        f"{duration:g} s; {SEES[eyes]}. The follower is given true boxes with noise."
     )
     report.show()
     if json is not None:

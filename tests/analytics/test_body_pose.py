@@ -132,6 +132,33 @@ def test_only_the_person_in_the_middle_counts() -> None:
     assert sorted(one.label for one in result) == ["person", "upright"]
 
 
+def test_who_stays_in_the_middle_is_watched_after_two_seconds() -> None:
+    """A passer-by who was seen first is not for ever the one whom the drone follows."""
+    watch = Watch()
+    aside, middle = body(Posture(), ahead=4.0, left=1.8), body(Posture(), ahead=3.0)
+    watch.see(10, aside)
+    hand = body(Posture(raised=1.0), ahead=3.0)
+    watch.see(19, aside, hand)
+    assert watch.alerts == []
+    watch.see(5, aside, middle)
+    watch.see(15, aside, hand)
+    assert [alert.kind for alert in watch.alerts] == ["hand_raised"]
+
+
+def test_who_crosses_the_middle_is_not_watched() -> None:
+    """Nor is anybody else while the one who is watched lies."""
+    watch = Watch()
+    aside, hand = body(Posture(), ahead=4.0, left=1.8), body(Posture(raised=1.0), ahead=3.0)
+    watch.see(10, aside)
+    for _ in range(3):
+        watch.see(15, aside, hand)
+        watch.see(1, aside)
+    assert watch.alerts == []
+    watch.see(20, body(Posture(fallen=1.0), ahead=4.0, left=1.8, turn=1.0))
+    watch.see(40, body(Posture(fallen=1.0), ahead=4.0, left=1.8, turn=1.0), hand)
+    assert [alert.kind for alert in watch.alerts] == ["fallen"]
+
+
 def test_who_wears_the_vest_counts() -> None:
     """Wherever in the picture; with no vest in sight for a second, nobody does."""
     watch = Watch()

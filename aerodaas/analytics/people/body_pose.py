@@ -15,7 +15,7 @@ from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.tracking import Tracker
 from aerodaas.analytics.people.arms import raised_arm
 from aerodaas.analytics.people.debounce import Debounce
-from aerodaas.analytics.people.downfall import Downfall
+from aerodaas.analytics.people.falls import FallDetector
 from aerodaas.analytics.people.gestures import GESTURE_MODEL, GestureClassifier
 from aerodaas.analytics.people.joints import POINTS
 from aerodaas.analytics.people.lying import lies
@@ -39,6 +39,9 @@ _VEST_AGE = 1.0
 """Seconds for which the boxes of vests identify the wearer."""
 _SAME_BODY = 0.6
 """Share of the smaller of two boxes inside the other, above which both are of one body."""
+_ASIDE, _ASIDE_TIME = 0.25, 2.0
+"""Heights by which, and seconds for which, another person must be nearer to the middle to be taken
+for the monitored one from then on."""
 _MOST_PEOPLE = 100
 """Greatest number of people; a pose model's own limit is far above the number distinguishable."""
 
@@ -69,8 +72,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     Only one person's gestures count. If a stream of boxes of vests is analysed, too, it is the
     person whose box contains the centre of a vest. Otherwise it is the person nearest to the
     middle of the image, where a follower keeps its target, until that person is out of sight for
-    a second; the distance is measured in heights of the person, so that a passer-by far behind is
-    not chosen.
+    a second, or another one is clearly nearer to the middle for two, unless the person has fallen
+    or raises a hand; the distance is measured in heights of the person, so that a passer-by far
+    behind is not chosen.
 
     Results are the detected people. The monitored person has the label of the confirmed gesture,
     `hand_raised` or `fallen`, or else `upright`, `other` or `person`; all others have `person`.
@@ -125,7 +129,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.tracker = Tracker(max_age=1.0, min_hits=1)
         self.person: int | None = None
         """Track id of the monitored person."""
-        self._downfall = Downfall(min_confidence)
+        self._aside: int | None = None
+        """Stamp since which another person is nearer to the middle, nanoseconds."""
+        self._falls = FallDetector(min_confidence)
         self._events = {
             "fallen": Debounce(needed, of, hold),
             "hand_raised": Debounce(needed + _SURER, of + _SURER, 2 * hold),
@@ -202,8 +208,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         people = self._people(found)
         chosen = self._choose(people)
         gesture = self._gesture(chosen, found)
-        upright = gesture is not None and gesture[0] == "upright"
-        down = self._downfall.shows(chosen, people, upright=upright)
+        down = self._falls.shows(chosen, people)
         if down:
             gesture = "fallen", self.min_probability
         for name, event in self._events.items():
@@ -223,7 +228,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
 
     def _with_missing(self, people: Detections) -> Detections:
         """Add a person who fell out of the image, as last detected, once the fall is confirmed."""
-        last = self._downfall.last
+        last = self._falls.last
         if last is None or not self._events["fallen"].active:
             return people
         return replace(people, items=(*people.items, replace(last, label="fallen")))
@@ -250,12 +255,28 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
             mine = max(people, key=lambda one: _shared(one, last), default=None)
             mine = mine if mine is not None and _shared(mine, last) > _SAME_BODY else None
             self.person = self.person if mine is None else mine.track_id
-        if mine is not None or known is not None:
-            return mine
         middle = people.width / 2
         nearest = min(people, key=lambda one: _off_centre(one, middle), default=None)
+        if (mine is not None or known is not None) and not self._is_aside(mine, nearest, people):
+            return mine
+        self._aside = None
         self.person = None if nearest is None else nearest.track_id
         return nearest
+
+    def _is_aside(
+        self, mine: Detection | None, nearest: Detection | None, people: Detections
+    ) -> bool:
+        """Whether `nearest` has for long been nearer to the middle than the monitored person."""
+        if mine is None or nearest is None or any(one.active for one in self._events.values()):
+            self._aside = None
+            return False
+        middle, stamp = people.width / 2, people.header.stamp
+        if _off_centre(nearest, middle) + _ASIDE >= _off_centre(mine, middle):
+            self._aside = None
+            return False
+        if self._aside is None or stamp < self._aside:
+            self._aside = stamp
+        return seconds(stamp - self._aside) >= _ASIDE_TIME
 
     def _gesture(self, chosen: Detection | None, found: Detections) -> tuple[str, float] | None:
         if chosen is None or chosen.keypoints is None:
