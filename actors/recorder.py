@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.actors.base import StreamActor
+from aerodaas.actors.batch_pause import BatchPause
 from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import vitals_stream
@@ -21,6 +22,9 @@ from aerodaas.types.status import Message
 from aerodaas.types.vitals import Vitals
 
 __all__ = ["RecorderActor"]
+
+_LONGEST_PAUSE = 0.1
+"""Wall seconds between two batches of messages."""
 
 
 class RecorderActor(ReaperHost, StreamActor):
@@ -52,6 +56,8 @@ class RecorderActor(ReaperHost, StreamActor):
         self._failure = ""
         self._lost: Counter[str] = Counter()
         self._readings = 0
+        # Who watches live sees each message as it comes.
+        self._pause = BatchPause(0.0 if live else _LONGEST_PAUSE)
 
     def _open(self) -> None:
         # The application's process imports this module, but does not need the writers.
@@ -99,6 +105,7 @@ class RecorderActor(ReaperHost, StreamActor):
             messages = deque(self.subscriber.receive(0.2))
             if self.stopping and not messages:
                 return
+            counts = Counter(one.stream for one in messages)
             headers = [one.header for one in messages]
             last = replace(messages[-1], item=None) if messages else None
             while messages:
@@ -107,6 +114,11 @@ class RecorderActor(ReaperHost, StreamActor):
             self._note_drops()
             if last is not None:
                 self._written(headers, last)
+            self._rest(counts)
+
+    def _rest(self, counts: Counter[str]) -> None:
+        """Let messages gather after a batch of so many by stream; a stop ends the rest."""
+        self._stopping.wait(self._pause.after(counts, self._reads))
 
     def _written(self, headers: list[Header], last: Message[None]) -> None:
         """Called when the messages with these headers are written; `last` has lost its item."""

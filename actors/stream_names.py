@@ -20,6 +20,7 @@ __all__ = [
     "task_stream",
     "trigger_stream",
     "vitals_stream",
+    "whereabouts_stream",
 ]
 
 ACKS = f"{INTERNAL}acks"
@@ -92,3 +93,8 @@ def is_guest_actor(actor: str) -> bool:
 def vitals_stream(actor: str) -> str:
     """Name of the stream of the vitals of an actor's process."""
     return f"{INTERNAL}vitals/{actor}"
+
+
+def whereabouts_stream(actor: str) -> str:
+    """Name of the stream of where the drones of a drone's actor are."""
+    return f"{INTERNAL}whereabouts/{actor}"

@@ -1,11 +1,13 @@
-"""What the footprint benchmark flies: a drone without a camera that hovers."""
+"""What the footprint benchmark flies: drones that hover, each above its own place."""
 
 from __future__ import annotations
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 
 env = Environment("environment.json")
-drone = env.get_robot_by_id("drone")
-hover = Waypoint("there", 4, 0, 2, hover_duration=600)
-drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
+for robot in env.config.robots:
+    drone = env.get_robot_by_id(robot.id)
+    east, north, _ = robot.start
+    hover = Waypoint("there", east + 4, north, 2, hover_duration=600)
+    drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
 drone.start_mission()

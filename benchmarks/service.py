@@ -4,7 +4,8 @@
     python benchmarks/service.py --drones 50 --watchers 200 --missions 2000
 
 starts `aerodaas serve` in a process of its own, flies one mission of so many simulated drones in
-real time, watches it by WebSocket, and measures over real loopback sockets from another process.
+real time, watches it by WebSocket, and measures over real loopback sockets from another process;
+and how busy the processes are meanwhile.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import re
 import subprocess
 import sys
 import time
@@ -39,6 +41,15 @@ _EVERY = 0.02
 """Seconds between two commands, and between two looks at a mission."""
 _SPACING = 6.0
 """Metres from drone to drone."""
+_SHARE_SECONDS = 8.0
+"""Seconds over which the processor's shares are measured."""
+_KINDS = {
+    "service": r" aerodaas serve ",
+    "flight": r" aerodaas\.service\.flights ",
+    "drones": r"^ray::DroneActor",
+    "recorder": r"^ray::RecorderActor",
+}
+"""Patterns of command lines, by kind of process."""
 
 
 def environment(drones: int) -> dict[str, Any]:
@@ -111,35 +122,85 @@ def commands(client: ProviderClient, mission: str, robot: str, count: int) -> li
     return times
 
 
+def busy(service: int) -> str:
+    """How much of a core each kind of process takes, and its memory."""
+    before, began = _used(service), time.monotonic()
+    time.sleep(_SHARE_SECONDS)
+    after, elapsed = _used(service), time.monotonic() - began
+    parts = []
+    for kind in (*_KINDS, "other"):
+        found = [(one, before[number][1]) for number, one in after.items() if number in before]
+        mine = [(one, seconds) for one, seconds in found if one[0] == kind]
+        share = sum(one[1] - seconds for one, seconds in mine) / elapsed
+        memory = sum(one[2] for one, _ in mine)
+        parts.append(f"{kind} {len(mine)} x {share / max(1, len(mine)):.0%} ({memory:.0f} MB)")
+    return ", ".join(parts)
+
+
+def _used(service: int) -> dict[int, tuple[str, float, float]]:
+    """Kind, processor seconds and own megabytes of the service's processes, by number."""
+    root = psutil.Process(service)
+    found = {}
+    for process in (root, *root.children(recursive=True)):
+        with contextlib.suppress(psutil.Error):
+            line, times = " ".join(process.cmdline()), process.cpu_times()
+            kind = next((kind for kind, one in _KINDS.items() if re.search(one, line)), "other")
+            memory = process.memory_info()
+            own = (memory.rss - memory.shared) / 1e6
+            found[process.pid] = kind, times.user + times.system, own
+    return found
+
+
 def show_flight(report: Report, drones: int, watchers: int, seconds: float) -> None:
     """Fly so many drones, command one, and watch them."""
-    with served(environment(drones)) as (client, token, _):
+    with served(environment(drones)) as (client, token, number):
         wanted = MissionIn.model_validate({"document": document(drones), "minutes": 30})
         mission = client.submit(wanted).id
-        while not (found := client.mission(mission)).status or any(
-            one.state != "enroute" for one in found.status.values()
-        ):
-            if found.reason and found.ended:
-                raise SystemExit(found.reason)
-            time.sleep(0.5)
-        row(report, f"command, {drones} drones", commands(client, mission, "d0", _COMMANDS))
-        url = f"{client.address.websocket}/v1/missions/{mission}/live?rate=5"
-        with subprocess.Popen(  # noqa: S603 - this very file, so that watching has a process
-            [sys.executable, __file__, "watch", url, token, str(watchers), str(seconds)],
-            stdout=subprocess.PIPE,
-            text=True,
-        ) as watching:
-            time.sleep(min(5.0, seconds / 3))
-            times = commands(client, mission, "d0", round((seconds - 5.0) / _EVERY / 2))
-            rates = json.loads(watching.communicate()[0])
-        row(report, f"the same, {watchers} watch at 5 Hz", times)
-        report.note(
-            f"watchers received {np.median(rates):.1f} states a second (median), "
-            f"{min(rates):.1f} the slowest"
-        )
-        client.cancel(mission)
-        while client.mission(mission).ended is None:
-            time.sleep(0.5)
+        try:
+            show_mission(report, client, token, number, mission, watchers, seconds)
+        finally:
+            # A flight outlives its service.
+            with contextlib.suppress(AeroDaaSError):
+                client.cancel(mission)
+            while client.mission(mission).ended is None:
+                time.sleep(0.5)
+
+
+def show_mission(
+    report: Report,
+    client: ProviderClient,
+    token: str,
+    service: int,
+    mission: str,
+    watchers: int,
+    seconds: float,
+) -> None:
+    """Command a drone of a flying mission, unwatched and watched; `service` is its process' id."""
+    while not (found := client.mission(mission)).status or any(
+        one.state != "enroute" for one in found.status.values()
+    ):
+        if found.reason and found.ended:
+            raise SystemExit(found.reason)
+        time.sleep(0.5)
+    report.note(f"of a core, unwatched: {busy(service)}")
+    row(report, f"command, {len(found.status)} drones", commands(client, mission, "d0", _COMMANDS))
+    watching_seconds = seconds + _SHARE_SECONDS
+    url = f"{client.address.websocket}/v1/missions/{mission}/live?rate=5"
+    with subprocess.Popen(  # noqa: S603 - this very file, so that watching has a process
+        [sys.executable, __file__, "watch", url, token, str(watchers), str(watching_seconds)],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as watching:
+        time.sleep(min(5.0, seconds / 3))
+        shares = busy(service)
+        times = commands(client, mission, "d0", round((seconds - 5.0) / _EVERY / 2))
+        rates = json.loads(watching.communicate()[0])
+    row(report, f"the same, {watchers} watch at 5 Hz", times)
+    report.note(f"of a core, watched: {shares}")
+    report.note(
+        f"watchers received {np.median(rates):.1f} states a second (median), "
+        f"{min(rates):.1f} the slowest"
+    )
 
 
 def show_submissions(report: Report, missions: int) -> None:

@@ -7,7 +7,7 @@ import contextlib
 import logging
 import os
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -17,7 +17,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 from aerodaas.actors.cluster.handshake import greet, hushed
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_internals import forbid_start, silence_nodes
-from aerodaas.actors.cluster.ray_variables import VARIABLES
+from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES, VARIABLES
 from aerodaas.config.model import ComputeConfig
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
@@ -65,7 +65,7 @@ def begin(address: str | None) -> None:
     global _local  # noqa: PLW0603 - one Ray for each process
     if ray.is_initialized() or address or os.environ.get("RAY_ADDRESS") or _local is not None:
         return
-    _local = LocalRay(VARIABLES)
+    _local = LocalRay(LOCAL_VARIABLES)
     atexit.register(disconnect)
 
 
@@ -84,7 +84,7 @@ def connect(address: str | None) -> None:
         return
     begin(None)
     assert _local is not None  # noqa: S101 - begun
-    _set_variables()
+    _set_variables(LOCAL_VARIABLES)
     _init(_local.address)
 
 
@@ -92,14 +92,14 @@ def join(address: str) -> None:
     """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError."""
     if ray.is_initialized():
         return
-    _set_variables()
+    _set_variables(VARIABLES)
     greet(address)
     _init(address)
 
 
-def _set_variables() -> None:
+def _set_variables(variables: Mapping[str, str]) -> None:
     """Set Ray's environment variables; before the first use of its C++ part, which reads them."""
-    for name, value in VARIABLES.items():
+    for name, value in variables.items():
         os.environ.setdefault(name, value)
     # The first error is reported; Ray would print the tracebacks of subsequent ones.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["VARIABLES"]
+__all__ = ["LOCAL_VARIABLES", "VARIABLES"]
 
 VARIABLES = {
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -21,3 +21,21 @@ VARIABLES = {
     # day lets drones return home; a run's processes end by themselves afterwards.
     "RAY_gcs_rpc_server_reconnect_timeout_s": "86400",
 }
+LOCAL_VARIABLES = {
+    **VARIABLES,
+    # Nobody reads the figures of a Ray that has no dashboard.
+    "RAY_enable_metrics_collection": "0",
+    "RAY_event_stats": "0",
+    "RAY_event_stats_print_interval_ms": "0",
+    # What one node has is known to itself; these tell it to an autoscaler, or look for what
+    # other nodes want, ten times a second.
+    "RAY_raylet_report_resources_period_milliseconds": "1000",
+    "RAY_gcs_pull_resource_loads_period_milliseconds": "10000",
+    "RAY_report_worker_backlog_interval_ms": "10000",
+    "RAY_object_manager_timer_freq_ms": "1000",
+    # Housekeeping five and ten times a second, for thousands of short tasks.
+    "RAY_kill_idle_workers_interval_ms": "5000",
+    "RAY_raylet_check_gc_period_milliseconds": "1000",
+    "RAY_DASHBOARD_AGENT_CHECK_PARENT_INTERVAL_S": "2",
+}
+"""Those of a Ray of one machine, which an application has started for itself."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -25,11 +25,13 @@ from aerodaas.actors.session import (
     Session,
     next_due,
 )
-from aerodaas.actors.stream_names import reply_stream, request_stream, state_stream
+from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
 
@@ -59,13 +61,14 @@ class DroneActor(StreamActor):
     ) -> None:
         """Create the actor `name` of `session`, which flies `robots`.
 
-        `neighbours` are the robots of other actors, from which to keep separation.
+        `neighbours` are the other drone actors, from whose robots to keep separation.
         """
         depths = dict.fromkeys(_streams(robots), MESSAGE_DEPTH)
-        depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
+        depths.update(dict.fromkeys(map(whereabouts_stream, neighbours), 1))
         super().__init__(session, name, depths)
         self._whereabouts: dict[str, Neighbour] = {}
-        self._neighbours = {state_stream(other): other for other in neighbours}
+        """Where each robot of this actor and of the others was last."""
+        self._neighbours = frozenset(map(whereabouts_stream, neighbours))
         self._specs = robots
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
@@ -73,6 +76,8 @@ class DroneActor(StreamActor):
         self._changes = ChangeSignal()
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
+        self._failures: dict[str, Exception] = {}
+        """What ended the loop for single robots, while it goes on for the others."""
         self._late = 0
         self._refused: tuple[str, ...] = ()
         """Reasons why this machine refuses real-time priority or locked memory."""
@@ -93,6 +98,8 @@ class DroneActor(StreamActor):
             streams = (*VehicleController.streams(spec), *map(reply_stream, spec.requesters))
             controller.open({stream: self.publisher(stream) for stream in streams})
             self._controllers[controller.id] = controller
+        if self._neighbours:
+            self.publisher(whereabouts_stream(self.name))
         self._publish_reports()
 
     def _controller(self, spec: RobotSpec) -> VehicleController:
@@ -111,6 +118,8 @@ class DroneActor(StreamActor):
         Raises MissionError if the loop does not execute it in time.
         """
         controller = self._controllers[robot]
+        if robot in self._failures:
+            return Answer(accepted=False, text=_failed(robot, self._failures[robot]))
         try:
             return self._calls.ask(
                 lambda: controller.handle(command, self.clock.now()), ANSWER_TIMEOUT
@@ -224,15 +233,52 @@ class DroneActor(StreamActor):
                 continue
             self._late += now - due > CONTROL_PERIOD_NS // 2
             for controller in self._controllers.values():
-                controller.advance_to(now)
-                self._turn(controller, now)
+                self._guarded(controller, self._advance, now)
+                # A command waits for one drone's turn, not for all of them.
+                self._calls.serve()
+            self._publish_whereabouts(now)
             for controller in self._controllers.values():
-                controller.observe(now)
+                self._guarded(controller, VehicleController.observe, now)
             self._watch_application()
             self._publish_reports()
             due = next_due(CONTROL_RATE, now)
             if due > self.clock.now():
                 slack.use()
+        if self._failures:
+            raise MissionError("; ".join(_failed(*one) for one in self._failures.items()))
+
+    def _guarded(
+        self,
+        controller: VehicleController,
+        step: Callable[[VehicleController, int], object],
+        now: int,
+    ) -> None:
+        """Take a step of the loop for one robot; its failure is its own, while others fly."""
+        if controller.id in self._failures:
+            return
+        try:
+            step(controller, now)
+        except Exception as error:
+            if len(self._controllers) == 1:
+                raise
+            self._failures[controller.id] = error
+            controller.abandon()
+            self.alert("drone_failed", _failed(controller.id, error))
+
+    def _advance(self, controller: VehicleController, now: int) -> None:
+        controller.advance_to(now)
+        self._turn(controller, now)
+
+    def _publish_whereabouts(self, now: int) -> None:
+        """Tell the other drones' actors where the robots of this one are."""
+        if self._neighbours:
+            known = self._whereabouts
+            mine = {name: known[name] for name in self._controllers if name in known}
+            stream = whereabouts_stream(self.name)
+            publisher, measured = self.publishers[stream], host_time_ns()
+            self._publisher.do(
+                lambda: publisher.measure(mine, Header(publisher.sent, now, stream), measured)
+            )
 
     def _turn(self, controller: VehicleController, now: int) -> None:
         others = [where for name, where in self._whereabouts.items() if name != controller.id]
@@ -244,14 +290,17 @@ class DroneActor(StreamActor):
             self._publisher.do(partial(self.tell, alert.kind, alert.text, now, dict(alert.values)))
 
     def _take(self, message: Message[Any], now: int) -> None:
-        if message.stream in self._neighbours and isinstance(message.item, VehicleState):
-            self._whereabouts[self._neighbours[message.stream]] = _neighbour(message.item)
+        if message.stream in self._neighbours:
+            self._whereabouts.update(message.item or {})
             return
         for controller in self._controllers.values():
             controller.take(message, now)
 
     def _over(self) -> bool:
-        return self.stopping or all(controller.over for controller in self._controllers.values())
+        return self.stopping or all(
+            name in self._failures or controller.over
+            for name, controller in self._controllers.items()
+        )
 
     def _watch_application(self) -> None:
         silent = time.monotonic() - self._heard > _APPLICATION_TIMEOUT
@@ -272,7 +321,8 @@ class DroneActor(StreamActor):
 
     def _fail(self, error: AeroDaaSError) -> None:
         for controller in self._controllers.values():
-            controller.abandon()
+            if not controller.over:
+                controller.abandon()
         super()._fail(error)
 
     def _values(self) -> dict[str, Any]:
@@ -303,6 +353,10 @@ def _notable(report: RobotReport) -> tuple[object, ...]:
     """What of a report the application is told at once, rather than at its next look."""
     status = report.status
     return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
+
+
+def _failed(robot: str, error: Exception) -> str:
+    return f"{robot}: {failure_line(error)}"
 
 
 def _neighbour(state: VehicleState) -> Neighbour:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from aerodaas.actors.lockstep.actor import LockstepActor
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.stream_names import ACKS
@@ -22,3 +24,6 @@ class LockstepRecorderActor(LockstepActor, RecorderActor):
     def _written(self, headers: list[Header], last: Message[None]) -> None:
         done = tuple((header.source, header.stamp) for header in headers)
         self._acks.derive(done, last, host_time_ns(), last.stamp)
+
+    def _rest(self, counts: Counter[str]) -> None:
+        """Go on at once: mission time waits for what is acknowledged."""

@@ -89,16 +89,9 @@ class Flight:
         self._head: HeadWatch | None = None
         session, edge = plan.session, Placement()
         environments = environment_options(plan)
-        for specs, place in zip(plan.drones, plan.edges, strict=True):
-            name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
+        for name, specs, place in zip(plan.drone_actors, plan.drones, plan.edges, strict=True):
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
-            mine = {spec.robot.id for spec in specs}
-            others = tuple(
-                spec.robot.id
-                for group in plan.drones
-                for spec in group
-                if spec.robot.id not in mine
-            )
+            others = tuple(other for other in plan.drone_actors if other != name)
             own = others if plan.conduct is None else plan.conduct
             args, setup = (session, name, specs, own), (vehicle_variables(),)
             self._create(name, self._classes.drone, place, args, setup=setup)

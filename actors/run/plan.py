@@ -18,6 +18,7 @@ from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleControlle
 from aerodaas.actors.lockstep.barrier import paths, widest
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.run.checks import check_graph, check_plugins, check_tasks
+from aerodaas.actors.run.hosting import by_actor
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.actors.stream_names import (
     ACKS,
@@ -106,6 +107,11 @@ class FlightPlan:
     """None in real time."""
     recorded: dict[str, int]
     """Streams for the recorder and their queue depths; empty without a recorder."""
+
+    @property
+    def drone_actors(self) -> tuple[str, ...]:
+        """Names of the drone actors, in the order of `drones`."""
+        return _names(self.drones)
 
 
 class _Planner:
@@ -410,8 +416,8 @@ def make_plan(
     dispatch = planner.dispatching()
     if dispatch is not None:
         streams.append(DECISIONS)
-    drones = (specs,) if session.lockstep else tuple((spec,) for spec in specs)
-    names = [f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones]
+    drones = by_actor(specs, [planner.edge_of(one.robot.id) for one in specs], session)
+    names = [*_names(drones)]
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
@@ -426,6 +432,10 @@ def make_plan(
         conduct=planner.conduct(specs, cameras) if session.lockstep else None,
         recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
+
+
+def _names(drones: tuple[tuple[RobotSpec, ...], ...]) -> tuple[str, ...]:
+    return tuple(f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones)
 
 
 def _streams_of(edge: NavigationEdge) -> list[str]:

@@ -18,6 +18,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data
+from aerodaas.types.identifiers import ScopedWord, Word
 from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = [
@@ -34,9 +35,7 @@ __all__ = [
     "read_mission",
 ]
 
-_Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}$")]
 _Number = Annotated[float, Field(allow_inf_nan=False)]
-_Name = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}(/[^\W\d][\w\-]{0,63})?$")]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
@@ -120,14 +119,14 @@ class WaypointEntry(BaseModel):
 class SchedulerEntry(_Entry):
     """A registered scheduler and its settings."""
 
-    name: _Word
+    name: Word
     settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
 
 
 class TriggerEntry(_Entry):
     """What an analysis does when a result meets a condition."""
 
-    target: _Name
+    target: ScopedWord
     """Id of the analysis that is woken, or of the robot that is commanded."""
     command: Literal["end_mission", "pause_mission", "resume_mission"] | None = None
     """The robot's method; None for an analysis."""
@@ -150,16 +149,16 @@ class HereEntry(_Entry):
 class AnalysisEntry(_Entry):
     """One analysis: by its registered name, or at the user's side."""
 
-    id: _Name
+    id: ScopedWord
     """Name of its stream."""
-    analysis: _Word | None = None
+    analysis: Word | None = None
     here: HereEntry | None = None
     """For one at the user's side, which has neither `analysis` nor settings, compute or task."""
     settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
     """Arguments of its constructor."""
-    reads: list[_Name] = Field(default_factory=list, max_length=_MOST)
+    reads: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors by full id, and analyses; empty for a source of its own."""
-    compute: _Name | None = None
+    compute: ScopedWord | None = None
     rate: Annotated[float, Field(gt=0, le=_MOST_HERTZ)] | None = None
     """Hz of a source of its own, where the application set it."""
     task: dict[str, Any] | None = None
@@ -184,15 +183,15 @@ class AnalysisEntry(_Entry):
 class NavigationDocument(_Entry):
     """Navigation of a robot: waypoints, or the stream of an analysis."""
 
-    robot: _Word
-    stream: _Name | None = None
+    robot: Word
+    stream: ScopedWord | None = None
     waypoints: list[WaypointEntry] = Field(default_factory=list, max_length=_MOST_WAYPOINTS)
     ordered: bool = True
     priority: Annotated[int, Field(ge=0)] | None = None
     index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
     deadline: Annotated[float, Field(gt=0)] | None = None
     """Seconds of mission time."""
-    clear_on: _Name | None = None
+    clear_on: ScopedWord | None = None
     """Stream whose first item empties the queue."""
 
 
@@ -205,14 +204,14 @@ class MissionDocument(_Entry):
     """Of the application."""
     environment: str = Field("", max_length=200)
     """File name of the environment that it was written for; a hint."""
-    sensors: list[_Name] = Field(default_factory=list, max_length=_MOST)
+    sensors: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors that run, by full id."""
     analyses: list[AnalysisEntry] = Field(default_factory=list, max_length=_MOST)
     """Each after those that it reads."""
     navigation: list[NavigationDocument] = Field(default_factory=list, max_length=_MOST)
     """Empty for one that senses only, which a provider attaches to another flight's cameras."""
     trajectory_scheduler: SchedulerEntry | None = None
-    analytics_scheduler: _Word | None = None
+    analytics_scheduler: Word | None = None
 
     @property
     def here(self) -> list[str]:

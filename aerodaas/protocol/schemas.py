@@ -16,6 +16,7 @@ from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
+from aerodaas.types.identifiers import ScopedWord, Word
 
 __all__ = [
     "AccountIn",
@@ -49,10 +50,8 @@ __all__ = [
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}$")]
 Area = Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=100)]
 """A polygon's corners (east, north) in metres of the provider's local frame."""
-_SensorId = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}(/[^\W\d][\w\-]{0,63})?$")]
 _MOST_ROBOTS = 64
 _MOST_MINUTES = 24 * 60
 _YEAR_DAYS = 366
@@ -232,7 +231,7 @@ class LeaseOut(AnswerModel):
 class GrantIn(RequestModel):
     """What a tenant may attach missions to."""
 
-    sensors: list[_SensorId] = Field(default_factory=list, max_length=_MOST_ROBOTS)
+    sensors: list[ScopedWord] = Field(default_factory=list, max_length=_MOST_ROBOTS)
     """Cameras by full id; none for all of the mission's."""
 
 
@@ -252,7 +251,7 @@ class MissionIn(RequestModel):
     is no lease: it runs until that flight ends, it is withdrawn, or its minutes are over."""
     share: list[Word] = Field(default_factory=list, max_length=_MOST_ROBOTS)
     """Tenants that may watch it."""
-    grants: dict[Word, list[_SensorId]] = Field(default_factory=dict, max_length=_MOST_ROBOTS)
+    grants: dict[Word, list[ScopedWord]] = Field(default_factory=dict, max_length=_MOST_ROBOTS)
     """Tenants that may attach missions to its cameras, as `GrantIn` says for each."""
     seed: Annotated[int, Field(ge=0)] | None = None
     """Of a simulated fleet."""

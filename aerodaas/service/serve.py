@@ -73,6 +73,8 @@ def serve(
             ws_max_size=_MOST_MESSAGE,
             ws_ping_interval=_PING_SECONDS,
             ws_ping_timeout=_PING_SECONDS,
+            # It would compress each state anew for each watcher, and pictures are compressed.
+            ws_per_message_deflate=False,
             timeout_graceful_shutdown=2,
         ).run(sockets=[listener])
 

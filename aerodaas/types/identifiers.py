@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Annotated, TypeVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from aerodaas.types.errors import AmbiguousIdError, GraphError, UnknownIdError
 
@@ -19,6 +19,8 @@ __all__ = [
     "INTERNAL",
     "Identifier",
     "ScopedName",
+    "ScopedWord",
+    "Word",
     "find_scoped",
     "internal",
     "is_internal",
@@ -39,6 +41,26 @@ ScopedName = Annotated[
 ]
 """`robot/name`, or the name alone where only one robot has it."""
 _NAME = re.compile(r"[^\W\d][\w\-]{0,63}")
+_LONGEST = 64
+"""Most characters of a name."""
+
+
+def _short_parts(name: str) -> str:
+    if any(len(part) > _LONGEST for part in name.split("/")):
+        raise ValueError(f"a name has at most {_LONGEST} characters, and so has its robot's")
+    return name
+
+
+# A pattern that counted (`{0,63}`) would take 1 to 3 MB for each field, for it is compiled into so
+# many copies of all letters of all scripts.
+Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]*$", max_length=_LONGEST)]
+"""A name in a document or a request, in letters of any script."""
+ScopedWord = Annotated[
+    str,
+    Field(pattern=r"^[^\W\d][\w\-]*(/[^\W\d][\w\-]*)?$", max_length=2 * _LONGEST + 1),
+    AfterValidator(_short_parts),
+]
+"""`robot/name` in a document or a request, or the name alone."""
 
 
 def internal(owner: str, name: str) -> str:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["fast_pickle", "valued"]
+__all__ = ["fast_pickle", "shared_pickle", "valued"]
 
 C = TypeVar("C", bound=type[Any])
 _PLAIN = frozenset({bool, float, int, str})
 """What most fields are; all else is asked what it is, which takes several times as long."""
+_MOST_SHARED = 4096
+"""Records that came last and are kept to be found again."""
 _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
 
@@ -57,6 +60,28 @@ def fast_pickle(cls: C) -> C:
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
     return valued(cls)
+
+
+def shared_pickle(cls: C) -> C:
+    """Pickle as `fast_pickle` does, and find an equal record instead of building another.
+
+    For what is immutable, throughout, and comes again and again, such as the waypoints in each
+    status of a mission. Its values are hashed as they are.
+    """
+    fast_pickle(cls)
+    values = _values_of(cls)
+    otherwise: Any = cls.__reduce__
+
+    def reduce(self: Any) -> Any:  # noqa: ANN401 - an instance of `cls`
+        return (_found, (cls, *values(self))) if type(self) is cls else otherwise(self)
+
+    cls.__reduce__ = reduce  # type: ignore[assignment]
+    return cls
+
+
+@lru_cache(maxsize=_MOST_SHARED, typed=True)
+def _found(cls: type[Any], *values: object) -> object:
+    return cls(*values)
 
 
 def _values_of(cls: type[Any]) -> Callable[[Any], tuple[Any, ...]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.records import fast_pickle
+from aerodaas.types.records import fast_pickle, shared_pickle
 
 __all__ = [
     "DEFAULT_PRIORITY",
@@ -105,7 +105,7 @@ def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
         raise InvalidWaypointError(f"{owner}: priority must be a whole number, not {priority!r}")
 
 
-@fast_pickle
+@shared_pickle
 @dataclass(frozen=True, slots=True)
 class Waypoint:
     """A place to fly to, with hover time, yaw, speed and priority.

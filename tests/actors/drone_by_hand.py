@@ -14,11 +14,11 @@ from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import state_stream
 from aerodaas.actors.streams import Subscriber
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.mission.commands import Command
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
-__all__ = ["DroneByHand", "LockstepDroneByHand", "drone_by_hand"]
+__all__ = ["DroneByHand", "LockstepDroneByHand", "drone_by_hand", "spec_by_hand"]
 
 
 class DroneByHand(DroneActor):
@@ -45,6 +45,24 @@ class _InThisProcess(NearestNeighborScheduler):
     isolated = False
 
 
+def spec_by_hand(
+    robot: RobotConfig,
+    *initial: Command,
+    navigation: tuple[str, ...] = (),
+    requesters: tuple[str, ...] = (),
+) -> RobotSpec:
+    """A robot without sensors, whose plans need no process of their own."""
+    return RobotSpec(
+        robot=robot,
+        sensors=(),
+        navigation=navigation,
+        commands=(),
+        requesters=requesters,
+        initial=tuple(initial),
+        scheduler=_InThisProcess(),
+    )
+
+
 def drone_by_hand(
     *initial: Command,
     speed: float | None,
@@ -59,15 +77,8 @@ def drone_by_hand(
         "simulation": {"world": "empty"},
     }
     environment = EnvironmentConfig.model_validate(content)
-    spec = RobotSpec(
-        robot=environment.robots[0],
-        sensors=(),
-        navigation=navigation,
-        commands=(),
-        requesters=requesters,
-        initial=tuple(initial),
-        scheduler=_InThisProcess(),
-    )
+    (only,) = environment.robots
+    spec = spec_by_hand(only, *initial, navigation=navigation, requesters=requesters)
     session, name = Session(environment, speed), "drone/drone"
     actor: DroneByHand
     if speed is None:

@@ -187,6 +187,29 @@ def test_in_real_time_each_drone_has_its_own_actor(tmp_path: Path) -> None:
     assert plan(env, speed=1.0).conduct is None
 
 
+def test_simulated_drones_of_a_large_flight_share_actors(tmp_path: Path) -> None:
+    """Evenly, and fewer at a faster pace; eight or fewer, and real ones, have each their own."""
+
+    def groups(simulated: int, speed: float) -> list[int]:
+        robots = [robot(f"s{number}", start=[0, 5 * number, 0]) for number in range(simulated)]
+        robots.insert(3, {"id": "real", "driver": "tello", "limits": {}})
+        env = Environment(Flyer(tmp_path).write({**FLAT, "robots": robots}))
+        for one in robots:
+            env.get_robot_by_id(one["id"]).navigate(hop((1, 0)))
+        made = plan(env, speed=speed)
+        (alone,) = [group for group in made.drones if group[0].robot.id == "real"]
+        assert len(alone) == 1
+        assert len({spec.robot.id for group in made.drones for spec in group}) == simulated + 1
+        return [len(group) for group in made.drones if group is not alone]
+
+    assert groups(8, 1.0) == [1] * 8
+    assert groups(9, 1.0) == [9]
+    assert groups(23, 1.0) == [7, 8, 8]
+    assert groups(9, 0.5) == [9]
+    assert groups(12, 4.0) == [2] * 6
+    assert groups(9, 50.0) == [1] * 9
+
+
 def test_triggers_belong_to_whoever_publishes_the_results(environment: Environment) -> None:
     """Of what is scheduled the dispatcher, which alone sees what the cloud has found."""
     drone = environment.get_robot_by_id("drone")

@@ -52,6 +52,8 @@ def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission
     words = [Subprotocol("aerodaas"), Subprotocol(f"bearer.{provider.token}")]
     with connect(url, subprotocols=words) as socket:
         assert socket.subprotocol == "aerodaas"
+        # Offered by the client: it would be done anew for each watcher.
+        assert socket.protocol.extensions == []
         status = json.loads(socket.recv(20))["mission"]["status"]["one"]
     assert status["places"]["wp1"] == [20, 20, 2]
     wrong = [Subprotocol("aerodaas"), Subprotocol("bearer.aerodaas_wrong")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,27 @@ import pytest
 from flying import FLAT, Flyer, recorded, robot
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from aerodaas import AeroNavigation, Analytics, Environment, Waypoint
 from aerodaas.actors import stream_names as _names
 from aerodaas.actors.run.plan import make_plan
 from aerodaas.actors.session import Session
 from aerodaas.analytics.base import Context
+from aerodaas.analytics.guests.document import GuestDocument
 from aerodaas.config.model import validated
+from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.protocol.schemas import AccountIn, GrantIn, MissionIn
 from aerodaas.recording.encoding import stream_of, topic
 from aerodaas.types.errors import ConfigError, GraphError
-from aerodaas.types.identifiers import INTERNAL, is_internal, require_name, safe_name
+from aerodaas.types.identifiers import (
+    INTERNAL,
+    ScopedWord,
+    Word,
+    is_internal,
+    require_name,
+    safe_name,
+)
 
 OWN = ["state", "status", "setpoints", "fence", "commands", "requests", "replies", "tasks", "done"]
 NAMERS = [
@@ -127,3 +139,33 @@ def test_sensors_called_like_ours_fly(flyer: Flyer) -> None:
     run = flyer.fly(application, {**FLAT, "robots": [robot(sensors=SENSORS)]})
     flight = recorded(run)
     assert flight.robots["drone"].visited == ("a",)
+
+
+WORD, SCOPED_WORD = TypeAdapter(Word), TypeAdapter(ScopedWord)
+_PART = r"[^\W\d][\w\-]{0,63}"
+parts = st.from_regex(r"[a-zà_0-9\-]{0,3}", fullmatch=True)
+lengths = st.sampled_from([0, 1, 60, 61, 64])
+texts = st.builds(lambda part, more: part + "x" * more, parts, lengths)
+
+
+def _takes(adapter: TypeAdapter[str], text: str) -> bool:
+    try:
+        return adapter.validate_python(text) == text
+    except ValidationError:
+        return False
+
+
+@given(texts, texts)
+def test_a_name_of_a_document_has_at_most_64_characters_a_letter_first(a: str, b: str) -> None:
+    """So has each of the two parts of a scoped one, and it has no third."""
+    assert _takes(WORD, a) == bool(re.fullmatch(_PART, a))
+    for text in (a, f"{a}/{b}", f"{a}/{b}/{a}", f"{a}\n"):
+        assert _takes(SCOPED_WORD, text) == bool(re.fullmatch(rf"{_PART}(/{_PART})?", text))
+
+
+@pytest.mark.parametrize("model", [MissionDocument, GuestDocument, MissionIn, GrantIn, AccountIn])
+def test_no_pattern_of_a_document_counts_letters_of_all_scripts(model: type[BaseModel]) -> None:
+    """Each that does takes megabytes of every process that imports the model."""
+    text = str(model.model_json_schema())
+    assert "pattern" in text
+    assert "]{0," not in text

@@ -8,10 +8,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.config.checked import explained
 from aerodaas.types.errors import GraphError
+from aerodaas.types.identifiers import ScopedWord
 
 __all__ = ["GuestDocument", "GuestNavigation", "GuestNode", "GuestTrigger", "read_document"]
 
-_Name = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}(/[^\W\d][\w\-]{0,63})?$")]
 _MOST = 64
 _MOST_WAYPOINTS = 10_000
 
@@ -23,21 +23,21 @@ class _Strict(BaseModel):
 class GuestTrigger(_Strict):
     """A trigger of an analysis: wakes another one, or calls a robot's method."""
 
-    target: _Name
+    target: ScopedWord
     method: Literal["end_mission", "pause_mission", "resume_mission"] | None = None
 
 
 class GuestNode(_Strict):
     """One analysis of a guest."""
 
-    id: _Name
-    robot: _Name | None = None
-    inputs: list[_Name] = Field(default_factory=list, max_length=_MOST)
+    id: ScopedWord
+    robot: ScopedWord | None = None
+    inputs: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors by full id, and the guest's own analyses."""
     external: bool = False
     rate: Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)] = 1.0
     """Hz of an external one."""
-    compute: _Name | None = None
+    compute: ScopedWord | None = None
     navigation: bool = False
     """Whether its results are navigation."""
     scheduled: bool = False
@@ -48,15 +48,15 @@ class GuestNode(_Strict):
 class GuestNavigation(_Strict):
     """Navigation of a robot by a guest: waypoints, or the stream of one of its analyses."""
 
-    robot: _Name
-    stream: _Name | None = None
+    robot: ScopedWord
+    stream: ScopedWord | None = None
     waypoints: list[Any] = Field(default_factory=list, max_length=_MOST_WAYPOINTS)
     """As `items.encoded` writes them."""
     ordered: bool = True
     priority: Annotated[int, Field(ge=0, le=1000)] | None = None
     index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
     deadline: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
-    clear_on: _Name | None = None
+    clear_on: ScopedWord | None = None
 
 
 class GuestDocument(_Strict):

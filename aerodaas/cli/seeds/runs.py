@@ -22,7 +22,7 @@ from typing import Any
 from typing_extensions import Self
 
 from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_variables import VARIABLES
+from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES
 from aerodaas.cli.seeds.job import OUTPUT, Job
 from aerodaas.environment.signals import raise_on_signals
 from aerodaas.recording.report.report import SUMMARY
@@ -87,7 +87,7 @@ def _shared_ray(address: str | None) -> Iterator[str]:
     if joined:
         yield joined
         return
-    ray = LocalRay(VARIABLES)
+    ray = LocalRay(LOCAL_VARIABLES)
     try:
         yield ray.address
     finally:

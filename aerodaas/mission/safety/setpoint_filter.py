@@ -25,6 +25,10 @@ from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 __all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
+_FEW = 4
+"""Neighbours up to which it takes longer to tell the near ones than to bound by all."""
+_ROUNDING = 1e-3
+"""Metres by which a neighbour is taken to be nearer than it is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,7 +188,7 @@ class SetpointFilter:
     def _stop_before_boundaries(
         self, velocity: Vector, odometry: Odometry, neighbours: Iterable[Neighbour]
     ) -> tuple[Vector, list[str]]:
-        bounds = self._bounds(odometry, neighbours)
+        bounds = self._bounds(velocity, odometry, neighbours)
         names: list[str] = []
         if self._clearance is not None:
             view = self._clearance.view(odometry.position, odometry.velocity, velocity)
@@ -211,7 +215,9 @@ class SetpointFilter:
                 velocity = velocity * (bound.speed / closing)
         return velocity, names
 
-    def _bounds(self, odometry: Odometry, neighbours: Iterable[Neighbour]) -> list[_Bound]:
+    def _bounds(
+        self, velocity: Vector, odometry: Odometry, neighbours: Iterable[Neighbour]
+    ) -> list[_Bound]:
         position = odometry.position
         bounds = [*self._fence_bounds(odometry), *self._height_bounds(odometry)]
         outwards = position - self.home
@@ -219,14 +225,35 @@ class SetpointFilter:
         if away > 0.0:
             room = self.limits.max_range - away
             bounds.append(self._bound("max_range", outwards / away, room, odometry))
-        for neighbour in neighbours:
+        for neighbour in self._near(velocity, odometry, list(neighbours)):
             way = neighbour.position - position
             distance = length(way)
             # Both drones brake, so each may use half of the room between them.
             room = (distance - self.limits.separation) / 2
-            if self.limits.separation > 0.0 and distance > 0.0:
+            if distance > 0.0:
                 bounds.append(self._bound("separation", way / distance, room, odometry))
         return bounds
+
+    def _near(
+        self, velocity: Vector, odometry: Odometry, neighbours: list[Neighbour]
+    ) -> list[Neighbour]:
+        """Neighbours to keep away from; of many, those that may bound the speed asked for.
+
+        All bounds allow standing still, so none of them makes a velocity longer; only the climb
+        over rising ground may.
+        """
+        if self.limits.separation <= 0.0:
+            return []
+        if len(neighbours) <= _FEW:
+            return neighbours
+        limits, climb = self.limits, max(abs(float(velocity[2])), self.limits.max_climb)
+        fastest = math.hypot(velocity[0], velocity[1], climb)
+        reaction = (fastest + length(odometry.velocity)) * limits.reaction_time
+        room = reaction + fastest * fastest / (2 * limits.max_acceleration)
+        reach = limits.separation + 2 * room + _ROUNDING
+        ways = np.array([neighbour.position for neighbour in neighbours]) - odometry.position
+        near = np.einsum("ij,ij->i", ways, ways) <= reach * reach
+        return [neighbours[index] for index in np.flatnonzero(near)]
 
     def _over_ground(self, velocity: Vector, view: GroundView, odometry: Odometry) -> Vector:
         """`velocity`, slowed down before higher ground, and climbing to pass over it."""

@@ -11,6 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.mission.safety import setpoint_filter
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
 from aerodaas.types.clock import NANOSECONDS
@@ -349,6 +350,30 @@ def test_each_drone_may_use_exactly_half_of_the_room() -> None:
         near = Neighbour(other, -way)
         speed = float(np.dot(clamped_velocity(guard, tuple(9.0 * way), at(0, 0, 5.0), [near]), way))
         assert speed * 0.5 + speed**2 / 4 == pytest.approx((11.0 - 3.0) / 2)
+
+
+def test_of_many_neighbours_the_far_ones_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among fifty the setpoint and its limits are those of a look at every one of them."""
+    random = np.random.default_rng(5)
+    limits = LimitsConfig(max_speed=9.0, max_climb=3.0, separation=2.0, reaction_time=0.5)
+    named = []
+    for _ in range(300):
+        places = random.uniform(-60, 60, (50, 3)) * random.uniform(0.1, 1.0)
+        neighbours = [Neighbour(place, np.zeros(3)) for place in places]
+        asked = VelocitySetpoint(random.uniform(-12, 12, 3))
+        odometry = Odometry(np.zeros(3), random.uniform(-9, 9, 3), 0.0)
+        made = []
+        for few in (0, 50):
+            monkeypatch.setattr(setpoint_filter, "_FEW", few)
+            guard = SetpointFilter(limits, np.zeros(3))
+            made.append(guard.clamp(asked, odometry, 10.0, neighbours))
+        one, other = made
+        assert isinstance(one.setpoint, VelocitySetpoint)
+        assert isinstance(other.setpoint, VelocitySetpoint)
+        assert one.setpoint.velocity.tolist() == other.setpoint.velocity.tolist()
+        assert one.clipped_by == other.clipped_by
+        named.append("separation" in one.clipped_by)
+    assert 100 < sum(named) < 250
 
 
 def test_two_boundaries_at_once_are_both_kept() -> None:
