@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 MODELS = Path(__file__).resolve().parents[2] / "aerodaas/analytics/models"
 NAMES = ("vest", "person", "car", "tower")
-SIDE = 320
+ROWS, COLUMNS = 256, 384
 OVERLAP = 0.45
 
 
@@ -57,13 +57,13 @@ class BoxDetector:
     def find(self, image: NDArray[Any], *, rgb: bool = False) -> dict[str, list[Box]]:
         """Find things in a BGR or RGB picture: by name, the best first."""
         height, width = image.shape[:2]
-        ratio = SIDE / max(height, width)
+        ratio = min(ROWS / height, COLUMNS / width)
         inner = cv2.resize(image, (round(width * ratio), round(height * ratio)))
-        top, left = (SIDE - inner.shape[0]) // 2, (SIDE - inner.shape[1]) // 2
-        square = np.full((SIDE, SIDE, 3), 114, np.uint8)
-        square[top : top + inner.shape[0], left : left + inner.shape[1]] = inner
-        square = square if rgb else square[:, :, ::-1]
-        pixels = square.transpose(2, 0, 1)[None].astype(np.float32) / 255
+        top, left = (ROWS - inner.shape[0]) // 2, (COLUMNS - inner.shape[1]) // 2
+        padded = np.full((ROWS, COLUMNS, 3), 114, np.uint8)
+        padded[top : top + inner.shape[0], left : left + inner.shape[1]] = inner
+        padded = padded if rgb else padded[:, :, ::-1]
+        pixels = padded.transpose(2, 0, 1)[None].astype(np.float32) / 255
         (output,) = self.network.run(None, {"images": pixels})
         rows = output[0].T
         corners = np.hstack([rows[:, :2] - rows[:, 2:4] / 2, rows[:, :2] + rows[:, 2:4] / 2])

@@ -27,14 +27,14 @@ FRESH = HELD_OUT + 500
 @pytest.mark.parametrize("path", [DETECTOR, POSE], ids=["detector", "pose"])
 def test_files_are_small_and_told_apart_by_their_metadata(path: Path) -> None:
     """The detector's as Ultralytics writes it, so that other tools read it, too."""
-    assert path.stat().st_size < 5_000_000
+    assert path.stat().st_size < (6_000_000 if path == DETECTOR else 5_000_000)
     session = ort.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     metadata = session.get_modelmeta().custom_metadata_map
     assert metadata["author"] == "AeroDaaS"
     shape = session.get_outputs()[0].shape
     if path == DETECTOR:
-        assert (metadata["task"], metadata["imgsz"]) == ("detect", "[320, 320]")
-        assert shape == [1, 8, 2100]
+        assert (metadata["task"], metadata["imgsz"]) == ("detect", "[256, 384]")
+        assert shape == [1, 8, 4032]
     else:
         assert (metadata["task"], metadata["imgsz"]) == ("keypoints", "[128, 128]")
         assert shape[1:] == [17, 3]
@@ -67,8 +67,8 @@ def test_things_are_found_in_fresh_worlds() -> None:
     precision = {
         label: ranking.average_precision for label, ranking in rankings(DETECTOR, samples).items()
     }
-    assert precision["vest"] > 0.65
-    assert min(precision.values()) > 0.4
+    assert precision["vest"] > 0.7
+    assert min(precision.values()) > 0.6
 
 
 def test_the_vest_is_found_in_pictures_that_are_kept(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_the_vest_is_found_in_pictures_that_are_kept(tmp_path: Path) -> None:
 
 @needs_peer("AERODAAS_TEST_DATA")
 def test_the_vest_is_found_in_photographs() -> None:
-    """In nine of ten, with five boxes elsewhere at most; no photograph was trained on."""
+    """In all but one, with four boxes elsewhere at most; none of them was trained on."""
     seen = sightings(DETECTOR, PHOTOGRAPHS, VESTS, 0.3)
-    assert seen.found >= 0.9 * seen.pictures
-    assert seen.false <= 5
+    assert seen.found >= seen.pictures - 1
+    assert seen.false <= 4

@@ -72,9 +72,9 @@ def test_a_detector_is_described_with_its_use(models: Callable[..., Result]) -> 
     output = models("check", str(DETECTOR)).output
     for words in (
         "a detector of the family Ultralytics",
-        "320 x 320 RGB, 0 to 1, padded",
+        "384 x 256 RGB, 0 to 1, padded",
         "4: vest, person, car, tower",
-        "2100 boxes a picture",
+        "4032 boxes a picture",
         f"OnnxDetector({str(DETECTOR)!r}, classes=['person'])",
     ):
         assert words in output

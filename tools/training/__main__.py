@@ -23,8 +23,15 @@ _console = Console()
 _Work = Annotated[Path, typer.Option(help="Folder of pictures and checkpoints.")]
 _Out = Annotated[Path, typer.Option(help="Folder of the models and their cards.")]
 _Worlds = Annotated[int, typer.Option(help="Worlds to train on, of 20 pictures each.")]
-_Steps = Annotated[int, typer.Option(help="Steps of training, of 32 pictures each.")]
-_Halved = Annotated[int, typer.Option(help="Of these, the first ones, on halved pictures.")]
+_Steps = Annotated[int, typer.Option(help="Steps of training.")]
+_Batch = Annotated[int, typer.Option(min=1, help="Pictures of each step.")]
+_Loaders = Annotated[
+    int, typer.Option(min=0, help="Processes that draw pictures ahead: one per core, for a GPU.")
+]
+_Renderers = Annotated[int, typer.Option(min=1, help="Processes that render.")]
+_Yolox = Annotated[
+    Path, typer.Option(help="YOLOX-nano's weights: Megvii's file, or a detector made of it.")
+]
 _Seed = Annotated[int, typer.Option(help="Seed of weights and order.")]
 _Start = Annotated[
     Path | None, typer.Option(help="Weights to begin with (weights.pt of an earlier run).")
@@ -40,12 +47,14 @@ _WORK, _OUT = Path("runs/training"), DETECTOR.parent
 
 
 @app.command()
-def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 30) -> None:
+def render(
+    work: _Work = _WORK, worlds: _Worlds = 1400, held_out: int = 30, renderers: _Renderers = 1
+) -> None:
     """Render the pictures, those to train on and those held out; resumes."""
     for name, first, count in (("train", 0, worlds), ("held-out", HELD_OUT, held_out)):
         with Progress(console=_console) as bar:
             task = bar.add_task(f"rendering {name}", total=count)
-            for done in render_shards(work / name, first, count):
+            for done in render_shards(work / name, first, count, renderers):
                 bar.update(task, completed=done)
 
 
@@ -59,12 +68,15 @@ def sheet(path: Path, seed: int = HELD_OUT) -> None:
 def detector(
     work: _Work = _WORK,
     out: _Out = _OUT,
-    worlds: _Worlds = 600,
-    steps: _Steps = 7600,
-    halved: _Halved = 4400,
+    worlds: _Worlds = 1400,
+    steps: _Steps = 8000,
+    batch: _Batch = 96,
     seed: _Seed = 1,
     start: _Start = None,
     processes: _Processes = 1,
+    loaders: _Loaders = 0,
+    renderers: _Renderers = 1,
+    yolox: _Yolox = DETECTOR,
     photographs: _Photographs = None,
     labels: _Labels = None,
 ) -> None:
@@ -72,9 +84,11 @@ def detector(
     _require_torch()
     from tools.training import pipeline, train  # noqa: PLC0415 - they need PyTorch
 
-    render(work, worlds)
-    places = pipeline.Places(work, out, photographs, labels)
-    recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start, processes=processes)
+    render(work, worlds, renderers=renderers)
+    places = pipeline.Places(work, out, photographs, labels, yolox)
+    recipe = train.Recipe(
+        steps=steps, batch=batch, seed=seed, start=start, processes=processes, loaders=loaders
+    )
     _watch(pipeline.trained(places, recipe), steps)
     _console.print(pipeline.make_detector(places, recipe).figures)
 

@@ -40,6 +40,8 @@ def backdrop(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     kinds = int(rng.integers(5))
     for _ in range(int(rng.integers(10, 120))):
         _leaf(canvas, kinds, rng)
+    for _ in range(int(rng.integers(4)) if rng.integers(2) else 0):
+        (_grid if rng.integers(2) else _twigs)(canvas, rng)
     result = canvas.astype(np.float32)
     for cells in rng.choice([4.0, 12.0, 40.0, 110.0, 250.0], 2, replace=False):
         result *= 1.0 + rng.uniform(0.0, 0.28) * field(shape, cells, rng)[..., None]
@@ -87,6 +89,52 @@ def _leaf(canvas: Picture, kinds: int, rng: np.random.Generator) -> None:
                 cv2.fillConvexPoly(canvas, piece.astype(np.int32), colour)
             return
     cv2.fillPoly(canvas, [points.astype(np.int32)], colour)
+
+
+def _grid(canvas: Picture, rng: np.random.Generator) -> None:
+    """Draw bars that cross or stand side by side: windows, fences, shelves, blinds."""
+    height, width = canvas.shape[:2]
+    radius = rng.uniform(0.05, 0.7) * width
+    corners = rng.uniform((0, 0), (width, height)) + radius * (
+        np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * rng.uniform(0.3, 1.0, 2)
+        + rng.normal(0.0, 0.15, (4, 2))
+    )
+    colour, thickness = _tone(rng).tolist(), int(rng.integers(1, 2 + max(1, int(radius / 40))))
+    for first, second, third, fourth in ((0, 1, 3, 2), (0, 3, 1, 2)):
+        if rng.random() < 0.25:  # noqa: PLR2004 - bars without bars across
+            continue
+        for share in np.linspace(0, 1, int(rng.integers(2, 14))):
+            start = corners[first] * (1 - share) + corners[second] * share
+            end = corners[third] * (1 - share) + corners[fourth] * share
+            _line(canvas, start, end, colour, thickness)
+
+
+def _twigs(canvas: Picture, rng: np.random.Generator) -> None:
+    """Draw lines that part from each other: bare branches, wires, stalks."""
+    height, width = canvas.shape[:2]
+    place, angle = rng.uniform((0, 0), (width, height)), rng.uniform(0, 2 * np.pi)
+    ends, length = [(place, angle)], rng.uniform(0.03, 0.25) * width
+    colour = _tone(rng).tolist()
+    for depth in range(int(rng.integers(2, 5))):
+        grown = []
+        for start, along in ends:
+            for turn in rng.normal(0.0, 0.5, int(rng.integers(1, 4))):
+                reach = length * rng.uniform(0.5, 1.0)
+                end = start + reach * np.array([np.cos(along + turn), np.sin(along + turn)])
+                _line(canvas, start, end, colour, max(1, 4 - depth))
+                grown.append((end, along + turn))
+        ends, length = grown, length * 0.7
+
+
+def _line(
+    canvas: Picture,
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    colour: list[float],
+    thickness: int,
+) -> None:
+    first, last = (int(start[0]), int(start[1])), (int(end[0]), int(end[1]))
+    cv2.line(canvas, first, last, colour, thickness, cv2.LINE_AA)
 
 
 def compose(picture: Picture, wanted: NDArray[np.bool_], rng: np.random.Generator) -> Picture:

@@ -92,10 +92,3 @@ class Pictures:
         """Decode one."""
         image = cv2.imdecode(self._files[index], cv2.IMREAD_COLOR)
         return Sample(np.asarray(image, np.uint8), *self._labels[index])
-
-    def halved(self, index: int) -> Sample:
-        """Decode one at half its size, which is faster."""
-        image = cv2.imdecode(self._files[index], cv2.IMREAD_REDUCED_COLOR_2)
-        kinds, boxes, keypoints = self._labels[index]
-        points = keypoints * np.array([0.5, 0.5, 1.0], np.float32)
-        return Sample(np.asarray(image, np.uint8), kinds, 0.5 * boxes, points)

@@ -12,41 +12,55 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
 from tools.training.network import STRIDES, DetectorNetwork, anchors_of, decode_boxes
+from tools.training.yolox import CAR, PERSON, FrozenYolox
 
 __all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "fused", "save_onnx"]
 
-SIZE = 320
-"""Pixels of the square input."""
+SIZE = (256, 384)
+"""Height and width of the input, between 4:3 and 16:9: either leaves a seventh of it empty."""
 
 NOMINAL_SCORE = 0.3
 """What a score at the best threshold is turned into, so that one threshold suits all classes."""
 
+_RELEASED = {"person": PERSON, "car": CAR}
+"""What YOLOX's own head answers for."""
+
 
 class _Detector(nn.Module):
-    """Boxes (centre, size) and class scores, (1, 4 + classes, n)."""
+    """Boxes (centre, size) and class scores, (1, 4 + classes, n): learnt ones, then YOLOX's own."""
 
-    def __init__(self, network: DetectorNetwork, thresholds: list[float]) -> None:
+    def __init__(
+        self, frozen: FrozenYolox, network: DetectorNetwork, thresholds: list[float]
+    ) -> None:
         super().__init__()
-        self.network = network
-        self.centres, self.strides = anchors_of((SIZE, SIZE))
+        self.frozen, self.network = frozen, network
+        self.centres, self.strides = anchors_of(SIZE)
         shifts = [_logit(NOMINAL_SCORE) - _logit(threshold) for threshold in thresholds]
         self.shifts = torch.tensor(shifts)[None, :, None]
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Find things."""
-        maps = self.network.maps(pixels)
-        raw = _joined(self.network.boxes, maps)
-        logits = _joined(self.network.kinds, maps)
+        features = self.frozen.features(pixels)
+        own = self.frozen.own(features)  # first: `released_weights` reads the file in this order
+        raw, logits = self.network(features)
         boxes = _centred(decode_boxes(raw, self.centres, self.strides))
-        return torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
+        learnt = torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
+        return torch.cat([learnt, self._released(own)], 2)
+
+    def _released(self, levels: list[Tensor]) -> Tensor:
+        rows = torch.cat([level.flatten(2) for level in levels], 2)
+        centres = (rows[:, :2] - 0.5) * self.strides + self.centres
+        sizes = rows[:, 2:4].exp() * self.strides
+        objectness, kinds = rows[:, 4:5], rows[:, 5:]
+        scores = [torch.zeros_like(objectness)] * len(DETECTOR_CLASSES)
+        for name, numbers in _RELEASED.items():
+            best = kinds[:, list(numbers)].amax(1, keepdim=True)
+            scores[DETECTOR_CLASSES.index(name)] = best * objectness
+        return torch.cat([centres, sizes, *scores], 1)
 
 
 def _logit(share: float) -> float:
     return math.log(share / (1 - share))
-
-
-def _joined(heads: nn.ModuleList, maps: list[Tensor]) -> Tensor:
-    return torch.cat([head(m).flatten(2) for head, m in zip(heads, maps, strict=True)], 2)
 
 
 def _centred(boxes: Tensor) -> Tensor:
@@ -65,18 +79,25 @@ def fused(module: nn.Module) -> nn.Module:
     return module
 
 
-def export_detector(weights: Path, path: Path, thresholds: list[float]) -> None:
-    """Write the detector; `thresholds` are the classes' best scores, made `NOMINAL_SCORE`."""
+def export_detector(
+    frozen: FrozenYolox, weights: Path, path: Path, thresholds: list[float]
+) -> None:
+    """Write the detector; `thresholds` are the learnt classes' best scores, made `NOMINAL_SCORE`.
+
+    They do not move the scores of YOLOX's own head.
+    """
     names = dict(enumerate(DETECTOR_CLASSES))
     metadata = {
+        "description": "AeroDaaS, trained on rendered pictures, on Megvii's YOLOX-nano",
         "task": "detect",
         "names": str(names),
         "stride": str(max(STRIDES)),
         "batch": "1",
-        "imgsz": str([SIZE, SIZE]),
+        "imgsz": str(list(SIZE)),
     }
-    picture = torch.zeros(1, 3, SIZE, SIZE)
-    save_onnx(_Detector(_load(weights), thresholds), path, ("images", "output0"), picture, metadata)
+    picture = torch.zeros(1, 3, *SIZE)
+    detector = _Detector(frozen, _load(weights), thresholds)
+    save_onnx(detector, path, ("images", "output0"), picture, metadata)
 
 
 def _load(weights: Path) -> DetectorNetwork:

@@ -1,4 +1,4 @@
-"""The network: one body, and heads for boxes and classes at strides 8, 16 and 32.
+"""The network that learns: a pyramid and heads at strides 8, 16 and 32, on frozen features.
 
 In kind it is YOLOv8 (anchor-free, decoupled heads, feature pyramid up and down), smaller: ReLU
 and plain distances instead of SiLU and their distributions, since both run faster on a CPU.
@@ -14,11 +14,15 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
+from tools.training.yolox import FEATURES, Features
 
 __all__ = ["STRIDES", "DetectorNetwork", "anchors_of"]
 
 STRIDES = (8, 16, 32)
-_WIDTHS = (16, 24, 48, 96, 128)
+_WIDTHS = (64, 96, 96)
+_TINTS, _HIDDEN = 24, 48
+_DROPPED = 0.1
+"""Share of the frozen channels left out in training, so that no look of renders is relied on."""
 _PRIOR = 0.01
 """Score of an untrained network."""
 
@@ -34,42 +38,21 @@ def _conv(
 
 
 class _Stage(nn.Module):
-    """Bottlenecks side by side with what passes them by (YOLOv8's C2f)."""
+    """A bottleneck side by side with what passes it by (YOLOv8's C2f)."""
 
-    def __init__(self, inputs: int, outputs: int, repeats: int = 1, *, add: bool = True) -> None:
+    def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
         self.hidden = outputs // 2
-        self.add = add
         self.enter = _conv(inputs, 2 * self.hidden, 1)
-        self.bottlenecks = nn.ModuleList(
-            nn.Sequential(_conv(self.hidden, self.hidden), _conv(self.hidden, self.hidden))
-            for _ in range(repeats)
+        self.bottleneck = nn.Sequential(
+            _conv(self.hidden, self.hidden), _conv(self.hidden, self.hidden)
         )
-        self.leave = _conv((2 + repeats) * self.hidden, outputs, 1)
+        self.leave = _conv(3 * self.hidden, outputs, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Apply the stage."""
-        parts = list(self.enter(x).split(self.hidden, 1))
-        for bottleneck in self.bottlenecks:
-            last = bottleneck(parts[-1])
-            parts.append(parts[-1] + last if self.add else last)
-        return self.leave(torch.cat(parts, 1))
-
-
-class _Pooling(nn.Module):
-    """Context from 5, 9 and 13 cells around (SPPF)."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.enter = _conv(width, width // 2, 1)
-        self.leave = _conv(2 * width, width, 1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        """Apply the pooling."""
-        parts = [self.enter(x)]
-        for _ in range(3):
-            parts.append(functional.max_pool2d(parts[-1], 5, 1, 2))
-        return self.leave(torch.cat(parts, 1))
+        past, through = self.enter(x).split(self.hidden, 1)
+        return self.leave(torch.cat([past, through, self.bottleneck(through)], 1))
 
 
 def _branch(width: int, hidden: int, outputs: int, bias: float) -> nn.Sequential:
@@ -86,48 +69,45 @@ def _branch(width: int, hidden: int, outputs: int, bias: float) -> nn.Sequential
 
 
 class DetectorNetwork(nn.Module):
-    """Body and heads; `decode_boxes` and a sigmoid make boxes and scores of what they give."""
+    """A pyramid and heads on frozen `Features`.
+
+    `decode_boxes` and a sigmoid make boxes and scores of what they give.
+    """
 
     def __init__(self) -> None:
         """Start from random weights."""
         super().__init__()
-        w1, w2, w3, w4, w5 = _WIDTHS
-        self.classes = len(DETECTOR_CLASSES)
-        self.fine = nn.Sequential(
-            _conv(3, w1, 3, 2),
-            _conv(w1, w2, 3, 2),
-            _Stage(w2, w2),
-            _conv(w2, w3, 3, 2),
-            _Stage(w3, w3),
-        )
-        self.middle = nn.Sequential(_conv(w3, w4, 3, 2), _Stage(w4, w4, 2))
-        self.coarse = nn.Sequential(_conv(w4, w5, 3, 2), _Stage(w5, w5), _Pooling(w5))
-        self.up_middle = _Stage(w5 + w4, w4, add=False)
-        self.up_fine = _Stage(w4 + w3, w3, add=False)
-        self.down_fine = _conv(w3, w3, 3, 2)
-        self.down_middle = _Stage(w3 + w4, w4, add=False)
-        self.down_coarse_enter = _conv(w4, w4, 3, 2)
-        self.down_coarse = _Stage(w4 + w5, w5, add=False)
+        fine, *wide = FEATURES
+        self.dropped = nn.ModuleList(nn.Dropout2d(_DROPPED) for _ in FEATURES)
+        self.tints = _conv(fine, _TINTS, 3, 2)
+        w3, w4, w5 = _WIDTHS
+        inputs = [backbone + neck for backbone, neck in zip(wide[:3], wide[3:], strict=True)]
+        self.enter8 = _conv(inputs[0] + _TINTS, w3, 1)
+        self.enter16, self.enter32 = _conv(inputs[1], w4, 1), _conv(inputs[2], w5, 1)
+        self.up16 = _Stage(w5 + w4, w4)
+        self.up8 = _Stage(w4 + w3, w3)
+        self.down16 = _conv(w3, w3, 3, 2)
+        self.level16 = _Stage(w3 + w4, w4)
+        self.down32 = _conv(w4, w4, 3, 2)
+        self.level32 = _Stage(w4 + w5, w5)
         rare = math.log(_PRIOR / (1 - _PRIOR))
-        self.boxes = nn.ModuleList(_branch(w, 48, 4, 0.7) for w in (w3, w4, w5))
-        self.kinds = nn.ModuleList(_branch(w, 48, self.classes, rare) for w in (w3, w4, w5))
+        classes = len(DETECTOR_CLASSES)
+        self.boxes = nn.ModuleList(_branch(w, _HIDDEN, 4, 0.7) for w in _WIDTHS)
+        self.kinds = nn.ModuleList(_branch(w, _HIDDEN, classes, rare) for w in _WIDTHS)
 
-    def maps(self, x: Tensor) -> list[Tensor]:
-        """Features at each stride."""
-        fine = self.fine(x)
-        middle = self.middle(fine)
-        coarse = self.coarse(middle)
-        up = self.up_middle(
-            torch.cat([functional.interpolate(coarse, scale_factor=2.0), middle], 1)
-        )
-        out_fine = self.up_fine(torch.cat([functional.interpolate(up, scale_factor=2.0), fine], 1))
-        out_middle = self.down_middle(torch.cat([self.down_fine(out_fine), up], 1))
-        entered = self.down_coarse_enter(out_middle)
-        return [out_fine, out_middle, self.down_coarse(torch.cat([entered, coarse], 1))]
+    def _maps(self, features: Features) -> list[Tensor]:
+        seen = [drop(part) for drop, part in zip(self.dropped, features, strict=True)]
+        at8 = self.enter8(torch.cat([seen[1], seen[4], self.tints(seen[0])], 1))
+        at16 = self.enter16(torch.cat([seen[2], seen[5]], 1))
+        at32 = self.enter32(torch.cat([seen[3], seen[6]], 1))
+        at16 = self.up16(torch.cat([functional.interpolate(at32, scale_factor=2.0), at16], 1))
+        at8 = self.up8(torch.cat([functional.interpolate(at16, scale_factor=2.0), at8], 1))
+        at16 = self.level16(torch.cat([self.down16(at8), at16], 1))
+        return [at8, at16, self.level32(torch.cat([self.down32(at16), at32], 1))]
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, features: Features) -> tuple[Tensor, Tensor]:
         """Raw distances (b, 4, n) and class logits (b, c, n)."""
-        maps = self.maps(x)
+        maps = self._maps(features)
         return (
             torch.cat([head(m).flatten(2) for head, m in zip(self.boxes, maps, strict=True)], 2),
             torch.cat([head(m).flatten(2) for head, m in zip(self.kinds, maps, strict=True)], 2),

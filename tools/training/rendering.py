@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Iterator
+from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -26,6 +29,9 @@ HELD_OUT = 1_000_000
 
 _WORLDS_PER_SHARD = 10
 
+_SHARE = 0.65
+"""Of the rendered width, what is kept: a little more than the detector's input."""
+
 _AS_FLOWN = 3
 """One world in so many is left as the simulator shows it in flight."""
 
@@ -33,7 +39,7 @@ _AS_FLOWN = 3
 def render_world(
     seed: int, views: int = VIEWS, *, plain: bool = False, looks: Looks | None = None
 ) -> Iterator[Sample]:
-    """Pictures of the world of this seed, 320 pixels wide; `plain` leaves them as rendered."""
+    """Pictures of the world of this seed, 416 pixels wide; `plain` leaves them as rendered."""
     rng = np.random.default_rng([seed, 1])
     world, camera = draw_world(seed), draw_camera(rng)
     renderer = LabellingRenderer(world, camera, looks or VariousLooks())
@@ -46,9 +52,9 @@ def render_world(
         labels = renderer.labels(view.time, view.pose)
         if not plain:
             picture = compose(picture, renderer.numbers() > 0, rng)
-        size = (camera.width // 2, camera.height // 2)
+        size = (round(_SHARE * camera.width), round(_SHARE * camera.height))
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-        yield Sample.of(np.asarray(small, np.uint8), labels, 0.5)
+        yield Sample.of(np.asarray(small, np.uint8), labels, _SHARE)
     renderer.close()
 
 
@@ -58,18 +64,33 @@ def _world(seed: int) -> Iterator[Sample]:
     return render_world(seed, plain=True, looks=Looks())
 
 
-def render_shards(folder: Path, first: int, worlds: int) -> Iterator[int]:
+def render_shards(folder: Path, first: int, worlds: int, processes: int = 1) -> Iterator[int]:
     """Render `worlds` worlds from seed `first` on into `folder`; yields the worlds done so far.
 
     Shards that lie there already are not rendered again.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for start in range(first, first + worlds, _WORLDS_PER_SHARD):
-        seeds = range(start, min(start + _WORLDS_PER_SHARD, first + worlds))
-        path = folder / f"{start:08d}.npz"
-        if not path.exists():
-            samples = [sample for seed in seeds for sample in _world(seed)]
-            partial = path.with_suffix(".partial.npz")
-            save_shard(partial, samples)
-            partial.rename(path)
-        yield seeds.stop - first
+    end = first + worlds
+    shards = [
+        range(start, min(start + _WORLDS_PER_SHARD, end))
+        for start in range(first, end, _WORLDS_PER_SHARD)
+    ]
+    work, done = partial(_render_shard, folder), 0
+    with ExitStack() as stack:
+        results: Iterator[int] = map(work, shards)
+        if processes > 1:
+            fresh = multiprocessing.get_context("spawn")  # a renderer does not outlive a fork
+            results = stack.enter_context(fresh.Pool(processes)).imap_unordered(work, shards)
+        for count in results:
+            done += count
+            yield done
+
+
+def _render_shard(folder: Path, seeds: range) -> int:
+    path = folder / f"{seeds.start:08d}.npz"
+    if not path.exists():
+        samples = [sample for seed in seeds for sample in _world(seed)]
+        partial_path = path.with_suffix(".partial.npz")
+        save_shard(partial_path, samples)
+        partial_path.rename(path)
+    return len(seeds)

@@ -16,7 +16,7 @@ from tools.training.passers import ParkedCar, Passer
 __all__ = ["View", "draw_camera", "draw_view", "draw_world"]
 
 _WIDTH = 640
-"""Pixels: twice the networks' input, so that the halved picture is free of jagged edges."""
+"""Pixels: more than the networks' input, so that what is kept is free of jagged edges."""
 
 _SHAPES = ((360, 0.55), (480, 0.35), (640, 0.1))
 """Heights of pictures and their shares: 16:9, 4:3, square."""

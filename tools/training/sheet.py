@@ -15,7 +15,7 @@ _COLOURS = ((40, 40, 255), (255, 140, 30), (30, 220, 255), (255, 60, 255))
 """Of vest, person, car, tower; BGR."""
 
 _ROWS, _COLUMNS = 5, 4
-_TILE = (320, 240)
+_TILE = (416, 312)
 
 
 def drawn(sample: Sample) -> NDArray[np.uint8]:

@@ -1,74 +1,112 @@
-"""The detector's training: pictures of two sizes, and what is lost on them."""
+"""The detector's training: what is drawn for each step, and what is lost on it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from tools.training.augment import augmented
-from tools.training.data_parallel import local_batch
+from tools.training.data_parallel import local_batch, rank
 from tools.training.dataset import Pictures, Sample
 from tools.training.loop import Course, Progress, learn
 from tools.training.loss import Targets, losses
 from tools.training.network import DetectorNetwork
+from tools.training.yolox import FrozenYolox
 
-__all__ = ["Recipe", "train"]
+__all__ = ["Recipe", "feed", "train"]
 
 _MOSAICS, _WHOLE = 0.2, 0.2
 """Share of pictures that are patched together of four, and of the steps, the last ones, that get
 none (as YOLOX: Ge et al., 2021)."""
+
+_Batch = tuple[Tensor, Tensor, Tensor, Tensor]
+"""Pictures (b, rows, columns, 3) of bytes, BGR; kinds, boxes and validity of `Targets`."""
 
 
 @dataclass(frozen=True)
 class Recipe(Course):
     """What the detector's training depends on, beside the pictures."""
 
-    steps: int = 7600
-    halved: int = 4400
-    """Of these, the first ones, on pictures of half the size: a fourth of the work."""
-    size: tuple[int, int] = (192, 320)
-    """Height and width to train at, multiples of 64: most pictures leave no more of the square."""
+    steps: int = 8000
+    batch: int = 96
+    memory: float = 0.9995
+    size: tuple[int, int] = (256, 384)
+    """Height and width to train at, multiples of 32."""
+    loaders: int = 0
+    """Processes that draw pictures ahead; with none, each is drawn when its step comes."""
 
 
-def train(pictures: Pictures, recipe: Recipe, folder: Path) -> Iterator[Progress]:
+def train(
+    pictures: Pictures, frozen: FrozenYolox, recipe: Recipe, folder: Path
+) -> Iterator[Progress]:
     """Train, or go on with it, in `folder`; yields as it goes."""
     torch.manual_seed(recipe.seed)
-    network = DetectorNetwork()
+    batches: Iterator[_Batch] | None = None
 
     def loss(
         step: int, rng: np.random.Generator, device: torch.device
     ) -> tuple[Tensor, tuple[float, ...]]:
-        size, draw = _source(pictures, recipe, step, rng)
-        mosaics = _MOSAICS if step < (1 - _WHOLE) * recipe.steps else 0.0
-        samples = [augmented(draw, size, rng, mosaics) for _ in range(local_batch(recipe.batch))]
-        inputs, targets = _batch_of(samples, device)
+        nonlocal batches
+        del rng
+        if batches is None:
+            frozen.to(device)
+            batches = iter(feed(pictures, recipe, step))
+        images, *labels = (part.to(device, non_blocking=True) for part in next(batches))
+        pixels = images.permute(0, 3, 1, 2).flip(1).float() / 255
         with torch.autocast(device.type, torch.bfloat16):
-            outputs = network(inputs)
-        parts = losses(outputs, targets, size)
+            with torch.no_grad():
+                features = frozen.features(pixels.contiguous(memory_format=torch.channels_last))
+            outputs = network(features)
+        parts = losses(outputs, Targets(*labels), recipe.size)
         return parts.total, parts.figures
 
+    network = DetectorNetwork()
     yield from learn(network, loss, recipe, folder)
 
 
-def _source(
-    pictures: Pictures, recipe: Recipe, step: int, rng: np.random.Generator
-) -> tuple[tuple[int, int], Callable[[], Sample]]:
-    """Size to train at, and what draws a picture for it."""
-    height, width = recipe.size
-    if step < recipe.halved:
-        return (height // 2, width // 2), lambda: pictures.halved(int(rng.integers(len(pictures))))
-    return (height, width), lambda: pictures[int(rng.integers(len(pictures)))]
+class _Batches(IterableDataset[_Batch]):
+    """The batches of each step from `first` on, drawn by its number, whoever draws it."""
+
+    def __init__(self, pictures: Pictures, recipe: Recipe, first: int) -> None:
+        self._pictures, self._recipe, self._first = pictures, recipe, first
+        self._rank, self._count = rank(), local_batch(recipe.batch)
+
+    def __iter__(self) -> Iterator[_Batch]:
+        worker = get_worker_info()
+        start, apart = (0, 1) if worker is None else (worker.id, worker.num_workers)
+        for step in range(self._first + start, self._recipe.steps, apart):
+            yield self._drawn(step)
+
+    def _drawn(self, step: int) -> _Batch:
+        recipe, pictures = self._recipe, self._pictures
+        rng = np.random.default_rng([recipe.seed, step, self._rank])
+        mosaics = _MOSAICS if step < (1 - _WHOLE) * recipe.steps else 0.0
+
+        def draw() -> Sample:
+            return pictures[int(rng.integers(len(pictures)))]
+
+        return _stacked([augmented(draw, recipe.size, rng, mosaics) for _ in range(self._count)])
 
 
-def _batch_of(samples: list[Sample], device: torch.device) -> tuple[Tensor, Targets]:
-    """Stack samples of one size into the network's input (RGB, 0 to 1) and padded labels."""
-    images = np.stack([sample.image for sample in samples])[..., ::-1]
-    pixels = torch.from_numpy(np.ascontiguousarray(images)).to(device).permute(0, 3, 1, 2)
+def feed(pictures: Pictures, recipe: Recipe, first: int) -> DataLoader[_Batch]:
+    """Draw the batches of the steps from `first` on, by `recipe.loaders` processes."""
+    return DataLoader(
+        _Batches(pictures, recipe, first),
+        batch_size=None,
+        num_workers=recipe.loaders,
+        prefetch_factor=4 if recipe.loaders else None,
+        pin_memory=torch.cuda.is_available(),
+    )
+
+
+def _stacked(samples: list[Sample]) -> _Batch:
+    """Stack samples of one size, and their labels, padded to the same number."""
     most = max(1, *(len(sample.kinds) for sample in samples))
     kinds = np.zeros((len(samples), most), np.int64)
     boxes = np.zeros((len(samples), most, 4), np.float32)
@@ -77,6 +115,5 @@ def _batch_of(samples: list[Sample], device: torch.device) -> tuple[Tensor, Targ
         count = len(sample.kinds)
         kinds[row, :count], boxes[row, :count] = sample.kinds, sample.boxes
         valid[row, :count] = True
-    arrays = (torch.from_numpy(array).to(device) for array in (kinds, boxes, valid))
-    inputs = pixels.contiguous(memory_format=torch.channels_last).float() / 255
-    return inputs, Targets(*arrays)
+    images = torch.from_numpy(np.stack([sample.image for sample in samples]))
+    return images, torch.from_numpy(kinds), torch.from_numpy(boxes), torch.from_numpy(valid)

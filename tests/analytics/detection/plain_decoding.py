@@ -37,12 +37,12 @@ def plain_suppression(boxes: list[Box], iou: float) -> list[Box]:
 def plain_ultralytics(model: Path, image: NDArray[np.uint8], least: float) -> list[Box]:
     """As ultralytics' LetterBox and non_max_suppression do it, one anchor at a time."""
     session = ort.InferenceSession(str(model), providers=["CPUExecutionProvider"])
-    side = session.get_inputs()[0].shape[2]
+    rows, columns = session.get_inputs()[0].shape[2:]
     height, width = image.shape[:2]
-    ratio = min(side / height, side / width)
+    ratio = min(rows / height, columns / width)
     new_width, new_height = round(width * ratio), round(height * ratio)
     resized = cv2.resize(image, (new_width, new_height), interpolation=cv2.INTER_LINEAR)
-    top, left = (side - new_height) / 2, (side - new_width) / 2
+    top, left = (rows - new_height) / 2, (columns - new_width) / 2
     padded = cv2.copyMakeBorder(
         resized,
         round(top - 0.1),

@@ -27,4 +27,4 @@ def test_a_contact_sheet_is_written(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["sheet", str(path)]).exit_code == 0
     image = cv2.imread(str(path))
     assert image is not None
-    assert image.shape == (1200, 1280, 3)
+    assert image.shape == (1560, 1664, 3)
