@@ -5,9 +5,9 @@ from __future__ import annotations
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 
 env = Environment("environment.json")
-for robot in env.config.robots:
-    drone = env.get_robot_by_id(robot.id)
-    east, north, _ = robot.start
+drones = [env.get_robot_by_id(robot.id) for robot in env.config.robots]
+for drone in drones:
+    east, north, _ = drone.config.start
     hover = Waypoint("there", east + 4, north, 2, hover_duration=600)
     drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
-drone.start_mission()
+drones[0].start_mission()
