@@ -1,7 +1,7 @@
 """Pause of a reader between two batches of messages, so that it takes several in one go.
 
-That costs half of the processor's time: between two wakes others run, and code and data have to
-come into the caches anew.
+That takes less of the processor: between two wakes others run, and code and data have to come into
+the caches anew.
 """
 
 from __future__ import annotations

@@ -5,9 +5,9 @@ from __future__ import annotations
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 
 env = Environment("environment.json")
-for robot in env.config.robots:
-    east, north, _ = robot.start
+drones = [env.get_robot_by_id(robot.id) for robot in env.config.robots]
+for drone in drones:
+    east, north, _ = drone.config.start
     hover = Waypoint("there", east + 4, north, 2, hover_duration=600)
-    drone = env.get_robot_by_id(robot.id)
     drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
-env.get_robot_by_id(env.config.robots[0].id).start_mission()
+drones[0].start_mission()
