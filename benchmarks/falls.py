@@ -161,8 +161,10 @@ def eyes_for(watched: Watched, world: World, seed: int) -> Iterator[Perception]:
     if watched.eyes is Eyes.BOXES:
         yield StandingJoints(world.thing(PERSON), camera, seed)
         return
-    detector = watched.detector and OnnxDetector(watched.detector, classes=["person", "vest"])
-    eyes = DetectorPerception(world, camera, PoseAnalytics(detector=detector or None))
+    pose = PoseAnalytics()
+    if watched.detector is not None:
+        pose = PoseAnalytics(detector=OnnxDetector(watched.detector, classes=["person", "vest"]))
+    eyes = DetectorPerception(world, camera, pose)
     try:
         yield eyes
     finally:

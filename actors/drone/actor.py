@@ -29,8 +29,6 @@ from aerodaas.actors.stream_names import reply_stream, request_stream, whereabou
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Header
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
@@ -274,11 +272,7 @@ class DroneActor(StreamActor):
         if self._neighbours:
             known = self._whereabouts
             mine = {name: known[name] for name in self._controllers if name in known}
-            stream = whereabouts_stream(self.name)
-            publisher, measured = self.publishers[stream], host_time_ns()
-            self._publisher.do(
-                lambda: publisher.measure(mine, Header(publisher.sent, now, stream), measured)
-            )
+            self._publisher.publish(self.publishers[whereabouts_stream(self.name)], mine, now)
 
     def _turn(self, controller: VehicleController, now: int) -> None:
         others = [where for name, where in self._whereabouts.items() if name != controller.id]

@@ -302,8 +302,5 @@ class VehicleController:
             self.vehicle.land()
 
     def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
-        publisher, measured = self._publishers[stream], host_time_ns()
-        self._background.do(
-            lambda: publisher.measure(item, Header(publisher.sent, now, stream), measured)
-        )
+        self._background.publish(self._publishers[stream], item, now)
         return stream, now
