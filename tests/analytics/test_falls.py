@@ -279,6 +279,19 @@ def test_who_leaves_by_the_side_leaves_an_arm_and_a_leg_and_has_not_fallen(
     assert not any(told)
 
 
+@LENSES
+@pytest.mark.parametrize("away", [3.0, 12.0])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_drone_that_lands_makes_nobody_fall(camera: CameraModel, away: float, seed: int) -> None:
+    """Near the ground, a box's error of a few pixels moves the feet by metres."""
+    scene = Scene(camera, 5.0)
+    scene.place = lambda _: (away, 0.0)
+    random = np.random.default_rng(seed)
+    scene.noise = lambda: random.normal(0, 0.03, 4)
+    scene.drone = lambda time: hovering(max(0.1, 1.5 - 0.35 * max(0.0, time - TURN_OFF)))
+    assert scene.play(9.0) == []
+
+
 def test_who_got_up_and_bends_has_not_fallen_again() -> None:
     """A fall is over with it."""
     scene = Scene(WIDE)

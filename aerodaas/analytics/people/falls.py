@@ -54,6 +54,10 @@ walks up to a camera above their head sinks in the image, too."""
 _NEAREST = 0.3
 """Metres from the camera nearer than which nobody stands."""
 
+_LOWEST = 0.5
+"""Least height of the camera in metres: the error of a box's lower edge is a share of the body, and
+the distance of the feet is wrong by that error divided by this height."""
+
 _MOMENT, _FORGOTTEN = 1.5, 3.0
 """Seconds after standing within which a fall must begin, and after the last observation until which
 a fall is remembered."""
@@ -80,7 +84,7 @@ class _Look:
 class FallDetector:
     """Fall detector for one person, taller than 1.3 m, from standing to lying.
 
-    The ground is flat and the camera at most about 2 m above it: from higher up a body that lies
+    The ground is flat and the camera 0.5 to about 2 m above it: from higher up a body that lies
     lengthwise before the camera appears as tall as one that stands.
     """
 
@@ -100,12 +104,11 @@ class FallDetector:
     def shows(self, person: Detection | None, seen: Detections) -> bool:
         """Process a frame of people; returns whether the person has fallen.
 
-        `person` is None if not detected. Always False for a camera of unknown height or
-        calibration.
+        `person` is None if not detected. Always False for a camera of unknown calibration, and of
+        unknown height or nearer to the ground than 0.5 m.
         """
-        try:
-            view = GroundView(seen)
-        except ValueError:
+        view = _view_of(seen)
+        if view is None:
             return False
         stamp = seen.header.stamp
         self._forget_by(stamp)
@@ -196,6 +199,14 @@ class FallDetector:
             self._places.clear()
             self._looks.clear()
             self._fell = False
+
+
+def _view_of(seen: Detections) -> GroundView | None:
+    try:
+        view = GroundView(seen)
+    except ValueError:
+        return None
+    return view if view.height >= _LOWEST else None
 
 
 def _crown(body: Detection) -> Array:
