@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+import pytest
 from drone_by_hand import DroneByHand, spec_by_hand
 from flying import FLAT, hop, robot
 
@@ -99,7 +100,7 @@ def test_drones_of_different_actors_keep_their_distance() -> None:
     assert "north" not in slowed
 
 
-def test_the_failure_of_one_drone_is_no_other_ones() -> None:
+def test_the_failure_of_one_drone_is_no_other_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is left to itself and told by name; the others of its actor fly on, obey and land."""
     with _actors(("west", "north")) as (actor,):
         _eventually(lambda: _is(actor, "north", MissionState.LOITERING))
@@ -114,6 +115,15 @@ def test_the_failure_of_one_drone_is_no_other_ones() -> None:
         assert _is(actor, "north", MissionState.LOITERING)
         assert actor.report().phase == "running"
         assert actor.command("north", End()).accepted
+        north = actor._controllers["north"]
+        land, landed_again = north.vehicle.land, []
+
+        def landing() -> None:
+            landed_again.extend(["north"] if north.over else [])
+            land()
+
+        monkeypatch.setattr(north.vehicle, "land", landing)
         _eventually(lambda: actor.report().phase == "failed")
         assert _is(actor, "north", MissionState.LANDED)
+        assert landed_again == [], "whose mission is over is left alone, for a pilot may fly it"
         assert str(actor.report().error).startswith("west: TypeError")
