@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import itertools
 import json
 import pickle
 import socket
@@ -288,6 +289,19 @@ def test_stream_ends_with_the_mission(service: Service) -> None:
     assert (seen[0], seen[-1]) == ("enroute", "landed")
     with pytest.raises(SourceError, match="refuses"):
         next(service.client().stream(rate=1000))
+
+
+def test_a_mission_that_ends_while_its_status_is_sent_is_told_to_have_ended(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last status of a stream is the last one of the mission, whenever that ends."""
+    flying = service.link.status()
+    service.client().command("abort")
+    service.link.flown.run()
+    statuses = itertools.chain([flying], itertools.repeat(service.link.status()))
+    monkeypatch.setattr(service.link, "status", lambda: next(statuses))
+    seen = [status["state"] for status in service.client().stream(rate=20)]
+    assert seen == ["enroute", "landed"]
 
 
 def test_silent_drone_is_no_silent_answer(

@@ -112,19 +112,17 @@ class _Desk:
         await socket.accept()
         try:
             while True:
-                if self._mission.status() is not None:
-                    await socket.send_text(self.status().model_dump_json())
-                if self._over:
-                    break
+                # Read once: a mission that ends while this one is being sent is told so next.
+                status = self._mission.status()
+                if status is not None:
+                    shown = StatusOut.of(status, self._mission.vehicle())
+                    await socket.send_text(shown.model_dump_json())
+                    if status.state in TERMINAL:
+                        break
                 await asyncio.sleep(1.0 / rate)
             await socket.close()
         except (WebSocketDisconnect, RuntimeError):
             return
-
-    @property
-    def _over(self) -> bool:
-        status = self._mission.status()
-        return status is not None and status.state in TERMINAL
 
     async def _tell(self, what: str, answer: Future[Answer]) -> JSONResponse:
         """Await the mission's answer and publish it as an alert."""
