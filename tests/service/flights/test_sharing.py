@@ -15,6 +15,7 @@ import pytest
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -94,8 +95,9 @@ class Flight:
         """None."""
         return {}
 
-    def reader(self, stream: str) -> Pictures:
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> Pictures:
         """The camera, of those that run."""
+        del form
         if stream != "one/cam":
             raise ConfigError(f"no stream of this mission is called {stream!r}")
         return self.pictures
