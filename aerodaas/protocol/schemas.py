@@ -175,6 +175,9 @@ class RobotOut(AnswerModel):
     """Lease that holds it; None if it is free."""
     tenant: str | None = None
     """Tenant of that lease; shown to operators and to the tenant itself."""
+    area: list[tuple[float, float]] | None = None
+    """Where it stays under that lease, east and north, before the fence narrows it; shown as the
+    tenant is. None without."""
     mission: str | None = None
     """Mission that flies it; shown as the tenant is, and to tenants that it shares cameras with."""
     shared: list[str] = Field(default_factory=list)
