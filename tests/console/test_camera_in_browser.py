@@ -68,9 +68,9 @@ class Reader:
         image = np.full((HEIGHT, WIDTH, 3), 40 + 8 * turn, np.uint8)
         depth = np.full((HEIGHT, WIDTH), 2000, np.uint16)
         depth[:, WIDTH // 2 :] = 0
-        item: Frame | Detections = Frame(header, image, depth=depth)
-        if self._stream == FINDER:
-            item = Detections.of(item, [body(20.0 + 10 * turn)])
+        frame = Frame(header, image, depth=depth)
+        found = Detections.of(frame, [body(20.0 + 10 * turn)])
+        item = found if self._stream == FINDER else frame
         return Message(self._stream, number, header.stamp, header, 0, (), item)
 
 

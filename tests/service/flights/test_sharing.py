@@ -131,9 +131,7 @@ def test_a_live_views_pictures_are_made_in_the_form_that_it_asks_for(
     flight: Flight, form: PictureForm
 ) -> None:
     """By the flight's process, which has the pixels."""
-    items = flight.link.items("one/cam", form)
-    message, blob = next(items)
-    items.close()
+    message, blob = next(flight.link.items("one/cam", form))
     assert message["item"]["is"] == "Frame"
     assert blob
     assert flight.form is form
