@@ -2,43 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any
 
-import numpy as np
 import pytest
-from hovering import console
 from required import needs_peer
+from scripted_camera import SHOWN, camera_console, require_own_frames
 
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.status import Message
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
-
-CAMERA, FINDER = "drone/cam", "drone/pose"
-RATE = 10
-WIDTH, HEIGHT = 320, 180
-TURN = 20
-"""Frames after which all repeats itself."""
-AMBER = [255, 176, 0]
-"""Of a `person`'s box and skeleton."""
-SHOWN = """new Promise(done => {
-  const screen = document.querySelector('[data-testid=video]');
-  const found = [];
-  new MutationObserver((_, watch) => {
-    const { stamp } = screen.dataset;
-    const pixel = (x, y) => [...screen.getContext('2d').getImageData(x, y, 1, 1).data].slice(0, 3);
-    const turn = Math.round(stamp / 1e8) % 20;
-    found.push([turn, pixel(300, 170), pixel(20 + 10 * turn, 90), pixel(25 + 10 * turn, 60)]);
-    if (found.length < 12) return;
-    watch.disconnect();
-    done(found);
-  }).observe(screen, { attributeFilter: ['data-stamp'] });
-})"""
-"""Of a dozen pictures: which one it is, its grey, and a pixel of its box and of a bone."""
 
 COUNT = """
   VideoDecoder.prototype.decode = (decode => function (...words) {
@@ -47,39 +19,6 @@ COUNT = """
   })(VideoDecoder.prototype.decode);
 """
 """Counts the pictures that come as H.264."""
-
-
-class Reader:
-    """Items of the clock's numbers: a frame each tenth of a second, a body found in each."""
-
-    def __init__(self, stream: str) -> None:
-        self._stream = stream
-        self._last = 0
-
-    def next_message(self, timeout: float) -> Message[Any]:
-        """The next one that there is; a body is found a while after its frame."""
-        del timeout
-        late = 0.06 if self._stream == FINDER else 0.0
-        while (number := int((time.monotonic() - late) * RATE)) <= self._last:
-            time.sleep(0.005)
-        self._last = number
-        header = Header(number, number * 10**9 // RATE, CAMERA)
-        turn = number % TURN
-        image = np.full((HEIGHT, WIDTH, 3), 40 + 8 * turn, np.uint8)
-        depth = np.full((HEIGHT, WIDTH), 2000, np.uint16)
-        depth[:, WIDTH // 2 :] = 0
-        frame = Frame(header, image, depth=depth)
-        found = Detections.of(frame, [body(20.0 + 10 * turn)])
-        item = found if self._stream == FINDER else frame
-        return Message(self._stream, number, header.stamp, header, 0, (), item)
-
-
-def body(left: float) -> Detection:
-    """One whose left arm hangs straight down, 5 pixels right of its box's left edge."""
-    points = np.zeros((17, 3), np.float32)
-    points[5], points[7] = (left + 5, 40, 0.9), (left + 5, 80, 0.9)
-    points[9] = (left + 5, 120, 0.1)
-    return Detection((left, 30.0, left + 40, 150.0), "person", 0.8, keypoints=points)
 
 
 @pytest.fixture(scope="module")
@@ -106,20 +45,11 @@ def test_bodies_and_depth_are_drawn_on_their_own_frame(
     browser: Browser, form: str, before: str, *, decodes: bool
 ) -> None:
     """By a grey that tells which frame it is, and a body whose place does."""
-    nodes = {
-        name: SimpleNamespace(id=name, item=kind, dormant=False)
-        for name, kind in ((CAMERA, Frame), (FINDER, Detections))
-    }
-    with console() as (server, run):
-        run.graph = SimpleNamespace(nodes=nodes, reader=Reader)  # type: ignore[assignment]
+    with camera_console() as server:
         page = opened(browser, server.address(), form, before)
         assert page.run("(window.decoded ?? 0) > 0") is decodes
         assert page.run("document.querySelector('[data-testid=video]').dataset.points") == "2"
-        shown = page.run(SHOWN)
-        for turn, grey, edge, bone in shown:
-            assert grey == pytest.approx([40 + 8 * turn] * 3, abs=4)
-            assert edge == pytest.approx(AMBER, abs=12)
-            assert bone == pytest.approx(AMBER, abs=12)
+        require_own_frames(page.run(SHOWN))
         # By keyboard: the button is pressed, and the legend names the range.
         page.run("document.querySelector('.video [aria-pressed]').focus()")
         page.key(" ")
