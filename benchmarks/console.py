@@ -2,6 +2,7 @@
 
     python benchmarks/console.py
     python benchmarks/console.py --seconds 3 --commands 4 --viewers 0 --viewers 5
+    python benchmarks/console.py --pictures h264
 
 flies a simulated drone with a camera of 1280 x 720 at 30 Hz in real time, and opens its console in
 the browser that is installed (AERODAAS_BROWSER names another one).
@@ -62,6 +63,7 @@ def main(
     seconds: Annotated[float, typer.Option(help="Of each measurement.", min=1)] = 15.0,
     commands: Annotated[int, typer.Option(help="Commands that are clicked.", min=2)] = 30,
     viewers: Annotated[list[int] | None, typer.Option(help="Numbers of viewers.", min=0)] = None,
+    pictures: Annotated[str, typer.Option(help="Their form: jpeg or h264.")] = "jpeg",
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
     """Fly, look on and command.
@@ -73,9 +75,10 @@ def main(
     """
     report = Report("console", UNITS, packages=["ray", "starlette", "uvicorn", "websockets"])
     report.note(f"Camera of {SIZE[0]} x {SIZE[1]} at {RATE:g} Hz, recorded as JPEG.")
+    report.note(f"Pictures go to the browser as {pictures}.")
     report.note(f"{psutil.getloadavg()[0]:.1f} processes wanted to run when it began.")
     with tempfile.TemporaryDirectory() as temporary:
-        _fly(Path(temporary), report, seconds, commands, viewers or [0, 1, 50])
+        _fly(Path(temporary), report, seconds, commands, viewers or [0, 1, 50], pictures)
     sizes = [len(gzip.compress(path.read_bytes(), 9)) for path in _PAGE.glob("[ci]*.*")]
     report.row("page, gzip, kB", _row([sum(sizes) / 1e3]))
     report.show()
@@ -83,7 +86,9 @@ def main(
         report.write(json)
 
 
-def _fly(folder: Path, report: Report, seconds: float, commands: int, viewers: list[int]) -> None:
+def _fly(
+    folder: Path, report: Report, seconds: float, commands: int, viewers: list[int], form: str
+) -> None:
     content = environment(1, draw_pictures(folder / "pictures"), recorded=True)
     path = folder / "environment.json"
     path.write_text(json_format.dumps(content))
@@ -103,7 +108,7 @@ def _fly(folder: Path, report: Report, seconds: float, commands: int, viewers: l
             origin = run._flight._origin  # type: ignore[union-attr] # noqa: SLF001 - as above
             address: str = told.call_args.args[0]
             try:
-                clicked = _look_on(address, report, seconds, commands, viewers)
+                clicked = _look_on(address, report, seconds, commands, viewers, form)
             finally:
                 run.command("drone0", COMMANDS["land"])
                 run.wait()
@@ -126,13 +131,14 @@ def _build(env: Environment) -> None:
 
 
 def _look_on(
-    address: str, report: Report, seconds: float, commands: int, viewers: list[int]
+    address: str, report: Report, seconds: float, commands: int, viewers: list[int], form: str
 ) -> list[float]:
     """Measure in flight; returns when commands were clicked, Unix milliseconds."""
-    loads = {count: _load(address, count, seconds) for count in viewers}
+    loads = {count: _load(address, count, seconds, form) for count in viewers}
     with Browser() as browser:
         page = browser.open("about:blank")
         page.before(_WATCH_FIRST_VIEW)
+        address += f"&pictures={form}"
         page.go(address)
         page.until("window.firstView")
         first = [page.run("window.firstView")]
@@ -148,10 +154,12 @@ def _look_on(
             page.until("window.firstView")
             first.append(page.run("window.firstView"))
     report.row("first view of the page, ms", _row(first))
-    for count, (cores, pictures) in loads.items():
+    for count, (cores, pictures, size) in loads.items():
         report.row(f"cores with {count} viewers", _row([cores]))
         if count:
-            report.note(f"{count} viewers got {pictures:.1f} pictures a second each.")
+            report.note(
+                f"{count} viewers got {pictures:.1f} pictures a second each, {size / 1e6:.2f} MB."
+            )
     return clicked
 
 
@@ -178,20 +186,21 @@ def _changes(path: Path) -> list[float]:
     return found
 
 
-def _load(address: str, viewers: int, seconds: float) -> tuple[float, float]:
-    """Cores of this process and its children, and pictures a second and viewer."""
+def _load(address: str, viewers: int, seconds: float, form: str) -> tuple[float, float, float]:
+    """Cores of this process and its children; pictures and bytes a second and viewer."""
     watching = None
     if viewers:
         script = str(Path(__file__).with_name("_console_viewers.py"))
-        words = [script, address, str(viewers), str(seconds + 2 * _SETTLE), CAMERA]
+        words = [script, address, str(viewers), str(seconds + 2 * _SETTLE), CAMERA, form]
         watching = subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True)  # noqa: S603 - ours
     time.sleep(_SETTLE)
     others = {watching.pid} if watching is not None else set()
     before, began = _busy(others), time.monotonic()
     time.sleep(seconds)
     cores = (_busy(others) - before) / (time.monotonic() - began)
-    pictures = float(watching.communicate()[0]) if watching is not None else 0.0
-    return cores, pictures
+    said = watching.communicate()[0] if watching is not None else "0 0"
+    pictures, size = map(float, said.split())
+    return cores, pictures, size
 
 
 def _busy(others: set[int]) -> float:

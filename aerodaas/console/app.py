@@ -17,7 +17,7 @@ from aerodaas.config.redaction import catalogue
 from aerodaas.console.access import role_of
 from aerodaas.console.controls import ControlCommand, ControlSession, told_of_controls
 from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import LiveSession, Rate, StreamNames, wanted_streams
+from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.console.own_flight import OWN, OwnFlight
 from aerodaas.console.page import page_routes
 from aerodaas.console.surveys import SurveyPlanner
@@ -29,6 +29,7 @@ from aerodaas.protocol.schemas import (
     FleetOut,
     MissionOut,
     NavigationIn,
+    PictureForm,
     RefusalOut,
     RobotOut,
     Role,
@@ -171,11 +172,16 @@ class _Routes:
         mission: str,
         rate: Rate = 5.0,
         streams: StreamNames = "",
+        pictures: Form = PictureForm.WHOLE,
+        depth: StreamNames = "",
     ) -> None:
-        """Send the flight's state, at most `rate` times a second, and items of `streams`."""
+        """Send the flight's state, at most `rate` times a second, and items of `streams`.
+
+        Pictures come in a form, with the depth of those that `depth` names beside them.
+        """
         require_known(mission)
         session = LiveSession(socket, self._flight, self._hub, mission)
-        await session.run(rate, wanted_streams(streams), own=False)
+        await session.run(rate, wanted_streams(streams, pictures, depth), own=False)
 
 
 def _listed(ids: Sequence[str]) -> str:

@@ -11,14 +11,20 @@ from fastapi import Query, WebSocket, WebSocketDisconnect
 
 from aerodaas.console.access import SUBPROTOCOL
 from aerodaas.console.hub import StreamHub, Watcher
+from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.clock import host_time_ns
 
-__all__ = ["LiveSession", "Rate", "Shown", "StreamNames", "wanted_streams"]
+__all__ = ["Form", "LiveSession", "Rate", "Shown", "StreamNames", "Wanted", "wanted_streams"]
+
+Wanted: TypeAlias = tuple[str, PictureForm]
+"""A stream, and how its pictures are sent."""
 
 Rate: TypeAlias = Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)]
 """Most messages of a mission's state a second, of a view's address."""
 StreamNames: TypeAlias = Annotated[str, Query(max_length=2000)]
 """Streams whose items are sent, too, by comma; of a view's address."""
+Form: TypeAlias = Annotated[PictureForm, Query()]
+"""How pictures are sent; of a view's address."""
 
 _MOST_STREAMS = 16
 _IDLE_SECONDS = 1.0
@@ -41,9 +47,17 @@ class Shown(Protocol):
         ...
 
 
-def wanted_streams(streams: str) -> list[str]:
-    """Names in a comma-separated list, as many as one view may have."""
-    return [name for name in streams.split(",") if name][:_MOST_STREAMS]
+def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[Wanted]:
+    """What is asked for by comma-separated lists of names, as much as one view may have.
+
+    Args:
+        streams: Streams whose items are sent.
+        form: How their pictures are.
+        depth: Streams of pictures whose depth is sent beside them.
+    """
+    wanted = [(name, form) for name in streams.split(",") if name]
+    wanted += [(name, PictureForm.DEPTH) for name in depth.split(",") if name]
+    return wanted[:_MOST_STREAMS]
 
 
 class LiveSession:
@@ -58,7 +72,7 @@ class LiveSession:
         # An item's two messages stay together.
         self._sending = asyncio.Lock()
 
-    async def run(self, rate: float, streams: Sequence[str], *, own: bool) -> None:
+    async def run(self, rate: float, streams: Sequence[Wanted], *, own: bool) -> None:
         """Accept the watcher, and send until the mission is over or the watcher has gone.
 
         Args:
@@ -70,7 +84,7 @@ class LiveSession:
         await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
         state = asyncio.create_task(self._state(rate, own=own))
         gone = asyncio.create_task(self._read())
-        jobs = [state, gone, *(asyncio.create_task(self._items(name)) for name in streams)]
+        jobs = [state, gone, *(asyncio.create_task(self._items(*one)) for one in streams)]
         try:
             await asyncio.wait((state, gone), return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -100,14 +114,14 @@ class LiveSession:
                         return
             await asyncio.sleep(1.0 / rate)
 
-    async def _items(self, stream: str) -> None:
+    async def _items(self, stream: str, form: PictureForm) -> None:
         """Send the items of one stream; begins again where the flight has not begun yet."""
         while True:
-            watcher = self._hub.watch(self._mission, stream)
+            watcher = self._hub.watch(self._mission, stream, form)
             try:
                 await self._forward(watcher)
             finally:
-                self._hub.leave(self._mission, stream, watcher)
+                self._hub.leave(self._mission, stream, form, watcher)
             await asyncio.sleep(_IDLE_SECONDS / 2)
 
     async def _forward(self, watcher: Watcher) -> None:

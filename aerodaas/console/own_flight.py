@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.protocol.schemas import MissionOut, MissionPhase, PictureForm
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 if TYPE_CHECKING:
@@ -125,13 +125,15 @@ class OwnFlight:
     def hear(self, mission: str) -> None:
         """Do nothing: the application, which is here, is the flight's user."""
 
-    def items(self, mission: str, stream: str) -> Iterator[tuple[dict[str, Any], bytes]]:
+    def items(
+        self, mission: str, stream: str, form: PictureForm
+    ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Items of a stream; an empty one a while without any. Raises ConfigError if none is so."""
         del mission
         graph = self._run.graph
         if stream not in drawn_streams(graph) or graph.reader is None:
             raise ConfigError(f"no stream that can be drawn is called {stream!r}")
-        reader = PackedReader(graph.reader(stream), stream)
+        reader = PackedReader(graph.reader(stream), stream, form)
         while not self.over:
             yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
 

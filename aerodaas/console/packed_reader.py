@@ -7,20 +7,32 @@ from typing import Any
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.dataflow.graph import Graph
-from aerodaas.protocol.schemas import StreamKind
+from aerodaas.protocol.schemas import PictureForm, StreamKind
+from aerodaas.recording.h264 import H264Encoder, is_key_frame
+from aerodaas.recording.playback.page_items import packed_depth, packed_picture
 from aerodaas.types.data import Detections, Frame
 from aerodaas.types.status import Message
 
 __all__ = ["PackedReader", "drawn_streams"]
 
+_VIDEO_QUALITY = 26
+"""x264's constant rate factor of a live picture; a recording has its own."""
+
 
 class PackedReader:
     """Reader of one stream's items as JSON messages with a blob each."""
 
-    def __init__(self, reader: Any, stream: str) -> None:  # noqa: ANN401 - LiveReader, of Ray's side
-        """Read `stream` by `reader`."""
+    def __init__(
+        self,
+        reader: Any,  # noqa: ANN401 - LiveReader, of Ray's side
+        stream: str,
+        form: PictureForm = PictureForm.WHOLE,
+    ) -> None:
+        """Read `stream` by `reader`; pictures in this form."""
         self._reader = reader
         self._stream = stream
+        self._form = form
+        self._encoder: H264Encoder | None = None
 
     def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
         """The next item; None if there was none within `timeout` wall seconds."""
@@ -37,10 +49,37 @@ class PackedReader:
             message = read(timeout)
         except (TimeoutError, StopIteration):
             return None
-        item, blob = pack(message.item)
-        head = {"kind": "item", "stream": self._stream, "seq": message.seq}
+        found = self._formed(message.item)
+        if found is None:
+            return None
+        item, blob, more = found
+        head = {"kind": "item", "stream": self._stream, "seq": message.seq, **more}
         stamps = {"stamp": message.stamp, "captured": message.captured}
         return {**head, **stamps, "item": item, "blob": bool(blob)}, blob
+
+    def _formed(self, item: object) -> tuple[Any, bytes, dict[str, Any]] | None:
+        """An item with its blob, and further words of its message; None for what has no depth."""
+        if not isinstance(item, Frame) or self._form is PictureForm.WHOLE:
+            return None if self._form is PictureForm.DEPTH else (*pack(item), {})
+        if self._form is PictureForm.DEPTH:
+            return None if item.depth is None else (*packed_depth(item.header, item.depth), {})
+        measured = item.depth is not None
+        data = self._video(item) if self._form is PictureForm.H264 else b""
+        if data:
+            content = packed_picture(item.header, len(data), "h264", measured=measured)
+            return content, data, {"key": is_key_frame(data)}
+        content, data = pack(Frame(item.header, item.image))
+        return packed_picture(item.header, len(data), "jpeg", measured=measured), data, {}
+
+    def _video(self, frame: Frame) -> bytes:
+        """A picture in H.264; empty where it cannot be encoded."""
+        size = frame.width, frame.height
+        try:
+            if self._encoder is None or self._encoder.size != size:
+                self._encoder = H264Encoder(*size, _VIDEO_QUALITY)
+            return self._encoder.encode(frame.image, frame.header.stamp)
+        except ValueError:
+            return b""
 
 
 def drawn_streams(graph: Graph) -> dict[str, StreamKind]:

@@ -50,16 +50,17 @@ class Player:
         self._require_readable()
         return self._text or PlaybackOut(read=self._read).model_dump_json().encode()
 
-    def picture(self, stream: str, time: int) -> bytes:
+    def picture(self, stream: str, time: int, *, depth: bool = False) -> bytes:
         """The last picture captured at or before a time, and what was found in it.
 
         Args:
             stream: Name of a stream of pictures.
             time: Mission nanoseconds.
+            depth: Whether its depth is wanted, too.
 
         Returns:
             One line of JSON, a list of messages as a live view sends them; after it the bytes of
-            the last message's picture. The list is empty before the first picture.
+            each one that has some. The list is empty before the first picture.
 
         Raises:
             RecordingError: If the recording has not been read yet, or cannot be.
@@ -70,7 +71,7 @@ class Player:
             if self._film is None or self._closed:
                 raise RecordingError("the recording is being read; ask again in a moment")
             try:
-                items = self._film.at(stream, time)
+                items = self._film.at(stream, time, depth=depth)
             except KeyError:
                 raise ConfigError(f"the recording shows no camera {stream!r}") from None
             except OSError as error:
@@ -139,7 +140,7 @@ def flight_answer(player: Player) -> Response:
     return Response(player.text, media_type="application/json")
 
 
-def picture_answer(player: Player, stream: str, time: int) -> Response:
-    """A picture with what was found in it."""
-    content = player.picture(stream, time)
+def picture_answer(player: Player, stream: str, time: int, *, depth: bool) -> Response:
+    """A picture with what was found in it, and with its depth if wanted."""
+    content = player.picture(stream, time, depth=depth)
     return Response(content, media_type="application/octet-stream")

@@ -70,6 +70,8 @@ class PageServer:
             lifespan="off",
             timeout_graceful_shutdown=1,
             ws_max_size=_MOST_BYTES_SENT,
+            # It would compress each picture anew for each watcher, and pictures are compressed.
+            ws_per_message_deflate=False,
             ws_ping_interval=_PING_SECONDS,
             ws_ping_timeout=_PING_SECONDS,
         )

@@ -110,9 +110,15 @@ class _Routes:
         """How far the recording has been read, and the flight once it was."""
         return flight_answer(self._player(mission))
 
-    def picture(self, mission: str, stream: Stream, at: Moment) -> Response:
+    def picture(
+        self,
+        mission: str,
+        stream: Stream,
+        at: Moment,
+        depth: bool = False,  # noqa: FBT001, FBT002 - of an address
+    ) -> Response:
         """The last picture of a stream captured at or before a mission time, in nanoseconds."""
-        return picture_answer(self._player(mission), stream, at)
+        return picture_answer(self._player(mission), stream, at, depth=depth)
 
     def _player(self, mission: str) -> Player:
         if mission not in self._players:

@@ -130,6 +130,20 @@ class StreamKind(str, enum.Enum):
     DETECTIONS = "detections"
 
 
+class PictureForm(str, enum.Enum):
+    """How a live view sends the pictures of a camera; other items are the same in each."""
+
+    WHOLE = "whole"
+    """JPEG with depth, calibration and odometry, for programs."""
+    JPEG = "jpeg"
+    """JPEG alone, for a page."""
+    H264 = "h264"
+    """H.264 for a page whose browser decodes it (WebCodecs): a message has `key`, whether decoding
+    can begin with it."""
+    DEPTH = "depth"
+    """The depth alone, as grey values to be coloured (`depth_picture`)."""
+
+
 class LinkState(str, enum.Enum):
     """Who is connected to a drone, and whether it answers."""
 
@@ -161,6 +175,9 @@ class RobotOut(AnswerModel):
     """Lease that holds it; None if it is free."""
     tenant: str | None = None
     """Tenant of that lease; shown to operators and to the tenant itself."""
+    area: list[tuple[float, float]] | None = None
+    """Where it stays under that lease, east and north, before the fence narrows it; shown as the
+    tenant is. None without."""
     mission: str | None = None
     """Mission that flies it; shown as the tenant is, and to tenants that it shares cameras with."""
     shared: list[str] = Field(default_factory=list)

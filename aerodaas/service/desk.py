@@ -23,6 +23,7 @@ from aerodaas.protocol.schemas import (
     MissionOut,
     MissionPhase,
     NavigationIn,
+    PictureForm,
     Role,
 )
 from aerodaas.service.access import Principal, sees
@@ -299,14 +300,16 @@ class MissionDesk:
             except MissionError:
                 return
 
-    def items(self, mission: str, stream: str) -> Iterator[tuple[dict[str, Any], bytes]]:
+    def items(
+        self, mission: str, stream: str, form: PictureForm
+    ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Items of a flying mission's stream; raises AeroDaaSError if there is none."""
         with self._lock:
             one = self._one(mission)
             if one.phase is not MissionPhase.FLYING:
                 raise MissionError(f"{mission} is not flying")
             link = one.follow()
-        return link.items(stream)
+        return link.items(stream, form)
 
     def flight(self, mission: str) -> FlightFolder | None:
         """The folder of a mission's flight; None unless it is flying."""

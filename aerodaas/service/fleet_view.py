@@ -44,11 +44,14 @@ class FleetView:
         news = self._garage.news(robot.id)
         flying, shared = self._desk.shared(robot.id, principal.tenant)
         mine = lease is not None and sees(principal, lease.tenant)
+        # Only of a lease that this account sees.
+        own = lease if mine else None
         return RobotOut(
             id=robot.id,
             sensors=[sensor.full_id for sensor in robot.sensors],
             lease=None if lease is None else lease.id,
-            tenant=lease.tenant if lease is not None and mine else None,
+            tenant=None if own is None else own.tenant,
+            area=None if own is None or own.area is None else list(own.area),
             mission=flying if mine or shared else None,
             shared=shared,
             battery=state.battery,

@@ -8,7 +8,7 @@ import { Refused, ask, keepToken, readFragment, takeToken, writeFragment } from 
 import type { Flight } from "./flight";
 import { FlightMap } from "./map";
 import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
-import { type Place, type Point, placeOf } from "./place";
+import { type LeasedArea, type Place, type Point, areasOf, placeOf } from "./place";
 import { Playback } from "./playback";
 import { Recorded } from "./recorded";
 import { LiveSource } from "./source";
@@ -37,6 +37,7 @@ function App() {
   const [token, setToken] = useState(takeToken);
   const [known, setKnown] = useState<Known | null>(null);
   const [missions, setMissions] = useState<MissionOut[]>([]);
+  const [areas, setAreas] = useState<LeasedArea[]>([]);
   const [chosen, setChosen] = useState<string | null>(() => readFragment("mission"));
   /** The mission that was seen flying: its end is shown before its recording. */
   const [seen, setSeen] = useState<string | null>(null);
@@ -59,6 +60,7 @@ function App() {
         if (gone) return;
         setKnown((before) => before ?? { account, place: placeOf(fleet), name: fleet.name });
         setMissions(all);
+        setAreas(areasOf(fleet.robots));
         setProblem("");
       } catch (error) {
         if (gone) return;
@@ -114,7 +116,7 @@ function App() {
   if (!token) return <SignIn problem={problem} onToken={setToken} />;
   if (known && mission) {
     const shared = {
-      ...{ first: mission, missions, known, token, theme, themes },
+      ...{ first: mission, missions, known, areas, token, theme, themes },
       onMission: choose,
       onBeside: compare,
     };
@@ -204,6 +206,7 @@ interface ConsoleProps {
   first: MissionOut;
   missions: MissionOut[];
   known: Known;
+  areas: LeasedArea[];
   token: string;
   theme: string;
   themes: preact.ComponentChildren;
@@ -308,6 +311,7 @@ function Console(props: ConsoleProps) {
         <FlightMap
           flight={flight}
           place={place}
+          areas={recorded ? [] : props.areas}
           robot={robot}
           mayFly={may && !flight.over}
           marked={marked}

@@ -2,7 +2,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Flight, aheadOf } from "./flight";
-import type { Place, Point } from "./place";
+import type { LeasedArea, Place, Point } from "./place";
 import { type Drawn, SurveyLayer } from "./survey_map";
 import type { StatusOut } from "./wire";
 import "./map.css";
@@ -17,6 +17,7 @@ interface View {
 export interface MapProps {
   flight: Flight;
   place: Place;
+  areas: LeasedArea[];
   robot: string;
   mayFly: boolean;
   marked: Point | null;
@@ -142,6 +143,12 @@ export function FlightMap(props: MapProps) {
               ))}
             </g>
           ))}
+          {props.areas.map(({ lease, polygon, title }) => (
+            <g key={lease} class="area" data-lease={lease}>
+              <polygon points={line(polygon)} />
+              <text {...middle(polygon, x, y)}>{title}</text>
+            </g>
+          ))}
           <g class="home" transform={`translate(${x(0)} ${y(0)})`}>
             <circle r="9" />
             <text dy="4">H</text>
@@ -228,6 +235,11 @@ export function FlightMap(props: MapProps) {
         <li class="coming">coming</li>
         <li class="fenced">fence</li>
         <li class="forbidden">no-fly</li>
+        {props.areas.length > 0 && (
+          <li class="leased">
+            lease<span class="unseen">: {props.areas.map((one) => one.title).join("; ")}</span>
+          </li>
+        )}
       </ul>
     </section>
   );
@@ -352,6 +364,13 @@ function label(value: number): string {
 function niceStep(least: number): number {
   const power = 10 ** Math.floor(Math.log10(least));
   return ([1, 2, 5, 10].find((one) => one * power >= least) ?? 10) * power;
+}
+
+/** Where an area's name stands: amid its corners. */
+function middle(polygon: Point[], x: Frame["x"], y: Frame["y"]): { x: number; y: number } {
+  const mean = (of: (point: Point) => number) =>
+    polygon.reduce((sum, point) => sum + of(point), 0) / polygon.length;
+  return { x: x(mean(([east]) => east)), y: y(mean(([, north]) => north)) };
 }
 
 function planKey(flight: Flight): string {

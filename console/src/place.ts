@@ -1,6 +1,6 @@
 // What of an environment the page draws: home, fences and starts. Metres east and north of home.
 
-import type { FleetOut } from "./wire";
+import type { FleetOut, RobotOut } from "./wire";
 
 export type Point = readonly [number, number];
 
@@ -19,6 +19,27 @@ export interface Abilities {
   maxClimb: number;
   /** Of its camera, horizontally, degrees. */
   fieldOfView: number;
+}
+
+/** Where a lease's drones stay. */
+export interface LeasedArea {
+  lease: string;
+  polygon: Point[];
+  /** Who has it, and which drones. */
+  title: string;
+}
+
+/** The areas of leases, each once, whatever the number of its drones. */
+export function areasOf(robots: RobotOut[]): LeasedArea[] {
+  const known = new Map<string, RobotOut[]>();
+  for (const one of robots) {
+    if (one.lease !== null && one.area) known.set(one.lease, [...(known.get(one.lease) ?? []), one]);
+  }
+  return [...known].map(([lease, held]) => ({
+    lease,
+    polygon: held[0]?.area ?? [],
+    title: `${held[0]?.tenant ?? ""}: ${held.map((one) => one.id).join(", ")}`,
+  }));
 }
 
 interface Robot {

@@ -3,7 +3,7 @@
 import { answered } from "./connection";
 import { type Alert, type Sample, shifted, speedOf } from "./flight";
 import type { Point } from "./place";
-import type { FlightEars, ItemEars, Past, Source } from "./source";
+import type { FlightEars, ItemEars, Past, Source, Wanted } from "./source";
 import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut } from "./wire";
 
 /** Milliseconds between two moments shown while it plays, and between two pictures asked for. */
@@ -104,7 +104,7 @@ export class Playback implements Source {
     return rows[lastBefore(rows, this.time, (one) => one.time)];
   }
 
-  watch(camera: string, _finders: string[], ears: ItemEars): () => void {
+  watch({ camera, depth }: Wanted, ears: ItemEars): () => void {
     const gone = new AbortController();
     let shown = -1;
     let busy = false;
@@ -114,7 +114,7 @@ export class Playback implements Source {
       while (!gone.signal.aborted && shown !== this.time) {
         const began = performance.now();
         shown = this.time;
-        await this.picture(camera, shown, ears, gone.signal).catch(() => undefined);
+        await this.picture(camera, depth, shown, ears, gone.signal).catch(() => undefined);
         const rest = STEP - (performance.now() - began);
         if (rest > 0) await new Promise((done) => setTimeout(done, rest));
       }
@@ -131,12 +131,13 @@ export class Playback implements Source {
 
   private async picture(
     camera: string,
+    depth: boolean,
     time: number,
     ears: ItemEars,
     signal: AbortSignal,
   ): Promise<void> {
     const at = String(Math.max(0, Math.round(time * 1e9)));
-    const query = new URLSearchParams({ stream: camera, at });
+    const query = new URLSearchParams({ stream: camera, at, depth: String(depth) });
     const path = `v1/missions/${this.mission.id}/playback/picture?${query}`;
     const answer = await answered(path, this.token, undefined, signal);
     const data = await answer.arrayBuffer();
@@ -145,9 +146,13 @@ export class Playback implements Source {
     const text = new TextDecoder().decode(new Uint8Array(data, 0, end));
     const messages = JSON.parse(text) as Record<string, unknown>[];
     if (messages.length === 0) ears.nothing();
+    let from = end + 1;
     for (const message of messages) {
-      if (message["blob"] === true) await ears.picture(message, data.slice(end + 1));
-      else ears.found(message);
+      if (message["blob"] === true) {
+        const [size = 0] = (message["item"] as { bytes: number[] }).bytes;
+        await ears.picture(message, data.slice(from, from + size));
+        from += size;
+      } else ears.found(message);
     }
   }
 

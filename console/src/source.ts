@@ -3,6 +3,7 @@
 import { LiveSocket } from "./connection";
 import type { Alert, Sample } from "./flight";
 import type { Point } from "./place";
+import { wantedForm } from "./video_pictures";
 import type { AnalyticsOut, MissionOut } from "./wire";
 
 /** What came before a moment of a recording, and of its charts what comes after it, too. */
@@ -25,9 +26,18 @@ export interface FlightEars {
 export interface ItemEars {
   /** What was found in a picture; it may come before that. */
   found(message: Record<string, unknown>): void;
+  /** A picture, or the depth measured with one. */
   picture(message: Record<string, unknown>, data: ArrayBuffer): Promise<void>;
   /** There is no picture at this moment. */
   nothing(): void;
+}
+
+export interface Wanted {
+  camera: string;
+  /** Streams of what was found. */
+  finders: string[];
+  /** Whether its depth is wanted, too. */
+  depth: boolean;
 }
 
 export interface Source {
@@ -35,7 +45,7 @@ export interface Source {
   /** Tell a flight of its state from now on. */
   follow(ears: FlightEars): void;
   /** Tell of a camera's pictures and of what `finders` find, until the answer is called. */
-  watch(camera: string, finders: string[], ears: ItemEars): () => void;
+  watch(wanted: Wanted, ears: ItemEars): () => void;
   close(): void;
 }
 
@@ -63,14 +73,24 @@ export class LiveSource implements Source {
     });
   }
 
-  watch(camera: string, finders: string[], ears: ItemEars): () => void {
+  watch({ camera, finders, depth }: Wanted, ears: ItemEars): () => void {
     const query = new URLSearchParams({ rate: "1", streams: [camera, ...finders].join(",") });
-    const socket = new LiveSocket(`${this.path}?${query}`, this.token, {
-      text: (message) => message["kind"] === "item" && ears.found(message),
-      blob: (message, data) => ears.picture(message, data),
-      up: () => undefined,
+    if (depth) query.set("depth", camera);
+    let socket: LiveSocket | undefined;
+    let left = false;
+    void wantedForm().then((form) => {
+      if (left) return;
+      query.set("pictures", form);
+      socket = new LiveSocket(`${this.path}?${query}`, this.token, {
+        text: (message) => message["kind"] === "item" && ears.found(message),
+        blob: (message, data) => ears.picture(message, data),
+        up: () => undefined,
+      });
     });
-    return () => socket.close();
+    return () => {
+      left = true;
+      socket?.close();
+    };
   }
 
   close(): void {

@@ -95,6 +95,7 @@ export interface FleetOut {
  * One drone of the fleet.
  */
 export interface RobotOut {
+  area: [number, number][] | null;
   battery: number | null;
   enabled: boolean;
   faults: string[];

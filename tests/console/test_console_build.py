@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hovering import console
 from required import needs_peer, peer
+from scripted_camera import camera_console
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.console.viewer import RecordingServer
@@ -71,7 +72,7 @@ def test_the_page_that_ships_is_built_from_its_source(source: Path) -> None:
 @needs_peer("AERODAAS_NPM")
 @needs_peer("AERODAAS_BROWSER")
 def test_nothing_stands_in_the_way_of_assistive_technology(source: Path, tmp_path: Path) -> None:
-    """By axe's rules: the page of a flight, of a recording, and the one that asks for a token."""
+    """By axe's rules: the pages of a flight, of depth, of a recording, and of no token."""
     axe = (source / "node_modules" / "axe-core" / "axe.min.js").read_text(encoding="utf-8")
     path = tmp_path / "flight.mcap"
     with FlightRecorder(path, config=RecordingConfig(), provenance=Provenance()) as recorder:
@@ -89,6 +90,12 @@ def test_nothing_stands_in_the_way_of_assistive_technology(source: Path, tmp_pat
         page = browser.open(server.address().partition("#")[0])
         page.until("document.querySelector('input[name=token]')")
         assert objections(page, axe) == []
+        with camera_console() as filming:
+            page = browser.open(filming.address())
+            page.until("document.querySelector('.video [aria-pressed]')")
+            page.press(".video [aria-pressed]")
+            page.until("document.querySelector('[data-testid=scale]')")
+            assert objections(page, axe) == []
         playing = RecordingServer("127.0.0.1:0", [Recording.open(path)])
         page = browser.open(playing.address(viewer=True))
         page.until("document.querySelector('.timeline')")

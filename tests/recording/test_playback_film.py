@@ -91,7 +91,8 @@ def test_any_time_gives_the_last_picture_captured(film: Film, times: list[int]) 
             continue
         *found, (message, data) = items
         assert message["captured"] == CAPTURED[number]
-        assert message["item"]["bytes"] == [len(data), 0]
+        assert message["item"]["bytes"] == [len(data)]
+        assert not message["item"]["depth"]
         assert abs(shown(data) - number) <= 1
         boxes = [one["item"]["of"]["items"] for one, _ in found]
         assert len(boxes) == (number % 3 == 0)
@@ -133,6 +134,36 @@ def test_another_cameras_boxes_are_not_drawn(tmp_path: Path) -> None:
             assert abs(shown(data) - number) <= 1
             assert one["item"]["of"]["header"]["of"]["source"] == f"tello/{camera}"
             assert message["stream"] == f"tello/{camera}"
+
+
+@pytest.mark.parametrize("images", ["jpeg", "h264"])
+def test_depth_comes_with_its_own_picture_where_it_is_wanted(tmp_path: Path, images: str) -> None:
+    """Two metres on the left, four on the right, and nothing measured above."""
+    depth = np.full((48, 64), 2000, np.uint16)
+    depth[:, 32:] = 4000
+    depth[:8] = 0
+    path = tmp_path / "flight.mcap"
+    config = RecordingConfig.model_validate({"images": images})
+    with FlightRecorder(path, config=config, provenance=Provenance()) as recorder:
+        for number in range(2):
+            header = Header(number, (1 + number) * 10**9, SOURCE)
+            frame = Frame(header, picture(number), depth=depth if number else None)
+            recorder.write(Message(STREAM, number, header.stamp, header, 0, (), frame))
+    with Recording.open(path) as recording:
+        film = read_flight(recording)[1]
+        without, _ = film.at(STREAM, 10**9, depth=True)[-1]
+        assert not without["item"]["depth"]
+        assert len(film.at(STREAM, 2 * 10**9)) == 1
+        (told, png), (shot, _) = film.at(STREAM, 2 * 10**9, depth=True)
+    assert shot["item"]["depth"]
+    assert told["item"]["header"] == shot["item"]["header"]
+    assert told["item"]["bytes"] == [len(png)]
+    assert told["item"]["range"] == 5.0
+    grey = np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED))
+    metres = (grey[8:].astype(float) - 1) / 254 * 5
+    assert metres[:, :32] == pytest.approx(2.0, abs=0.02)
+    assert metres[:, 32:] == pytest.approx(4.0, abs=0.02)
+    assert not grey[:8].any()
 
 
 def write_pictures(path: Path, pictures: Sequence[bytes]) -> Path:

@@ -88,6 +88,25 @@ def pixel(page: Page, x: int, y: int) -> list[int]:
     return found
 
 
+def test_a_moment_later_the_same_picture_keeps_its_boxes(browser: Browser, path: Path) -> None:
+    """Four pictures a second: two moments a hundredth apart share one."""
+    asked = "performance.getEntriesByType('resource').filter(one => one.name.includes('/picture'))"
+    flight, pictures = facts(path)
+    stamp = next(one.stamp for one in flight.sightings if one.stamp > 20e9)
+    assert stamp in pictures
+    with served(path) as address:
+        page = browser.open(address)
+        page.until("document.querySelector('.timeline')")
+        page.run(SEEK.format(stamp / 1e9 + 0.01))
+        until_stamp(page, stamp, 1)
+        before = page.run(f"{asked}.length")
+        page.run(SEEK.format(stamp / 1e9 + 0.02))
+        page.until(f"{asked}.length > {before}")
+        # Until it has been decoded and drawn.
+        page.run("new Promise(done => setTimeout(done, 300))")
+        until_stamp(page, stamp, 1)
+
+
 def test_scrubbing_moves_map_picture_state_and_charts_together(
     browser: Browser, path: Path
 ) -> None:

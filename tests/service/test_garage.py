@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from desks import PILOT, Provider
 
 from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service import garage as garages
 
 T0 = 1_800_000_000.0
@@ -130,3 +131,19 @@ def test_a_simulated_drone_has_its_settings_charge_before_it_flies(
     lease = provider.bookings.request(PILOT, LeaseIn(battery_minutes=2.0, minutes=5.0))
     assert lease.state.value == state
     provider.desk.close()
+
+
+def test_a_leases_area_is_shown_to_who_sees_the_lease(provider: Provider) -> None:
+    """To its own tenant and to operators: where others mean to fly is not everybody's business."""
+    area = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0)]
+    assert seen(provider).area is None
+    provider.monitor.see("one")
+    provider.bookings.request(PILOT, LeaseIn(robots=["one"], area=area))
+    assert seen(provider).area == area
+    operator = replace(PILOT, account="olga", tenant="provider", role=Role.OPERATOR)
+    stranger = replace(PILOT, account="bela", tenant="city")
+    for who, shown in ((operator, area), (stranger, None)):
+        robots = {one.id: one for one in provider.fleet.seen_by(who).robots}
+        assert robots["one"].area == shown
+        assert robots["one"].lease is not None
+        assert robots["two"].area is None

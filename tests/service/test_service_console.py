@@ -17,6 +17,7 @@ from tools.browser import Browser
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 FAR = ((20.0, 0.0), (20.0, 20.0))
+AREA = [[-5, -5], [25, -5], [25, 25], [-5, 25]]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,11 @@ def provider() -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def mission(provider: Served) -> str:
     """A mission in flight, of the administrator's tenant."""
-    answer = provider.ask("POST", "/v1/missions", {"document": document("one", *FAR)})
+    wanted = {"robots": ["one"], "minutes": 10, "area": AREA}
+    lease = provider.ask("POST", "/v1/leases", wanted)["id"]
+    answer = provider.ask(
+        "POST", "/v1/missions", {"document": document("one", *FAR), "lease": lease}
+    )
     id_ = str(answer["id"])
     provider.until(lambda: "one" in provider.mission(id_)["status"])
     return id_
@@ -78,6 +83,9 @@ def test_missions_are_watched_and_commanded_by_role(provider: Served, mission: s
         pilot.until("document.querySelector('.orders li')?.dataset.stage === 'done'")
         for page in pages:
             page.until("document.querySelector('[data-testid=state]')?.innerText === 'paused'")
+            # Where the lease is for stands on the map.
+            page.until("document.querySelectorAll('[data-lease] polygon').length === 1")
+            assert "admin: one" in page.run("document.querySelector('.leased').textContent")
             assert page.complaints() == []
         assert watcher.run("document.querySelectorAll('.command:disabled').length") == 5
         pilot.run("document.querySelector('.command.return-home').click()")

@@ -12,6 +12,7 @@ from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.recording.pictures import Shot, detections, shots
+from aerodaas.recording.playback.page_items import packed_depth, packed_picture
 from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import SourceError
@@ -89,16 +90,18 @@ class Film:
         self._schemas = {name: one.schema for name, one in recording.topics.items()}
         self._reels: dict[str, _Reel] = {}
 
-    def at(self, stream: str, time: int) -> list[Packed]:
+    def at(self, stream: str, time: int, *, depth: bool = False) -> list[Packed]:
         """The picture of a stream that was the last one captured at or before a time.
 
         Args:
             stream: Its name; KeyError for an unknown one.
             time: Mission nanoseconds.
+            depth: Whether the depth measured with it is wanted, too.
 
         Returns:
-            What was found in the picture, by each analysis, then the picture itself; nothing
-            before the first one. In place of a broken picture comes the last whole one before it.
+            What was found in the picture, by each analysis, then its depth if wanted and there,
+            then the picture itself; nothing before the first one. In place of a broken picture
+            comes the last whole one before it.
         """
         topic, captures = self._pictures[stream]
         last = captures.last(time)
@@ -106,7 +109,8 @@ class Film:
             shot = self._shot(topic, captures, place)
             packed = None if shot is None else _packed(stream, shot)
             if shot is not None and packed is not None:
-                return [*self._detections(shot.header), packed]
+                measured = list(_measured(stream, shot)) if depth else []
+                return [*self._detections(shot.header), *measured, packed]
         return []
 
     def _shot(self, topic: str, captures: Captures, place: int) -> Shot | None:
@@ -173,20 +177,28 @@ def _packed(stream: str, shot: Shot) -> Packed | None:
     message = _message(stream, shot.record.stamp, shot.record.captured)
     data = _jpeg(shot)
     if data is not None:
-        item = {
-            "is": "Frame",
-            "header": pack(shot.header)[0],
-            "bytes": [len(data), 0],
-        }
-        return {**message, "item": item, "blob": True}, data
+        return {**message, "item": _picture(shot, data), "blob": True}, data
     try:
         image = shot.image()
         if image is None:
             return None
-        item, data = pack(Frame(shot.header, image))
+        _, data = pack(Frame(shot.header, image))
     except (SourceError, ItemError):
         return None
-    return {**message, "item": item, "blob": True}, data
+    return {**message, "item": _picture(shot, data), "blob": True}, data
+
+
+def _picture(shot: Shot, data: bytes) -> dict[str, Any]:
+    return packed_picture(shot.header, len(data), "jpeg", measured=shot.measured is not None)
+
+
+def _measured(stream: str, shot: Shot) -> Iterator[Packed]:
+    """The depth of a picture, if there is any that is whole."""
+    depth = shot.depth()
+    if depth is not None:
+        item, data = packed_depth(shot.header, depth)
+        message = _message(stream, shot.record.stamp, shot.record.captured)
+        yield {**message, "item": item, "blob": True}, data
 
 
 def _jpeg(shot: Shot) -> bytes | None:

@@ -23,7 +23,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
-from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch
@@ -81,8 +81,8 @@ class Flown(Protocol):
         """The streams that can be drawn, by name."""
         ...
 
-    def reader(self, stream: str) -> Reader:
-        """A reader of a stream; raises AeroDaaSError if there is none."""
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> Reader:
+        """A reader of a stream, its pictures in a form; raises AeroDaaSError if there is none."""
         ...
 
     @property
@@ -199,7 +199,8 @@ class ControlServer:
 
     def _items(self, channel: Channel, first: dict[str, Any]) -> None:
         try:
-            reader = self._flown.reader(str(first["stream"]))
+            form = PictureForm(first.get("form", PictureForm.WHOLE))
+            reader = self._flown.reader(str(first["stream"]), form)
         except AeroDaaSError as error:
             channel.send({"refused": str(error)}, timeout=_SEND_SECONDS)
             return

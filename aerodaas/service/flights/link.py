@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
-from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.types.errors import ConfigError, MissionError
 
@@ -73,13 +73,16 @@ class FlightLink:
                 self._drop()
                 raise MissionError(f"the flight's process does not answer: {error}") from None
 
-    def items(self, stream: str) -> Iterator[tuple[dict[str, Any], bytes]]:
+    def items(
+        self, stream: str, form: PictureForm = PictureForm.WHOLE
+    ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Yield a stream's items until the flight is over; an empty message a while without any.
 
-        Raises ConfigError if there is no such stream, MissionError if the flight is lost.
+        Its pictures come in a form. Raises ConfigError if there is no such stream, MissionError
+        if the flight is lost.
         """
         try:
-            channel = self._connected("items", stream=stream)
+            channel = self._connected("items", stream=stream, form=form.value)
         except (GuestError, OSError) as error:
             raise MissionError(f"the flight's process does not answer: {error}") from None
         with contextlib.closing(channel):

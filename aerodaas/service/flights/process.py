@@ -28,7 +28,7 @@ from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.environment import environment_of
@@ -216,12 +216,12 @@ class Flying:
         environment = self._environment
         return {} if environment is None else drawn_streams(environment.graph)
 
-    def reader(self, stream: str) -> PackedReader:
-        """A reader of a stream; raises ConfigError if there is none."""
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> PackedReader:
+        """A reader of a stream, its pictures in a form; raises ConfigError if there is none."""
         graph = self._environment.graph if self._environment is not None else None
         if graph is None or stream not in graph.nodes or graph.reader is None:
             raise ConfigError(f"no stream of this mission is called {stream!r}")
-        return PackedReader(graph.reader(stream), stream)
+        return PackedReader(graph.reader(stream), stream, form)
 
     @property
     def over(self) -> bool:

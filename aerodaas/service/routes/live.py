@@ -7,8 +7,8 @@ import asyncio
 from fastapi import APIRouter, WebSocket
 
 from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import LiveSession, Rate, StreamNames, wanted_streams
-from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
+from aerodaas.protocol.schemas import PictureForm, Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
@@ -38,9 +38,14 @@ class LiveRoutes:
         mission: str,
         rate: Rate = 5.0,
         streams: StreamNames = "",
+        pictures: Form = PictureForm.WHOLE,
+        depth: StreamNames = "",
     ) -> None:
-        """Send the mission's state, at most `rate` times a second, and items of `streams`."""
-        wanted = wanted_streams(streams)
+        """Send the mission's state, at most `rate` times a second, and items of `streams`.
+
+        Pictures come in a form, with the depth of those that `depth` names beside them.
+        """
+        wanted = wanted_streams(streams, pictures, depth)
         try:
             scope = Scope.SENSE if wanted else None
             principal = self._admission.require(socket, Role.VIEWER, scope)

@@ -170,12 +170,20 @@ class MissionRoutes:
         """The recorded flight as a page plays it, once it is over; how far it has been read."""
         return flight_answer(self._player(mission, request))
 
-    def moment(self, mission: str, request: Request, stream: Stream, at: Moment) -> Response:
+    def moment(
+        self,
+        mission: str,
+        request: Request,
+        stream: Stream,
+        at: Moment,
+        depth: bool = False,  # noqa: FBT001, FBT002 - of an address
+    ) -> Response:
         """The last picture of a stream captured at or before a mission time, in nanoseconds.
 
-        One line of JSON with what was found in it and the picture's header; after it a JPEG.
+        One line of JSON with what was found in it and the picture's header; after it its depth as a
+        PNG, if wanted and measured, and a JPEG.
         """
-        return picture_answer(self._player(mission, request), stream, at)
+        return picture_answer(self._player(mission, request), stream, at, depth=depth)
 
     def _player(self, mission: str, request: Request) -> Player:
         principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)

@@ -15,6 +15,7 @@ import pytest
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -72,6 +73,7 @@ class Flight:
         )
         self.lease = LeaseWatch(order, lambda _: None)
         self.over = False
+        self.form: PictureForm | None = None
         self.pictures = Pictures()
         self.commands: list[object] = []
         self.server = ControlServer(self.folder, self, self.lease, HereRelay(path / "here"))
@@ -94,8 +96,9 @@ class Flight:
         """None."""
         return {}
 
-    def reader(self, stream: str) -> Pictures:
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> Pictures:
         """The camera, of those that run."""
+        self.form = form
         if stream != "one/cam":
             raise ConfigError(f"no stream of this mission is called {stream!r}")
         return self.pictures
@@ -121,6 +124,17 @@ def flight() -> Iterator[Flight]:
         made.link.ask(do="share", mission="guest", streams=["one/cam"])
         yield made
         made.close()
+
+
+@pytest.mark.parametrize("form", list(PictureForm))
+def test_a_live_views_pictures_are_made_in_the_form_that_it_asks_for(
+    flight: Flight, form: PictureForm
+) -> None:
+    """By the flight's process, which has the pixels."""
+    message, blob = next(flight.link.items("one/cam", form))
+    assert message["item"]["is"] == "Frame"
+    assert blob
+    assert flight.form is form
 
 
 def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight) -> None:

@@ -1,0 +1,102 @@
+// What was found in a picture, drawn on it: depth, boxes, labels and the skeletons of bodies.
+
+import type { Detection, Picture } from "./pictures";
+
+const COLOURS = ["#ffb000", "#00c2a8", "#ff5d8f", "#6aa8ff", "#c6e03a", "#d58bff"];
+const SHADOW = "#10151c";
+/** Least confidence of a keypoint that is drawn, as in recordings. */
+const VISIBLE = 0.3;
+/** Points of a body, in COCO's order. */
+const BODY = 17;
+/** Pairs of a body's points that it connects: limbs, then trunk and neck. */
+const BONES = [
+  ...[[5, 7], [7, 9], [6, 8], [8, 10], [11, 13], [13, 15], [12, 14], [14, 16]],
+  ...[[5, 6], [11, 12], [5, 11], [6, 12], [0, 5], [0, 6]],
+] as const;
+
+export interface Painted {
+  boxes: number;
+  /** Points of bodies. */
+  points: number;
+}
+
+/** Draw a picture with what was found in it; returns what was drawn. */
+export function paint(canvas: HTMLCanvasElement, picture: Picture): Painted {
+  const { width, height } = picture.bitmap;
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width;
+    canvas.height = height;
+  }
+  const painted = { boxes: 0, points: 0 };
+  const pen = canvas.getContext("2d");
+  if (!pen) return painted;
+  pen.drawImage(picture.bitmap, 0, 0);
+  if (picture.depth) {
+    pen.imageSmoothingEnabled = false;
+    pen.drawImage(picture.depth.bitmap, 0, 0, width, height);
+    pen.imageSmoothingEnabled = true;
+  }
+  const all = [...picture.found.values()].flat();
+  // Labels lie over all bodies.
+  for (const one of all) painted.points += drawBody(pen, one, width);
+  for (const one of all) drawBox(pen, one, width);
+  painted.boxes = all.length;
+  return painted;
+}
+
+function colourOf(one: Detection): string {
+  return COLOURS[(one.track_id ?? one.label.length) % COLOURS.length] ?? "#ffb000";
+}
+
+function drawBox(pen: CanvasRenderingContext2D, one: Detection, width: number): void {
+  const size = Math.max(11, Math.round(width / 45));
+  pen.font = `600 ${size}px system-ui, sans-serif`;
+  pen.lineWidth = Math.max(2, width / 320);
+  const [left, top, right, bottom] = one.box;
+  const colour = colourOf(one);
+  pen.strokeStyle = colour;
+  pen.strokeRect(left, top, right - left, bottom - top);
+  const track = one.track_id === null ? "" : ` #${one.track_id}`;
+  const text = `${one.label}${track} ${Math.round(100 * one.score)} %`;
+  const wide = pen.measureText(text).width + 8;
+  const above = top >= size + 6 ? top - size - 6 : top;
+  pen.fillStyle = colour;
+  pen.fillRect(left, above, wide, size + 6);
+  pen.fillStyle = SHADOW;
+  pen.fillText(text, left + 4, above + size + 1);
+}
+
+/** Draw the keypoints that are seen, and a body's bones between them; returns how many points. */
+function drawBody(pen: CanvasRenderingContext2D, one: Detection, width: number): number {
+  const { points } = one;
+  const seen = points.map(([u, v, sure]) => sure >= VISIBLE && Number.isFinite(u + v));
+  // A body far away is a few pixels wide.
+  const thick = Math.min(Math.max(2, width / 320), Math.max(1, (one.box[3] - one.box[1]) / 40));
+  const bones = new Path2D();
+  if (points.length === BODY) {
+    for (const [from, to] of BONES) {
+      const [first, last] = [points[from], points[to]];
+      if (!first || !last || !seen[from] || !seen[to]) continue;
+      bones.moveTo(first[0], first[1]);
+      bones.lineTo(last[0], last[1]);
+    }
+  }
+  const joints = new Path2D();
+  points.forEach(([u, v], place) => {
+    if (!seen[place]) return;
+    joints.moveTo(u + 1.6 * thick, v);
+    joints.arc(u, v, 1.6 * thick, 0, 2 * Math.PI);
+  });
+  pen.lineCap = "round";
+  pen.strokeStyle = SHADOW;
+  pen.lineWidth = 2.2 * thick;
+  pen.stroke(bones);
+  pen.lineWidth = 1.2 * thick;
+  pen.stroke(joints);
+  pen.strokeStyle = pen.fillStyle = colourOf(one);
+  pen.lineWidth = 1.2 * thick;
+  pen.stroke(bones);
+  pen.fill(joints);
+  pen.lineCap = "butt";
+  return seen.filter(Boolean).length;
+}

@@ -1,0 +1,168 @@
+// Pictures of a camera with what was found in each: boxes belong to the frame they were made from.
+
+import { type Depth, coloured } from "./depth";
+import { VideoPictures } from "./video_pictures";
+
+/** Pictures that are kept while what is found in them is under way. */
+export const KEPT = 16;
+/** Mission nanoseconds by which an analysed picture may be older than the newest one. */
+const BEHIND = 1.5e9;
+/** And one with more analyses in it than the newest analysed one. */
+const PATIENCE = 0.4e9;
+
+export interface Detection {
+  box: [number, number, number, number];
+  label: string;
+  score: number;
+  track_id: number | null;
+  /** Pixels right and down, and confidence, 0 to 1; none where the model gives none. */
+  points: [number, number, number][];
+}
+
+export interface Picture {
+  bitmap: ImageBitmap;
+  source: string;
+  stamp: number;
+  captured: number;
+  camera: string;
+  found: Map<string, Detection[]>;
+  /** Whether the camera measured depth with it. */
+  measured: boolean;
+  depth: Depth | undefined;
+}
+
+interface Header {
+  stamp: number;
+  source: string;
+}
+
+/** What came before its picture. */
+interface Early {
+  found: Map<string, Detection[]>;
+  depth: Depth | undefined;
+}
+
+interface PictureItem {
+  is: "Picture" | "Frame" | "Depth";
+  header: unknown;
+  bytes: number[];
+  format?: string;
+  depth?: boolean;
+  range?: number;
+}
+
+/** The fields of an item as the wire has it: `{"is": CLASS, "of": fields}`. */
+function fields<T>(item: unknown): T {
+  return (item as { of: T }).of;
+}
+
+function list(items: unknown): unknown[] {
+  return Array.isArray(items) ? items : ((items as { of?: unknown[] } | null)?.of ?? []);
+}
+
+/** Rows of three of an array of 32-bit floats, as the wire has it; none for anything else. */
+function triples(array: unknown): [number, number, number][] {
+  const known = array as { type?: string; shape?: number[]; data?: string } | null;
+  if (known?.type !== "<f4" || known.shape?.[1] !== 3 || known.data === undefined) return [];
+  const bytes = Uint8Array.from(atob(known.data), (one) => one.charCodeAt(0));
+  const view = new DataView(bytes.buffer);
+  return Array.from({ length: Math.floor(bytes.length / 12) }, (_, row) => [
+    view.getFloat32(12 * row, true),
+    view.getFloat32(12 * row + 4, true),
+    view.getFloat32(12 * row + 8, true),
+  ]);
+}
+
+export class Pictures {
+  private kept: Picture[] = [];
+  private early = new Map<string, Early>();
+  private readonly video = new VideoPictures();
+  /** Stamp of the picture that was shown last: none before it comes back. */
+  private shown = 0;
+
+  constructor(
+    private readonly most: number,
+    /** Whether the depth is shown. */
+    private readonly deep: boolean,
+  ) {}
+
+  close(): void {
+    this.video.close();
+    for (const one of this.kept.splice(0)) one.bitmap.close();
+  }
+
+  /** Take a picture or its depth. */
+  async take(message: Record<string, unknown>, data: ArrayBuffer): Promise<void> {
+    const item = message["item"] as PictureItem;
+    const header = fields<Header>(item.header);
+    const bytes = new Uint8Array(data, 0, item.bytes[0]);
+    if (item.is === "Depth") {
+      const depth = await coloured(new Blob([bytes], { type: "image/png" }), item.range ?? 0);
+      this.of(header).depth = depth;
+      return;
+    }
+    const bitmap =
+      item.format === "h264"
+        ? await this.video.decoded(bytes, message["key"] === true)
+        : await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
+    if (!bitmap) return;
+    // The same frame comes again where a recording's moments share it.
+    const { found, depth } = this.of(header);
+    this.early.delete(nameOf(header));
+    this.kept.push({
+      ...{ bitmap, found, depth, source: header.source, stamp: header.stamp },
+      measured: item.depth === true,
+      captured: message["captured"] as number,
+      camera: message["stream"] as string,
+    });
+    // Of a live flight, several are decoded at a time.
+    if (this.most > 1) this.kept.sort((one, other) => one.stamp - other.stamp);
+    while (this.kept.length > this.most) this.kept.shift()?.bitmap.close();
+  }
+
+  detections(message: Record<string, unknown>): void {
+    const item = fields<{ header: unknown; items: unknown }>(message["item"]);
+    const found = list(item.items).map((one) => {
+      const { box, label, score, track_id, keypoints } = fields<
+        Detection & { keypoints?: unknown }
+      >(one);
+      const corners = list(box) as Detection["box"];
+      return { box: corners, label, score, track_id, points: triples(keypoints) };
+    });
+    this.of(fields<Header>(item.header)).found.set(message["stream"] as string, found);
+  }
+
+  /**
+   * The newest analysed picture, or one shortly before it in which more analyses found something;
+   * the newest of all, where analyses lag far behind. Depth counts as one of them.
+   */
+  newest(camera: string): Picture | undefined {
+    const own = this.kept.filter((one) => one.camera === camera);
+    const last = own[own.length - 1];
+    const known = ({ found, depth }: Picture) => found.size + (this.deep && depth ? 1 : 0);
+    const analysed = own.filter((one) => known(one) > 0);
+    const newest = analysed[analysed.length - 1];
+    let best = newest && last && last.stamp - newest.stamp < BEHIND ? newest : last;
+    const from = Math.max(this.most > 1 ? this.shown : 0, (best?.stamp ?? 0) - PATIENCE);
+    for (const one of analysed.reverse()) {
+      if (best && one.stamp >= from && known(one) > known(best)) best = one;
+    }
+    this.shown = best?.stamp ?? 0;
+    return best;
+  }
+
+  /** The picture of a frame, or what waits for it. */
+  private of(header: Header): Early {
+    const key = nameOf(header);
+    const picture = this.kept.find((one) => nameOf(one) === key);
+    if (picture) return picture;
+    const waiting = this.early.get(key) ?? { found: new Map(), depth: undefined };
+    this.early.set(key, waiting);
+    for (const old of [...this.early.keys()].slice(0, -KEPT)) this.early.delete(old);
+    return waiting;
+  }
+}
+
+function nameOf({ source, stamp }: Pick<Picture, "source" | "stamp">): string {
+  return `${source} ${stamp}`;
+}

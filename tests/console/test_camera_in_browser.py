@@ -1,0 +1,67 @@
+"""A camera on the page in a real browser: what was found is drawn on the frame it was found in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from required import needs_peer
+from scripted_camera import SHOWN, camera_console, require_own_frames
+
+from tools.browser import Browser, Page
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
+
+COUNT = """
+  VideoDecoder.prototype.decode = (decode => function (...words) {
+    window.decoded = (window.decoded ?? 0) + 1;
+    return decode.apply(this, words);
+  })(VideoDecoder.prototype.decode);
+"""
+"""Counts the pictures that come as H.264."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """One for all tests here."""
+    with Browser() as browser:
+        yield browser
+
+
+def opened(browser: Browser, address: str, form: str, before: str) -> Page:
+    """The page, with the first analysed picture shown; a script runs before its own."""
+    page = browser.open("about:blank")
+    page.before(before)
+    page.go(f"{address}&pictures={form}")
+    page.until("document.querySelector('[data-testid=video]')?.dataset.points > 0")
+    return page
+
+
+@pytest.mark.parametrize(
+    ("form", "before", "decodes"),
+    [("jpeg", COUNT, False), ("h264", COUNT, True), ("h264", "delete window.VideoDecoder", False)],
+)
+def test_bodies_and_depth_are_drawn_on_their_own_frame(
+    browser: Browser, form: str, before: str, *, decodes: bool
+) -> None:
+    """By a grey that tells which frame it is, and a body whose place does."""
+    with camera_console() as server:
+        page = opened(browser, server.address(), form, before)
+        assert page.run("(window.decoded ?? 0) > 0") is decodes
+        assert page.run("document.querySelector('[data-testid=video]').dataset.points") == "2"
+        require_own_frames(page.run(SHOWN))
+        # By keyboard: the button is pressed, and the legend names the range.
+        page.run("document.querySelector('.video [aria-pressed]').focus()")
+        page.key(" ")
+        page.until("document.querySelector('[data-testid=video]').dataset.range === '2'")
+        assert page.text("[data-testid=scale]").split() == ["0", "2", "m"]
+        near, unmeasured = page.run(
+            "[5, 300].map(x => [...document.querySelector('[data-testid=video]')"
+            ".getContext('2d').getImageData(x, 170, 1, 1).data])"
+        )
+        # The far end of the colours is violet; what was not measured stays grey.
+        assert near[2] > near[1] + 10
+        assert max(unmeasured[:3]) - min(unmeasured[:3]) <= 6
+        page.press(".video [aria-pressed]")
+        page.until("document.querySelector('[data-testid=scale]') === null")
+        assert page.complaints() == []

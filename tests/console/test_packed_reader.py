@@ -1,0 +1,106 @@
+"""A camera's pictures in each form that a live view may ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import av
+import cv2
+import numpy as np
+import pytest
+from av.video.frame import VideoFrame
+
+from aerodaas.analytics.wire_items import unpack
+from aerodaas.console.packed_reader import PackedReader
+from aerodaas.protocol.schemas import PictureForm
+from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.types.status import Message
+
+SOURCE = "drone/cam"
+SECOND = 10**9
+
+
+def frame(number: int, stamp: int, width: int = 64, *, depth: bool = False) -> Frame:
+    """One whose grey tells its number."""
+    measured = np.full((48, width), 3000, np.uint16) if depth else None
+    image = np.full((48, width, 3), 20 + 10 * number, np.uint8)
+    return Frame(Header(number, stamp, SOURCE), image, depth=measured)
+
+
+class Stream:
+    """Items that come at once, and then none."""
+
+    def __init__(self, *items: Any) -> None:  # noqa: ANN401 - of any stream
+        self._items: Iterator[Any] = iter(items)
+
+    def next_message(self, timeout: float) -> Message[Any]:
+        """The next item."""
+        del timeout
+        item = next(self._items)
+        return Message(SOURCE, item.header.id, item.header.stamp, item.header, 0, (), item)
+
+
+def packed(form: PictureForm, *items: Any) -> list[tuple[dict[str, Any], bytes]]:  # noqa: ANN401
+    """What a watcher gets of these."""
+    reader = PackedReader(Stream(*items), SOURCE, form)
+    return [found for _ in items if (found := reader.next_packed(0.1)) is not None]
+
+
+def greys(data: list[bytes]) -> list[int]:
+    """The numbers that a video's greys tell."""
+    decoder = av.CodecContext.create("h264", "r")
+    found: list[VideoFrame] = []
+    for part in [*map(av.Packet, data), None]:
+        found += [one for one in decoder.decode(part) if isinstance(one, VideoFrame)]
+    return [round((float(one.to_ndarray(format="gray").mean()) - 20) / 10) for one in found]
+
+
+def test_programs_get_whole_frames() -> None:
+    """With depth, to the millimetre."""
+    ((message, blob),) = packed(PictureForm.WHOLE, frame(1, 0, depth=True))
+    item = unpack(message["item"], blob)
+    assert (item.depth == 3000).all()
+
+
+@pytest.mark.parametrize("form", [PictureForm.JPEG, PictureForm.H264])
+@pytest.mark.parametrize("depth", [True, False])
+def test_a_page_is_told_of_depth_but_gets_the_picture_alone(
+    form: PictureForm, *, depth: bool
+) -> None:
+    """Its blob is one picture."""
+    ((message, blob),) = packed(form, frame(1, 0, depth=depth))
+    assert message["item"]["depth"] is depth
+    assert message["item"]["format"] == form.value
+    assert message["item"]["bytes"] == [len(blob)]
+    if form is PictureForm.JPEG:
+        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR)
+        assert np.asarray(image).mean() == pytest.approx(30, abs=1)
+
+
+def test_a_video_can_be_entered_each_second_and_each_part_is_one_picture() -> None:
+    """Ten pictures a second for three seconds; each can be shown as soon as it has come."""
+    pictures = [frame(number % 20, number * SECOND // 10) for number in range(30)]
+    found = packed(PictureForm.H264, *pictures)
+    keys = [number for number, (message, _) in enumerate(found) if message["key"]]
+    assert keys == [0, 10, 20]
+    for begin in keys:
+        parts = [blob for _, blob in found[begin : begin + 10]]
+        assert greys(parts) == [number % 20 for number in range(begin, begin + 10)]
+
+
+def test_a_video_of_another_size_begins_anew() -> None:
+    """As a camera that is switched to another mode."""
+    found = packed(PictureForm.H264, frame(0, 0), frame(1, 1), frame(2, 2, 80), frame(3, 3, 80))
+    assert [message["key"] for message, _ in found] == [True, False, True, False]
+
+
+def test_depth_is_sent_alone_and_only_where_it_was_measured() -> None:
+    """Nothing else of a stream comes beside it."""
+    measured = frame(1, 5, depth=True)
+    found = Detections.of(measured, [Detection((1, 2, 3, 4), "person", 0.5)])
+    ((message, blob),) = packed(PictureForm.DEPTH, frame(0, 4), measured, found)
+    assert message["item"]["is"] == "Depth"
+    assert message["item"]["header"]["of"]["stamp"] == 5
+    assert message["item"]["range"] == 3.0
+    assert message["item"]["bytes"] == [len(blob)]
