@@ -201,7 +201,8 @@ class CameraModel:
     """A pinhole camera bolted to a body: intrinsics in pixels, mount in metres and radians.
 
     The optical frame is x right, y down, z forward. `mount` is the camera's place in the body
-    frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive.
+    frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive, `roll`
+    lowers its right side when positive.
     """
 
     width: int
@@ -213,6 +214,7 @@ class CameraModel:
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pitch: float = 0.0
     yaw: float = 0.0
+    roll: float = 0.0
 
     @classmethod
     def from_fov(
@@ -232,7 +234,7 @@ class CameraModel:
     @property
     def body_from_optical(self) -> NDArray[np.float64]:
         """Rotation (3, 3) that takes optical-frame vectors to the body frame."""
-        mounted = rotation_from_rpy(0.0, self.pitch, self.yaw)
+        mounted = rotation_from_rpy(self.roll, self.pitch, self.yaw)
         rotation: NDArray[np.float64] = mounted @ FLU_FROM_OPTICAL
         return rotation
 
