@@ -82,7 +82,8 @@ class SimulatedVehicle:
             if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
                 settings = camera_settings(sensor)
                 self._camera = SimulatedPhotoCamera()
-                self._gimbal = settings.gimbal and SimulatedGimbal(settings.gimbal, settings)
+                if settings.gimbal is not None:
+                    self._gimbal = SimulatedGimbal(settings.gimbal, settings)
                 break
 
     @property
@@ -150,7 +151,7 @@ class SimulatedVehicle:
             exact,
             tuple(self._faults()),
             ended=self._autopilot.ended,
-            gimbal=self._gimbal and self._gimbal.attitude,
+            gimbal=None if self._gimbal is None else self._gimbal.attitude,
         )
 
     def _faults(self) -> list[str]:

@@ -88,7 +88,7 @@ class SimulatedPhotoCamera:
     def expose(self, state: VehicleState) -> None:
         """Take what was asked for, from where the vehicle is now."""
         fix = state.gps
-        place = fix and PhotoPlace(fix.latitude, fix.longitude, fix.altitude)
+        place = None if fix is None else PhotoPlace(fix.latitude, fix.longitude, fix.altitude)
         self._storing += [
             Photo(
                 number,

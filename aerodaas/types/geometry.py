@@ -23,6 +23,7 @@ __all__ = [
     "CameraModel",
     "GeodeticOrigin",
     "Vector",
+    "angles_of_rotation",
     "body_to_enu",
     "enu_to_body",
     "enu_to_ned",
@@ -138,6 +139,25 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
         ]
+    )
+
+
+def angles_of_rotation(
+    rotation: NDArray[np.float64], pole: float = 1e-12
+) -> tuple[float, float, float]:
+    """Roll, pitch and yaw in radians, by which `rotation_from_rpy` gives `rotation` (3, 3).
+
+    Straight up and down roll and yaw are one, and all of it is yaw: where the sine of pitch is
+    within `pole` of one.
+    """
+    sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
+    pitch = math.asin(sine)
+    if abs(sine) >= 1.0 - pole:
+        return 0.0, pitch, math.atan2(-rotation[0, 1], rotation[1, 1])
+    return (
+        math.atan2(rotation[2, 1], rotation[2, 2]),
+        pitch,
+        math.atan2(rotation[1, 0], rotation[0, 0]),
     )
 
 

@@ -9,15 +9,11 @@ horizon while the vehicle tilts; only its yaw turns along.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
+from aerodaas.types.geometry import CameraModel, angles_of_rotation, rotation_from_rpy
 from aerodaas.types.records import fast_pickle
 
 __all__ = [
@@ -153,24 +149,5 @@ def levelled(camera: CameraModel, attitude: GimbalAttitude, vehicle: Odometry) -
     """
     look = rotation_from_rpy(attitude.roll, -attitude.pitch, vehicle.yaw + attitude.yaw)
     body = rotation_from_rpy(vehicle.roll, vehicle.pitch, vehicle.yaw)
-    roll, pitch, yaw = _angles(body.T @ look)
+    roll, pitch, yaw = angles_of_rotation(body.T @ look)
     return replace(camera, roll=roll, pitch=pitch, yaw=yaw)
-
-
-def _angles(rotation: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Roll, pitch and yaw by which `rotation_from_rpy` gives `rotation`.
-
-    Straight up and down, roll and yaw are one; then all of it is yaw.
-    """
-    pitch = math.asin(max(-1.0, min(1.0, -float(rotation[2, 0]))))
-    if abs(rotation[2, 0]) > 1.0 - _POLE:
-        return 0.0, pitch, math.atan2(-rotation[0, 1], rotation[1, 1])
-    return (
-        math.atan2(rotation[2, 1], rotation[2, 2]),
-        pitch,
-        math.atan2(rotation[1, 0], rotation[0, 0]),
-    )
-
-
-_POLE = 1e-12
-"""Nearness of the sine of pitch to one at which roll and yaw cannot be told apart."""

@@ -174,8 +174,9 @@ class Waypoint:
             if angle is not None and abs(angle) > _HALF_TURN:
                 message = f"{owner}: {name} is in radians, from -pi to pi, not {angle}"
                 raise InvalidWaypointError(message)
-        if type(self.photo) is not bool:
-            message = f"{owner}: photo must be True or False, not {self.photo!r}"
+        photo: object = self.photo
+        if not isinstance(photo, bool):
+            message = f"{owner}: photo must be True or False, not {photo!r}"
             raise InvalidWaypointError(message)
 
     def _type_named(self, owner: str) -> WaypointType:
