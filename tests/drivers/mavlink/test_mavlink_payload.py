@@ -10,10 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stepped import Stepped
 
+from aerodaas.config.model import MissionConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure, PhotoOutcome
+from aerodaas.types.status import MissionState
+from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 
@@ -258,3 +267,78 @@ def test_no_attitude_is_anything_but_finite(
     gimbal.take(status(flags, quaternion, device), 0.0, 7, 0.0)
     seen = gimbal.attitude
     assert seen is None or all(map(math.isfinite, (seen.pitch, seen.yaw, seen.roll)))
+
+
+class _Clock:
+    """The mission's clock: that of both ends."""
+
+    def __init__(self, ends: Stepped) -> None:
+        self._ends = ends
+
+    def now(self) -> int:
+        """Nanoseconds."""
+        return round(self._ends.now * 1e9)
+
+
+def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
+    """A whole mission of two pictures; `each` is called at each turn."""
+    clock = _Clock(ends)
+    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
+    mission = Mission(
+        ends.robot.model_copy(update={"mission": MissionConfig(photo_timeout=4.0)}),
+        InlinePlanner(OrderedScheduler()),
+        takeoff=ends.vehicle.read().odometry.position,
+        payload=ends.vehicle,
+    )
+    loop = SetpointLoop(ends.vehicle, mission)
+    stops = [
+        Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
+        Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
+    ]
+    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
+    mission.handle(Start(), clock.now())
+    end = ends.now + 120.0
+    while not mission.finished and ends.now < end:
+        ends.advance(0.05)
+        loop.turn(clock.now())
+        each(mission)
+    return mission
+
+
+def told(mission: Mission) -> list[str]:
+    """What people were told of pictures."""
+    return [alert.text for alert in mission.alerts if alert.kind == "photo"]
+
+
+def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
+    """Each once the gimbal looks there, straight down included."""
+    with ends:
+        mission = fly(ends)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert told(mission) == []
+        first, second = mission.photographer.photos
+        assert first.gimbal is not None
+        assert second.gimbal is not None
+        assert first.gimbal.pitch == pytest.approx(-math.pi / 2, abs=0.06)
+        assert second.gimbal.pitch == pytest.approx(-0.5, abs=0.06)
+        assert second.gimbal.yaw == pytest.approx(0.7, abs=0.06)
+        assert [photo.label for photo in (first, second)] == ["a", "b"]
+
+
+@pytest.mark.parametrize("fault", ["stuck", "nonsense", "blind", "gone", "camera_refuses"])
+def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, fault: str) -> None:
+    """It is told, and the drone flies on, comes home and lands."""
+
+    def strike(mission: Mission) -> None:
+        theirs = carried(ends)
+        if mission.status.visits and fault == "gone":
+            theirs.has_gimbal = theirs.has_camera = False
+        elif mission.status.visits:
+            setattr(theirs, fault, True)
+
+    with ends:
+        mission = fly(ends, strike)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert list(mission.status.visited) == ["a", "b"]
+        assert mission.status.photos == (1, 1)
+        assert any(text.startswith("b: no picture: ") for text in told(mission))
