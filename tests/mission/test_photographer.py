@@ -293,3 +293,18 @@ def test_an_interrupted_stop_has_its_picture_later() -> None:
     made.expect(MissionState.LANDED)
     assert set(made.status.visited) == {"urgent", "north"}
     assert made.status.photos == (1, 0)
+
+
+def test_the_time_out_begins_anew_after_an_interruption() -> None:
+    """A long detour takes nothing from what gimbal and camera get."""
+    vehicle = Surveyor()
+    assert vehicle.gimbal is not None
+    vehicle.gimbal.stuck = True
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made.run_to(MissionState.LOITERING)
+    made.tell(add(Waypoint("urgent", 3, 5, 2, priority=1, hover_duration=5)))
+    made.run(until=lambda: "urgent" in made.status.visited)
+    vehicle.gimbal.stuck = False
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert made.status.photos == (1, 0)
