@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import CameraModel, rotation_from_rpy
@@ -66,3 +67,11 @@ def test_degrees_and_nonsense_are_refused(fields: dict[str, object], said: str) 
     """By the name of the field."""
     with pytest.raises(InvalidWaypointError, match=said):
         Waypoint("a", 0, 0, 2, **fields)  # type: ignore[arg-type]
+
+
+def test_a_mission_document_holds_it() -> None:
+    """The same waypoint comes back, and one without says nothing of it."""
+    waypoint = Waypoint("a", 0, 0, 2, gimbal_pitch=-1.0, gimbal_yaw=0.5, photo=True)
+    entry = WaypointEntry.of(waypoint)
+    assert entry.waypoint() == waypoint
+    assert "photo" not in WaypointEntry.of(Waypoint("a", 0, 0, 2)).model_dump(exclude_defaults=True)
