@@ -18,6 +18,7 @@ from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.payload import Photo
 from aerodaas.types.status import Message
 from aerodaas.types.vitals import Vitals
 
@@ -62,6 +63,7 @@ class RecorderActor(ReaperHost, StreamActor):
     def _open(self) -> None:
         # The application's process imports this module, but does not need the writers.
         from aerodaas.recording.live import LiveServer  # noqa: PLC0415
+        from aerodaas.recording.photo_album import PhotoAlbum, album_folder  # noqa: PLC0415
         from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
 
         environment = self.session.environment
@@ -70,6 +72,7 @@ class RecorderActor(ReaperHost, StreamActor):
         self._live = LiveServer(self._address, name) if self._address else None
         # A restarted actor keeps its predecessor's file and writes a second part.
         self._path = _unwritten(self._path)
+        self._album = PhotoAlbum(album_folder(self._path), environment)
         self._recorder = FlightRecorder(
             self._path,
             config=environment.recording,
@@ -136,6 +139,16 @@ class RecorderActor(ReaperHost, StreamActor):
             self._failure = str(error)
             self.alert("recording_stopped", self._failure)
 
+        if isinstance(message.item, Photo):
+            self._keep(message.stream.partition("/")[0], message.item)
+
+    def _keep(self, robot: str, photo: Photo) -> None:
+        """Keep a picture beside the recording; one that cannot be kept does not end it."""
+        try:
+            self._album.add(robot, photo)
+        except RecordingError as error:
+            self.alert("photo", str(error))
+
     def _note_drops(self) -> None:
         """Record dropped messages immediately, because the run may be killed."""
         assert self.subscriber is not None  # noqa: S101 - set by prepare
@@ -146,6 +159,7 @@ class RecorderActor(ReaperHost, StreamActor):
 
     def _close(self) -> None:
         self._summary = self._recorder.close()
+        self._album.close()
         if self._live is not None:
             self._live.close()
 

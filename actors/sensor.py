@@ -7,7 +7,7 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.stream_names import end_stream
-from aerodaas.cameras.base import Camera, Picture, most_memory
+from aerodaas.cameras.base import Camera, GimballedCamera, Picture, most_memory
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
@@ -53,6 +53,7 @@ class SensorActor(StreamActor):
         if most is not None:
             limit_memory(most)
         self._camera.open()
+        self._gimballed = self._camera if isinstance(self._camera, GimballedCamera) else None
         self._frames = self.publisher(self._stream)
         self._commands = self.publisher(end_stream(self._stream))
 
@@ -78,6 +79,8 @@ class SensorActor(StreamActor):
 
     def _capture(self, stamp: int) -> None:
         vehicle = self._vehicle
+        if self._gimballed is not None and vehicle is not None:
+            self._gimballed.follow_gimbal(vehicle.gimbal)
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
         # Before the frame: mission time may wait for the frame's readers, and then advance.

@@ -12,6 +12,7 @@ __all__ = [
     "end_stream",
     "guest_actor",
     "is_guest_actor",
+    "photo_stream",
     "reply_stream",
     "request_stream",
     "setpoint_stream",
@@ -53,6 +54,11 @@ def reply_stream(node: str) -> str:
 def setpoint_stream(robot: str) -> str:
     """Name of the stream of a robot's requested and sent setpoints."""
     return internal(robot, "setpoints")
+
+
+def photo_stream(robot: str) -> str:
+    """Name of the stream of the pictures that a robot's own camera took."""
+    return internal(robot, "photos")
 
 
 def end_stream(camera: str) -> str:

@@ -266,7 +266,13 @@ def flight(
     planner = planner or InlinePlanner(scheduler or OrderedScheduler())
     takeoff = vehicle.position.copy()
     mission = Mission(
-        robot, planner, takeoff=takeoff, origin=origin, clearance=clearance, sea_level=sea_level
+        robot,
+        planner,
+        takeoff=takeoff,
+        origin=origin,
+        clearance=clearance,
+        sea_level=sea_level,
+        payload=vehicle,
     )
     prepared = Flight(vehicle, mission, SetpointLoop(vehicle, mission))
     for command in (*commands, *([Start()] if start else [])):

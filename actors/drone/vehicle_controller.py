@@ -14,6 +14,7 @@ from aerodaas.actors.drone.planner import PlannerExecutor
 from aerodaas.actors.drone.robot_report import Latencies
 from aerodaas.actors.session import NEVER, Session
 from aerodaas.actors.stream_names import (
+    photo_stream,
     reply_stream,
     request_stream,
     setpoint_stream,
@@ -104,6 +105,8 @@ class VehicleController:
         """Milliseconds from capture to the arrival of the resulting navigation."""
         self._session = session
         self._told = 0
+        self._photographed = 0
+        """How many of the mission's pictures have been published."""
         self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
@@ -135,6 +138,7 @@ class VehicleController:
             obeyed=self.vehicle.capabilities.obeys,
             clearance=GroundClearance.of(environment, robot.limits, takeoff, sea_level),
             sea_level=sea_level,
+            payload=self.vehicle,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()
@@ -169,11 +173,11 @@ class VehicleController:
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
         """Streams that the controller of this robot publishes, except replies."""
-        own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
+        robot = spec.robot.id
         return [
-            *own,
-            setpoint_stream(spec.robot.id),
-            *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+            *(state_stream(robot), status_stream(robot), setpoint_stream(robot)),
+            photo_stream(robot),
+            *(f"{robot}/{sensor.id}" for sensor in spec.sensors),
         ]
 
     def start(self, clock: Clock) -> None:
@@ -243,6 +247,10 @@ class VehicleController:
         self._turned = now
         self._publish(setpoint_stream(self.id), record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
+        photos = self.mission.photographer.photos
+        while self._photographed < len(photos):
+            self._publish(photo_stream(self.id), photos[self._photographed], now)
+            self._photographed += 1
         return record
 
     def _recover(self, error: Exception, now: int) -> SetpointRecord:

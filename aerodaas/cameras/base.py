@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel
+from aerodaas.types.payload import GimbalAttitude
 from aerodaas.types.records import valued
 
-__all__ = ["Camera", "Picture", "most_memory"]
+__all__ = ["Camera", "GimballedCamera", "Picture", "most_memory"]
 
 
 @valued
@@ -74,6 +75,15 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Release the source."""
+        ...
+
+
+@runtime_checkable
+class GimballedCamera(Camera, Protocol):
+    """A camera whose view the vehicle's gimbal turns."""
+
+    def follow_gimbal(self, attitude: GimbalAttitude | None) -> None:
+        """Look as the gimbal does at the next image; None: as mounted."""
         ...
 
 

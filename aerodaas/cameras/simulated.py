@@ -13,6 +13,7 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import CameraModel
+from aerodaas.types.payload import GimbalAttitude, levelled
 
 if TYPE_CHECKING:
     from aerodaas.simulation.renderer import Renderer
@@ -21,7 +22,7 @@ __all__ = ["SimulatedCamera"]
 
 
 class SimulatedCamera:
-    """A pinhole camera in the simulated world; implements `aerodaas.cameras.base.Camera`.
+    """A pinhole camera in the simulated world: a `aerodaas.cameras.base.GimballedCamera`.
 
     Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
     environment's world is invalid.
@@ -34,7 +35,7 @@ class SimulatedCamera:
         config = camera_settings(sensor)
         self._name = sensor.id
         self._world = World.load(environment.simulation)
-        self._model = CameraModel.from_fov(
+        self._mounted = self._model = CameraModel.from_fov(
             config.width,
             config.height,
             math.radians(config.horizontal_fov),
@@ -42,12 +43,13 @@ class SimulatedCamera:
             pitch=math.radians(config.pitch),
             yaw=math.radians(config.yaw),
         )
+        self._gimbal: GimbalAttitude | None = None
         self._depth_range = config.depth_range
         self._renderer: Renderer | None = None
 
     @property
     def model(self) -> CameraModel:
-        """Calibration and mount."""
+        """Calibration and mount; on a gimbal, as it held the camera at the newest image."""
         return self._model
 
     @property
@@ -68,6 +70,10 @@ class SimulatedCamera:
 
             self._renderer = renderer_for(self._world, self._model, self._depth_range)
 
+    def follow_gimbal(self, attitude: GimbalAttitude | None) -> None:
+        """Look as the gimbal does at the next image."""
+        self._gimbal = attitude
+
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Render at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
 
@@ -77,6 +83,9 @@ class SimulatedCamera:
             raise SourceError(f"{self._name} is not open; call open first")
         if pose is None:
             return None
+        if self._gimbal is not None:
+            self._model = levelled(self._mounted, self._gimbal, pose)
+            self._renderer.turn(self._model)
         image = self._renderer.render(seconds(stamp), pose)
         return Picture(image, stamp, depth=self._renderer.depth())
 

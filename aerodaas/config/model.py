@@ -21,6 +21,7 @@ from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.robot import (
     CameraConfig,
     GeofenceConfig,
+    GimbalConfig,
     LimitsConfig,
     MissionConfig,
     RobotConfig,
@@ -36,6 +37,7 @@ __all__ = [
     "EndpointConfig",
     "EnvironmentConfig",
     "GeofenceConfig",
+    "GimbalConfig",
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",

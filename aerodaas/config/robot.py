@@ -15,6 +15,7 @@ from aerodaas.types.identifiers import Identifier
 __all__ = [
     "CameraConfig",
     "GeofenceConfig",
+    "GimbalConfig",
     "LimitsConfig",
     "MissionConfig",
     "RobotConfig",
@@ -117,6 +118,8 @@ class MissionConfig(Strict):
     """Wait for a scheduler's first plan before flying the order given."""
     stall_timeout: Positive = 60.0
     """A waypoint that comes no nearer for so long is given up."""
+    photo_timeout: Positive = 10.0
+    """Seconds that gimbal and camera get at a waypoint; then the drone flies on without them."""
 
 
 class SensorConfig(Strict):
@@ -148,6 +151,18 @@ class SensorConfig(Strict):
         return sensor
 
 
+class GimbalConfig(Strict):
+    """The gimbal of a simulated camera, which keeps it to the horizon."""
+
+    max_rate: Positive = 60.0
+    """Degrees per second at which it turns."""
+    lowest: Annotated[float, Field(ge=-180, le=0)] = -90.0
+    """Degrees of pitch, negative downwards."""
+    highest: Annotated[float, Field(ge=0, le=180)] = 30.0
+    widest: Annotated[float, Field(ge=0, le=180)] = 180.0
+    """Degrees of yaw to either side."""
+
+
 class CameraConfig(Strict):
     """The settings of a camera, from `SensorConfig.settings`."""
 
@@ -163,6 +178,9 @@ class CameraConfig(Strict):
     """Degrees to the left."""
     depth_range: Annotated[float, Field(ge=3, le=60)] | None = None
     """Metres up to which a simulated camera measures depth as well; None: it measures none."""
+    gimbal: GimbalConfig | None = None
+    """The gimbal that a simulated camera hangs from, pitched and turned as above at first; None:
+    it is bolted to the body."""
     path: SecretUrl | None = None
     """Folder of pictures, video file or URL, for the drivers that read one. User, password and
     parameters of a URL are shown, logged and recorded nowhere."""

@@ -36,6 +36,7 @@ __all__ = [
 ]
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
+_HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
@@ -95,6 +96,11 @@ class WaypointEntry(BaseModel):
     deadline: _Number | None = None
     above: Literal["home", "sea", "ground"] | None = None
     """What z is counted from; None: as `waypoint_type` says."""
+    gimbal_pitch: _HalfTurn | None = None
+    """Negative looks down."""
+    gimbal_yaw: _HalfTurn | None = None
+    """From the nose, counter-clockwise."""
+    photo: bool = False
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from aerodaas.cameras.settings import camera_settings
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite
@@ -16,6 +17,7 @@ from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
 from aerodaas.simulation.noise import SensorNoise
+from aerodaas.simulation.payload import SimulatedGimbal, SimulatedPhotoCamera
 from aerodaas.simulation.wind import Wind
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
@@ -36,7 +38,7 @@ _EXACT = SensorNoise(0.0, "")
 
 
 class SimulatedVehicle:
-    """A quadrotor in the embedded simulator; implements `aerodaas.types.vehicle.SteppedVehicle`.
+    """A quadrotor in the embedded simulator: a `SteppedVehicle` and a `PayloadVehicle`.
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.
@@ -74,6 +76,25 @@ class SimulatedVehicle:
         self._now = 0
         self._steps = 0
         self._connected = False
+        self._camera: SimulatedPhotoCamera | None = None
+        self._gimbal: SimulatedGimbal | None = None
+        for sensor in robot.sensors:
+            if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
+                settings = camera_settings(sensor)
+                self._camera = SimulatedPhotoCamera()
+                if settings.gimbal is not None:
+                    self._gimbal = SimulatedGimbal(settings.gimbal, settings)
+                break
+
+    @property
+    def gimbal(self) -> SimulatedGimbal | None:
+        """The gimbal of its first camera; None if that is bolted to the body."""
+        return self._gimbal
+
+    @property
+    def photo_camera(self) -> SimulatedPhotoCamera | None:
+        """Its first camera; None without one."""
+        return self._camera
 
     @property
     def capabilities(self) -> Capabilities:
@@ -108,6 +129,12 @@ class SimulatedVehicle:
         for _ in range(stamp // STEP_NS - self._steps):
             step()
         self._steps = stamp // STEP_NS
+        if self._gimbal is not None:
+            self._gimbal.advance_to(stamp)
+        if self._camera is not None:
+            self._camera.advance_to(stamp)
+            if self._camera.waits and self._connected:
+                self._camera.expose(self.read())
 
     def read(self) -> VehicleState:
         """Return the state at the time last advanced to."""
@@ -124,6 +151,7 @@ class SimulatedVehicle:
             exact,
             tuple(self._faults()),
             ended=self._autopilot.ended,
+            gimbal=None if self._gimbal is None else self._gimbal.attitude,
         )
 
     def _faults(self) -> list[str]:

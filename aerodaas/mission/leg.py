@@ -8,10 +8,11 @@ import math
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length, wrap_angle
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.types.geometry import Vector, body_to_enu, length, wrap_angle
+from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.types.waypoints import VelocityCommand
 
-__all__ = ["Leg", "LegPhase", "setpoint_towards"]
+__all__ = ["Leg", "LegPhase", "setpoint_towards", "velocity_setpoint"]
 
 _TURNING_DISTANCE = 1.0
 """Metres from a place within which the direction to it no longer defines the yaw."""
@@ -39,6 +40,12 @@ def setpoint_towards(
     if yaw is None and math.hypot(way[0], way[1]) > _TURNING_DISTANCE:
         yaw = math.atan2(way[1], way[0])
     return PositionSetpoint(place, yaw, speed)
+
+
+def velocity_setpoint(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
+    """Return a velocity command in the local frame, by the drone's yaw."""
+    velocity = body_to_enu(command.velocity, state.odometry.yaw)
+    return VelocitySetpoint(velocity, command.yaw_rate, command.evasive)
 
 
 class Leg:

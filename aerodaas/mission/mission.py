@@ -34,10 +34,11 @@ from aerodaas.mission.commands import (
     TakeControls,
 )
 from aerodaas.mission.forecast import BatteryForecast
-from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards
+from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, velocity_setpoint
 from aerodaas.mission.log import MissionLog, subject
 from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
+from aerodaas.mission.photographer import Photographer
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
@@ -52,10 +53,10 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert
 from aerodaas.types.energy import EnergyMeter, EnergyModel
 from aerodaas.types.errors import failure_line
-from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
+from aerodaas.types.geometry import GeodeticOrigin, Vector
 from aerodaas.types.status import RECENT, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import HeightDatum, VelocityCommand
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import HeightDatum
 
 __all__ = ["Mission"]
 
@@ -90,13 +91,14 @@ class Mission:
         obeyed: bool = True,
         clearance: GroundClearance | None = None,
         sea_level: float | None = None,
+        payload: object = None,
     ) -> None:
         """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
 
         `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. `obeyed` is False
         for a recorded vehicle, which lands when it landed in the recording. `clearance` is kept
-        above the ground; the local frame's zero lies `sea_level` metres above the sea. Raises
-        ConfigError for an invalid geofence.
+        above the ground; the local frame's zero lies `sea_level` metres above the sea; `payload` is
+        the `PayloadVehicle` that takes pictures. Raises ConfigError for an invalid geofence.
         """
         self.limits = limits = robot.limits
         self.preflight = robot.preflight
@@ -107,6 +109,7 @@ class Mission:
         self._obeyed = obeyed
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
+        self.photographer = Photographer(payload, self._log, robot.mission.photo_timeout)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -173,6 +176,7 @@ class Mission:
             self._log.waypoint_counts(stop.id for stop in stops),
             self._manual.operator(self._now),
             self._forecast.outlook(self._now),
+            (len(self.photographer.photos), self.photographer.lost),
         )
 
     def handle(self, command: Command, now: int) -> Answer:
@@ -315,6 +319,7 @@ class Mission:
     def _observe(self, state: VehicleState, now: int) -> None:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
+        self.photographer.look(now)
         last, self._last = self._last, state
         on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
         if last is None or on_ground or not has_position(last):
@@ -438,7 +443,7 @@ class Mission:
         if velocity is None or self._assessment.demand is FailsafeAction.HOLD:
             return self._hover(state)
         self._leg = self._anchor = None
-        return Fly(_flown(velocity, state))
+        return Fly(velocity_setpoint(velocity, state))
 
     def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
         if self._awaits_plan(stop):
@@ -453,6 +458,8 @@ class Mission:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
+        if self.photographer.attend(stop, self._now) and phase is LegPhase.DONE:
+            phase = LegPhase.HOVERING
         place = self._route.towards(stop.waypoint.position, position, stop.above_ground)
         if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
             self._finish(stop, phase)
@@ -498,7 +505,7 @@ class Mission:
             return self._hover(state)
         self._to(MissionState.DIVERTED if waiting else MissionState.FOLLOWING, "following commands")
         self._anchor = None
-        return Fly(_flown(live.command, state), live.cause)
+        return Fly(velocity_setpoint(live.command, state), live.cause)
 
     def _idle(self, state: VehicleState) -> Action:
         options, limits = self._options, self.limits
@@ -552,8 +559,7 @@ class Mission:
             return Land()
         return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
 
-    def _land(self, state: VehicleState) -> Action:
-        del state
+    def _land(self, _: VehicleState) -> Action:
         self._leg = None
         return Land()
 
@@ -591,9 +597,3 @@ class Mission:
 
     def _to(self, state: MissionState, reason: str = "") -> None:
         self._machine.to(state, self._now, reason)
-
-
-def _flown(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
-    """A velocity command in the local frame, by the drone's yaw."""
-    velocity = body_to_enu(command.velocity, state.odometry.yaw)
-    return VelocitySetpoint(velocity, command.yaw_rate, command.evasive)

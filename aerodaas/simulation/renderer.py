@@ -102,6 +102,10 @@ class Renderer:
         buffer.make_display_region().set_camera(eye)
         return pixels
 
+    def turn(self, camera: CameraModel) -> None:
+        """Turn the camera as `camera` is mounted, whose lens is the same."""
+        self._camera, self._optical = camera, camera.body_from_optical
+
     def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
         """Render (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)

@@ -23,6 +23,7 @@ __all__ = [
     "CameraModel",
     "GeodeticOrigin",
     "Vector",
+    "angles_of_rotation",
     "body_to_enu",
     "enu_to_body",
     "enu_to_ned",
@@ -141,6 +142,25 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float
     )
 
 
+def angles_of_rotation(
+    rotation: NDArray[np.float64], pole: float = 1e-12
+) -> tuple[float, float, float]:
+    """Roll, pitch and yaw in radians, by which `rotation_from_rpy` gives `rotation` (3, 3).
+
+    Straight up and down roll and yaw are one, and all of it is yaw: where the sine of pitch is
+    within `pole` of one.
+    """
+    sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
+    pitch = math.asin(sine)
+    if abs(sine) >= 1.0 - pole:
+        return 0.0, pitch, math.atan2(-rotation[0, 1], rotation[1, 1])
+    return (
+        math.atan2(rotation[2, 1], rotation[2, 2]),
+        pitch,
+        math.atan2(rotation[1, 0], rotation[0, 0]),
+    )
+
+
 @dataclass(frozen=True)
 class GeodeticOrigin:
     """Where the local ENU frame is pinned on the WGS84 ellipsoid: degrees and metres."""
@@ -201,7 +221,8 @@ class CameraModel:
     """A pinhole camera bolted to a body: intrinsics in pixels, mount in metres and radians.
 
     The optical frame is x right, y down, z forward. `mount` is the camera's place in the body
-    frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive.
+    frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive, `roll`
+    lowers its right side when positive.
     """
 
     width: int
@@ -213,6 +234,7 @@ class CameraModel:
     mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pitch: float = 0.0
     yaw: float = 0.0
+    roll: float = 0.0
 
     @classmethod
     def from_fov(
@@ -232,7 +254,7 @@ class CameraModel:
     @property
     def body_from_optical(self) -> NDArray[np.float64]:
         """Rotation (3, 3) that takes optical-frame vectors to the body frame."""
-        mounted = rotation_from_rpy(0.0, self.pitch, self.yaw)
+        mounted = rotation_from_rpy(self.roll, self.pitch, self.yaw)
         rotation: NDArray[np.float64] = mounted @ FLU_FROM_OPTICAL
         return rotation
 

@@ -100,6 +100,8 @@ class MissionStatus:
     outlook: BatteryOutlook | None = None
     """Forecast before take-off, on the way through the plan, and while paused; None 2 s after that,
     and where charge or place is not known."""
+    photos: tuple[int, int] = (0, 0)
+    """How many pictures were taken, and how many that waypoints asked for were not."""
 
     @property
     def progress(self) -> float:

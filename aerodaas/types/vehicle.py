@@ -13,12 +13,14 @@ from typing import Protocol, TypeAlias, runtime_checkable
 from aerodaas.types.clock import Clock
 from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.geometry import Vector
+from aerodaas.types.payload import Gimbal, GimbalAttitude, PhotoCamera
 from aerodaas.types.records import fast_pickle
 
 __all__ = [
     "Capabilities",
     "ClockedVehicle",
     "FlightEnd",
+    "PayloadVehicle",
     "PlayedVehicle",
     "PositionSetpoint",
     "SeaLevelVehicle",
@@ -124,6 +126,8 @@ class VehicleState:
     """Further figures by name in SI units, such as temperature or link quality."""
     ended: FlightEnd | None = None
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
+    gimbal: GimbalAttitude | None = None
+    """Where its gimbal looks; None without one, and where it does not say."""
 
 
 @runtime_checkable
@@ -197,6 +201,24 @@ class SeaLevelVehicle(Vehicle, Protocol):
     @property
     def sea_level(self) -> float | None:
         """Metres above mean sea level of our frame's zero; None if it is not known (yet)."""
+        ...
+
+
+@runtime_checkable
+class PayloadVehicle(Vehicle, Protocol):
+    """A vehicle that may carry a gimbal and a camera for pictures.
+
+    Both may be found late and vanish in flight, so they are asked for each time.
+    """
+
+    @property
+    def gimbal(self) -> Gimbal | None:
+        """Its gimbal; None if there is none, none yet, or none any more."""
+        ...
+
+    @property
+    def photo_camera(self) -> PhotoCamera | None:
+        """Its camera; None if there is none, none yet, or none any more."""
         ...
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.payload import GimbalTarget
 from aerodaas.types.records import fast_pickle, shared_pickle
 
 __all__ = [
@@ -84,6 +85,8 @@ class SchedulingType(str, enum.Enum):
     UNORDERED = "unordered"
 
 
+_HALF_TURN = 3.1416
+"""Radians: pi, and the rounding of who writes it by hand."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
 
@@ -133,6 +136,15 @@ class Waypoint:
     """Seconds of mission time by which to arrive; None for no deadline."""
     above: HeightReference | str | None = None
     """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
+    gimbal_pitch: float | None = None
+    """Radians to which the gimbal is turned on the way there, 0 at the horizon, negative
+    downwards: -pi/2 looks straight down. None leaves it as it is, or level where `gimbal_yaw` is
+    given."""
+    gimbal_yaw: float | None = None
+    """Radians from the nose, counter-clockwise; None leaves it as it is, or ahead where
+    `gimbal_pitch` is given."""
+    photo: bool = False
+    """Whether a picture is taken there, once the gimbal looks where it is to."""
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -149,11 +161,22 @@ class Waypoint:
         if self.speed is not None and self.speed <= 0:
             message = f"{owner}: speed must be positive, not {self.speed}"
             raise InvalidWaypointError(message)
+        self._check_camera(owner)
         north_pole, date_line = 90.0, 180.0
         if self.waypoint_type in _ON_THE_GLOBE and (
             abs(self.x) > north_pole or abs(self.y) > date_line
         ):
             message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
+            raise InvalidWaypointError(message)
+
+    def _check_camera(self, owner: str) -> None:
+        for name, angle in (("gimbal_pitch", self.gimbal_pitch), ("gimbal_yaw", self.gimbal_yaw)):
+            if angle is not None and abs(angle) > _HALF_TURN:
+                message = f"{owner}: {name} is in radians, from -pi to pi, not {angle}"
+                raise InvalidWaypointError(message)
+        photo: object = self.photo
+        if not isinstance(photo, bool):
+            message = f"{owner}: photo must be True or False, not {photo!r}"
             raise InvalidWaypointError(message)
 
     def _type_named(self, owner: str) -> WaypointType:
@@ -227,6 +250,13 @@ class Waypoint:
         return ground + self.z
 
     @property
+    def gimbal(self) -> GimbalTarget | None:
+        """Where the gimbal is to look; None to leave it as it is."""
+        if self.gimbal_pitch is None and self.gimbal_yaw is None:
+            return None
+        return GimbalTarget(self.gimbal_pitch or 0.0, self.gimbal_yaw or 0.0)
+
+    @property
     def position(self) -> Vector:
         """x, y and z as an array of shape (3,)."""
         return np.array([self.x, self.y, self.z], dtype=np.float64)
@@ -235,7 +265,11 @@ class Waypoint:
 _NUMBERS = tuple(
     field.name
     for field in fields(Waypoint)
-    if field.name in {"x", "y", "z", "hover_duration", "yaw", "speed", "deadline"}
+    if field.name
+    in {
+        *("x", "y", "z", "hover_duration", "yaw", "speed", "deadline"),
+        *("gimbal_pitch", "gimbal_yaw"),
+    }
 )
 
 

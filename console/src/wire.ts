@@ -232,8 +232,11 @@ export interface NavigationIn {
 export interface WaypointEntry {
   above?: ("home" | "sea" | "ground") | null;
   deadline?: number | null;
+  gimbal_pitch?: number | null;
+  gimbal_yaw?: number | null;
   hover_duration?: number;
   id: string;
+  photo?: boolean;
   priority?: number;
   speed?: number | null;
   waypoint_type?: "relative" | "local" | "global" | "global_relative";

@@ -16,6 +16,7 @@ from aerodaas.types.vehicle import VehicleMode
 from tools.mavlink_vehicle.extras import Extras
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
+from tools.mavlink_vehicle.payload import EmulatedPayload
 from tools.mavlink_vehicle.route import Route
 from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
 
@@ -92,6 +93,7 @@ class Firmware(ABC):
         self._drifted = np.zeros(3)
         self._say = say
         self._extras = Extras(self)
+        self.payload = EmulatedPayload(self, say)
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False
@@ -193,7 +195,8 @@ class Firmware(ABC):
         if number == mavlink.MAV_CMD_RUN_PREARM_CHECKS:
             self.refuse_arming()
             return _OK
-        return self.command(number, values, frame)
+        carried = self.payload.obey(number, values)
+        return self.command(number, values, frame) if carried is None else carried
 
     def _request(self, message: int) -> Result:
         if message == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
@@ -308,6 +311,7 @@ class Firmware(ABC):
     def advance(self, duration: float) -> None:
         """Let time pass."""
         self.now += duration
+        self.payload.advance()
         self.route.advance()
         self.flight.advance(duration)
         if self._lifted and not self.flight.flying:
@@ -376,7 +380,9 @@ class Firmware(ABC):
         }
         if number in needs_place and not self.ready:
             return None
-        return makers[number]() if number in makers else self._extras.message(number)
+        if number in makers:
+            return makers[number]()
+        return self._extras.message(number) or self.payload.message(number)
 
     @property
     def _boot(self) -> int:

@@ -40,6 +40,10 @@ class AutopilotOptions:
     """Sign by this key, and refuse what is not signed."""
     parameters: dict[str, float] = field(default_factory=dict)
     """Other values than the family's own."""
+    gimbal: bool = False
+    """Whether it carries a gimbal, and is its manager."""
+    camera: bool = False
+    """Whether it carries a camera."""
     uplink: Impairment = field(default_factory=Impairment)
     """On the way to the vehicle."""
     downlink: Impairment = field(default_factory=Impairment)

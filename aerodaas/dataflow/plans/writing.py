@@ -129,6 +129,7 @@ def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
     for what, named in (
         ("priorities", [w.id for w in waypoints if w.priority != DEFAULT_PRIORITY]),
         ("deadlines", [w.id for w in waypoints if w.deadline is not None]),
+        ("pictures", [w.id for w in waypoints if w.photo or w.gimbal is not None]),
     ):
         if named:
             yield Notice(

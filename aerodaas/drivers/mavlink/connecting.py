@@ -58,6 +58,20 @@ class Connection:
     target: tuple[int, int]
     """System and component."""
 
+    def put_back(self, name: str, *, stands: bool) -> None:
+        """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
+        if not stands:
+            _log.warning(
+                "%s: still in flight, so that its fallback stays set; the next flight, or "
+                "`python -m aerodaas.drivers.mavlink URL --restore`, puts its own parameters back",
+                name,
+            )
+            return
+        try:
+            self.fallback.restore()
+        except VehicleError as error:
+            _log.warning("%s: its own parameters are not back: %s", name, error)
+
 
 def require_answer(commander: Commander, name: str, pause: Callable[[], None]) -> None:
     """Wait for the first answer of a vehicle that signs, while we have no key.

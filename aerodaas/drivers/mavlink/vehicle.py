@@ -22,6 +22,7 @@ from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
 from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
+from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
@@ -38,6 +39,7 @@ from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import Vector
 from aerodaas.types.health import HealthReadings
+from aerodaas.types.payload import Gimbal, PhotoCamera
 from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
@@ -60,7 +62,7 @@ _STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
 class MavlinkVehicle:
-    """One multicopter with PX4 or ArduPilot; implements `aerodaas.types.vehicle.ClockedVehicle`.
+    """One multicopter with PX4 or ArduPilot; a `ClockedVehicle` and a `PayloadVehicle`.
 
     One thread at a time may use it, except the link's own. Raises ConfigError for unknown settings.
     """
@@ -96,6 +98,7 @@ class MavlinkVehicle:
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
+        self._payload = Payload(self._clock, self._lock)
         self._climb_place: Vector | None = None
         self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
@@ -114,7 +117,7 @@ class MavlinkVehicle:
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
-        self._clock = clock
+        self._clock = self._payload.clock = clock
         self._watchdog.belong()
 
     def connect(self, timeout: float = 10.0) -> None:
@@ -169,6 +172,7 @@ class MavlinkVehicle:
             )
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
+            self._payload.search(commander)
         except BaseException:
             self.close()
             raise
@@ -191,7 +195,8 @@ class MavlinkVehicle:
             return
         if self._connection is not None:
             self._part(self._connection)
-            self._put_back(self._connection)
+            if self._settings.fallback == "set" and not self._settings.observe:
+                self._connection.put_back(self._name, stands=self._stands())
         link.close()
         self._connection = None
         self._log()
@@ -211,22 +216,6 @@ class MavlinkVehicle:
                 return
             self._pause()
 
-    def _put_back(self, connection: Connection) -> None:
-        """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
-        if self._settings.fallback != "set" or self._settings.observe:
-            return
-        if not self._stands():
-            _log.warning(
-                "%s: still in flight, so that its fallback stays set; the next flight, or "
-                "`python -m aerodaas.drivers.mavlink URL --restore`, puts its own parameters back",
-                self._name,
-            )
-            return
-        try:
-            connection.fallback.restore()
-        except VehicleError as error:
-            _log.warning("%s: its own parameters are not back: %s", self._name, error)
-
     def _ours_in_the_air(self) -> bool:
         phase = self._phase
         landing = phase.wish in {FlightMode.RETURN, FlightMode.LAND}
@@ -244,7 +233,18 @@ class MavlinkVehicle:
         self._watchdog.feed()
         with self._lock:
             link, now = self._connected().link, time.monotonic()
-            return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
+            state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
+            return self._payload.complete(state)
+
+    @property
+    def gimbal(self) -> Gimbal | None:
+        """The gimbal that it carries, once it is found."""
+        return self._payload.gimbal
+
+    @property
+    def photo_camera(self) -> PhotoCamera | None:
+        """The camera that it carries, once it is found."""
+        return self._payload.camera
 
     @property
     def sea_level(self) -> float | None:
@@ -467,6 +467,8 @@ class MavlinkVehicle:
                 self._commander.take(message, now)
             elif kind == "HEARTBEAT":
                 self._observe(now)
+            elif kind in Payload.messages:
+                self._payload.take(message, now)
             else:
                 self._moved(kind, now)
 
@@ -517,6 +519,7 @@ class MavlinkVehicle:
             self._commander.turn(now)
             self._rates.turn(self._telemetry, now)
             self._touchdown.turn(now)
+            self._payload.turn(now)
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
@@ -539,7 +542,7 @@ class MavlinkVehicle:
         if goal is None or frame is None or not able:
             return
         done = phase.seen and phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
-        near = self._touchdown.flew and goal - self._up() < _SHORT
+        near = self._touchdown.flew and goal - self._telemetry.up < _SHORT
         if not ((done and near) or phase.wish is FlightMode.GUIDED):
             return
         if self._climb_place is None:
@@ -547,11 +550,6 @@ class MavlinkVehicle:
         top = frame.position(np.array([0.0, 0.0, -goal]))[2]
         place = np.array([*self._climb_place[:2], top])
         self._steer(PositionSetpoint(place, None, self._steering.climb_rate), connection, now)
-
-    def _up(self) -> float:
-        """Metres above the autopilot's own origin."""
-        position = self._telemetry.position
-        return -math.inf if position is None else -float(position[2])
 
     def _mind_the_loop(self, now: float) -> None:
         """Hold if the control loop hangs; return home if it does not recover.

@@ -32,6 +32,7 @@ MISSION = json_schema(
     progress="number",
     faults="array",
     outlook={},
+    photos="array",
 )
 NAVIGATION = json_schema(
     "Navigation",
@@ -71,6 +72,7 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
         "progress": item.progress,
         "faults": item.faults,
         "outlook": item.outlook,
+        "photos": item.photos,
     }
     yield Entry(topic(stream, "mission"), MISSION, json_bytes(value), item.stamp)
     if session.changed("state", stream, item.state):

@@ -18,6 +18,7 @@ from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.payload import Photo
 from aerodaas.types.status import Message, SetpointRecord
 from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
@@ -45,6 +46,17 @@ BATTERY = json_schema(
     fraction="number",
     voltage="number",
     current="number",
+)
+PHOTO = json_schema(
+    "Photo",
+    stamp="integer",
+    robot="string",
+    number={},
+    label="string",
+    place={},
+    odometry={},
+    gimbal={},
+    file="string",
 )
 SETPOINT = json_schema(
     "Setpoint",
@@ -97,6 +109,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
     }
     if item.gps is not None:
         state["gps"] = item.gps
+    if item.gimbal is not None:
+        state["gimbal"] = item.gimbal
     if item.truth is not None:
         state["truth"] = odometry_json(item.truth)
     yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)
@@ -123,6 +137,23 @@ def battery(item: Battery, message: Message[Any], session: Session) -> Iterator[
     header = message.header
     value = {"stamp": header.stamp, "source": header.source, **_battery_json(item)}
     yield Entry(topic(message.stream, "battery"), BATTERY, json_bytes(value))
+
+
+@convert.register
+def photo(item: Photo, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write what is known of a picture that the vehicle's own camera took."""
+    del session
+    value = {
+        "stamp": item.stamp,
+        "robot": (message.header.source or message.stream).partition("/")[0],
+        "number": item.number,
+        "label": item.label,
+        "place": item.place,
+        "odometry": item.odometry and odometry_json(item.odometry),
+        "gimbal": item.gimbal,
+        "file": item.file,
+    }
+    yield Entry(topic(message.stream, "photos"), PHOTO, json_bytes(value), item.stamp)
 
 
 @convert.register

@@ -51,7 +51,7 @@ class Handmade:
         self._ear = mavlink.MAVLink(None, 9, 9)
         self._inbox: list[tuple[bytes, tuple[str, int]]] = []
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda _: self.advance())
-        for module in ("vehicle", "connecting", "control.watchdog"):
+        for module in ("vehicle", "connecting", "control.watchdog", "microservices.payload"):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 
@@ -165,5 +165,6 @@ class Handmade:
         return [
             one.command
             for one in self.told("COMMAND_LONG", "COMMAND_INT")
-            if one.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+            if one.command
+            not in {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
         ]

@@ -40,7 +40,7 @@ class Stepped:
         """Connect; `options` of the autopilot, `settings` of the driver."""
         self.now = 1000.0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.advance)
-        for module in ("vehicle", "connecting", "control.watchdog"):
+        for module in ("vehicle", "connecting", "control.watchdog", "microservices.payload"):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 

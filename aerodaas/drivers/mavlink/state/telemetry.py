@@ -132,6 +132,11 @@ class Telemetry:
         fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
         return fresh and not self.health.lost(now)
 
+    @property
+    def up(self) -> float:
+        """Metres above the autopilot's own origin; minus infinity while that is not known."""
+        return -math.inf if self.position is None else -float(self.position[2])
+
     def whereabouts(self) -> tuple[tuple[float, float], Vector]:
         """Latitude and longitude (degrees), and local position (NED metres).
 

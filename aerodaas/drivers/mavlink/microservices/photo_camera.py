@@ -1,0 +1,126 @@
+"""A camera by the camera protocol v2: one picture after the other, each until it is told.
+
+That a picture was taken is told by CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with
+the place that the autopilot had at its exposure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from aerodaas.drivers.mavlink.microservices.commander import (
+    Commander,
+    CommandResult,
+    PendingCommand,
+)
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.types.data import Odometry
+from aerodaas.types.payload import GimbalAttitude, Photo, PhotoFailure, PhotoOutcome, PhotoPlace
+
+__all__ = ["MavlinkCamera"]
+
+_PATIENCE = 8.0
+"""Seconds from a request to the word of its picture."""
+_MOST = 64
+"""Outcomes kept for who does not ask for them."""
+
+
+@dataclass(slots=True)
+class _Request:
+    number: int
+    label: str
+    deadline: float
+
+
+class MavlinkCamera:
+    """One camera; implements `aerodaas.types.payload.PhotoCamera`. The caller locks."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        moment: Callable[[], tuple[int, Odometry | None, GimbalAttitude | None]],
+    ) -> None:
+        """Command it by `commander`; `moment` is mission clock, vehicle and gimbal now."""
+        self._commander = commander
+        self._moment = moment
+        self._taken = 0
+        self._request: _Request | None = None
+        self._newest: int | None = None
+        self._outcomes: deque[PhotoOutcome] = deque(maxlen=_MOST)
+
+    def take_photo(self, label: str, now: float) -> int:
+        """Ask for one picture; one that is still awaited is given up."""
+        if self._request is not None:
+            self._fail(self._request, "another picture was asked for before it came")
+        self._taken += 1
+        number = self._taken
+        self._request = _Request(number, label, now + _PATIENCE)
+
+        def done(outcome: CommandResult) -> None:
+            request = self._request
+            if not outcome.accepted and request is not None and request.number == number:
+                self._fail(request, f"the camera: {outcome.text}")
+
+        self._commander.give(
+            PendingCommand(
+                mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+                (0.0, 0.0, 1.0, float(number), 0.0, 0.0, 0.0),
+                "take a picture",
+            ),
+            done,
+            now=now,
+        )
+        return number
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """What became of pictures since the last call."""
+        found = list(self._outcomes)
+        self._outcomes.clear()
+        return found
+
+    def turn(self, now: float) -> None:
+        """Give up a picture that is not told."""
+        if self._request is not None and now >= self._request.deadline:
+            self._fail(self._request, "the camera does not tell of the picture")
+
+    def _fail(self, request: _Request, reason: str) -> None:
+        self._request = None
+        self._outcomes.append(PhotoFailure(request.number, reason))
+
+    def take(self, message: Message) -> None:
+        """Process a CAMERA_IMAGE_CAPTURED or a CAMERA_FEEDBACK."""
+        told = message.get_type() == "CAMERA_IMAGE_CAPTURED"
+        index = int(message.image_index if told else message.img_idx)
+        if index == self._newest:
+            return
+        self._newest = index
+        request = self._request
+        if told and message.capture_result != 1:
+            if request is not None:
+                self._fail(request, "the camera failed to take it")
+            return
+        self._request = None
+        if told:
+            place = _place(message.lat, message.lon, message.alt / 1e3)
+            file = str(message.file_url)
+        else:
+            place, file = _place(message.lat, message.lng, message.alt_msl), ""
+        stamp, odometry, gimbal = self._moment()
+        number = None if request is None else request.number
+        label = "" if request is None else request.label
+        name = file or f"picture {index}"
+        self._outcomes.append(Photo(number, stamp, label, place, odometry, gimbal, None, name))
+
+
+def _place(latitude: float, longitude: float, altitude: float) -> PhotoPlace | None:
+    """A place in 1e-7 degrees; None where the camera had none, which says zero or nonsense."""
+    known = (latitude or longitude) and math.isfinite(altitude)
+    north_pole, date_line = 90.0, 180.0
+    lat, lon = latitude / 1e7, longitude / 1e7
+    if not known or abs(lat) > north_pole or abs(lon) > date_line:
+        return None
+    return PhotoPlace(lat, lon, float(altitude), "sea")

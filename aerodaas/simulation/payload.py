@@ -1,0 +1,104 @@
+"""Gimbal and camera of a simulated drone, in its own steps of time.
+
+The camera takes no pixels: a picture is rendered by whoever keeps it, from what the `Photo` says of
+the moment of its exposure. So the drone's loop never waits for a renderer, and a picture does not
+depend on how fast the machine is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from aerodaas.config.model import CameraConfig, GimbalConfig
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.payload import GimbalAttitude, GimbalTarget, Photo, PhotoOutcome, PhotoPlace
+from aerodaas.types.vehicle import VehicleState
+
+__all__ = ["SimulatedGimbal", "SimulatedPhotoCamera"]
+
+_STORING = NANOSECONDS // 2
+"""Nanoseconds from exposure until the camera says that it has the picture."""
+
+
+class SimulatedGimbal:
+    """A gimbal that turns at a limited rate; implements `aerodaas.types.payload.Gimbal`."""
+
+    fault = ""
+
+    def __init__(self, settings: GimbalConfig, camera: CameraConfig) -> None:
+        """Look as `camera` is mounted."""
+        self._step = math.radians(settings.max_rate)
+        self._lowest, self._highest = map(math.radians, (settings.lowest, settings.highest))
+        self._widest = math.radians(settings.widest)
+        self._stamp = 0
+        self._pitch, self._yaw = -math.radians(camera.pitch), math.radians(camera.yaw)
+        self._target = GimbalTarget(self._pitch, self._yaw)
+
+    def aim(self, target: GimbalTarget) -> GimbalTarget:
+        """Turn to `target` from now on; returns it as it is within the range."""
+        pitch = min(max(target.pitch, self._lowest), self._highest)
+        yaw = min(max(target.yaw, -self._widest), self._widest)
+        self._target = GimbalTarget(pitch, yaw)
+        return self._target
+
+    @property
+    def attitude(self) -> GimbalAttitude:
+        """Where it looks."""
+        return GimbalAttitude(self._stamp, self._pitch, self._yaw)
+
+    def advance_to(self, stamp: int) -> None:
+        """Turn until mission time `stamp`, nanoseconds."""
+        most = self._step * (stamp - self._stamp) / NANOSECONDS
+        self._stamp = stamp
+        self._pitch += min(max(self._target.pitch - self._pitch, -most), most)
+        self._yaw += min(max(self._target.yaw - self._yaw, -most), most)
+
+
+class SimulatedPhotoCamera:
+    """A camera on board; implements `aerodaas.types.payload.PhotoCamera`."""
+
+    def __init__(self) -> None:
+        """Have taken nothing yet."""
+        self._taken = 0
+        self._asked: list[tuple[int, str]] = []
+        self._storing: list[Photo] = []
+        self._now = 0
+
+    def take_photo(self, label: str) -> int:
+        """Take a picture at the next step of time."""
+        self._taken += 1
+        self._asked.append((self._taken, label))
+        return self._taken
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """Pictures that are stored by now."""
+        ready = [one for one in self._storing if one.stamp + _STORING <= self._now]
+        self._storing = [one for one in self._storing if one not in ready]
+        return list(ready)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a picture is to be exposed."""
+        return bool(self._asked)
+
+    def advance_to(self, stamp: int) -> None:
+        """Let time pass until `stamp`, nanoseconds."""
+        self._now = stamp
+
+    def expose(self, state: VehicleState) -> None:
+        """Take what was asked for, from where the vehicle is now."""
+        fix = state.gps
+        place = None if fix is None else PhotoPlace(fix.latitude, fix.longitude, fix.altitude)
+        self._storing += [
+            Photo(
+                number,
+                state.stamp,
+                label,
+                place,
+                state.odometry,
+                state.gimbal,
+                state.truth,
+            )
+            for number, label in self._asked
+        ]
+        self._asked.clear()

@@ -1,0 +1,153 @@
+"""What a vehicle carries to look with: a gimbal that is aimed, a camera that takes pictures.
+
+A driver implements `Gimbal` and `PhotoCamera`, and hands them out as a
+`aerodaas.types.vehicle.PayloadVehicle`. Angles are those of surveyors and ground stations: pitch is
+zero at the horizon and negative downwards (-pi/2 looks straight down), yaw is zero along the
+vehicle's nose and positive counter-clockwise, radians. A gimbal keeps pitch and roll to the
+horizon while the vehicle tilts; only its yaw turns along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol, TypeAlias
+
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import CameraModel, angles_of_rotation, rotation_from_rpy
+from aerodaas.types.records import fast_pickle
+
+__all__ = [
+    "Gimbal",
+    "GimbalAttitude",
+    "GimbalTarget",
+    "Photo",
+    "PhotoCamera",
+    "PhotoFailure",
+    "PhotoOutcome",
+    "PhotoPlace",
+    "levelled",
+]
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class GimbalTarget:
+    """Where a gimbal is to look; radians."""
+
+    pitch: float = 0.0
+    """Negative looks down."""
+    yaw: float = 0.0
+    """From the vehicle's nose, counter-clockwise."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class GimbalAttitude:
+    """Where a gimbal says that it looks; radians."""
+
+    stamp: int
+    """Mission clock when it said so, nanoseconds."""
+    pitch: float
+    """Negative looks down."""
+    yaw: float
+    """From the vehicle's nose, counter-clockwise, in (-pi, pi]."""
+    roll: float = 0.0
+    """Positive with the right side of the picture down."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class PhotoPlace:
+    """Where on the earth a picture was taken: WGS84 degrees and metres."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+    datum: Literal["ellipsoid", "sea"] = "ellipsoid"
+    """What the altitude is counted from."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class Photo:
+    """One picture that was taken, by what camera and vehicle say; the pixels are not in it."""
+
+    number: int | None
+    """That of `PhotoCamera.take_photo`; None for a picture that nobody here asked for."""
+    stamp: int
+    """Mission clock at exposure, nanoseconds."""
+    label: str = ""
+    """What it was taken for, such as a waypoint's id."""
+    place: PhotoPlace | None = None
+    """None where neither camera nor vehicle knows it."""
+    odometry: Odometry | None = None
+    """Where the vehicle believed to be at exposure."""
+    gimbal: GimbalAttitude | None = None
+    """Where the camera looked; None for one that is bolted to the vehicle."""
+    truth: Odometry | None = None
+    """The simulator's exact state at exposure, by which the picture is rendered."""
+    file: str = ""
+    """Name or URL by which the camera itself keeps it; empty where it tells none."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class PhotoFailure:
+    """A picture that was asked for and will not come."""
+
+    number: int
+    """That of `PhotoCamera.take_photo`."""
+    reason: str
+    """In a few words."""
+
+
+PhotoOutcome: TypeAlias = Photo | PhotoFailure
+
+
+class Gimbal(Protocol):
+    """A gimbal; every method returns at once."""
+
+    def aim(self, target: GimbalTarget) -> GimbalTarget:
+        """Have it turn to `target`; returns the target after clipping to its range.
+
+        The driver repeats what is not acknowledged. Progress shows in `attitude`, and a refusal
+        in `fault`. Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    @property
+    def attitude(self) -> GimbalAttitude | None:
+        """The newest that it said; None before the first, and after nonsense."""
+        ...
+
+    @property
+    def fault(self) -> str:
+        """Why it did not take the last command, in a few words; empty if nothing is known."""
+        ...
+
+
+class PhotoCamera(Protocol):
+    """A camera that takes single pictures; every method returns at once."""
+
+    def take_photo(self, label: str) -> int:
+        """Ask for one picture, for what `label` says; returns a number of this request alone.
+
+        The driver repeats what is not acknowledged, and never takes two pictures for one request
+        where the camera can tell. Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """Pictures taken, by request or not, and requests that failed, since the last call."""
+        ...
+
+
+def levelled(camera: CameraModel, attitude: GimbalAttitude, vehicle: Odometry) -> CameraModel:
+    """`camera` as the gimbal holds it while the vehicle is at `vehicle`'s attitude.
+
+    The gimbal turns about the camera's own centre, so that its place in the body stays.
+    """
+    look = rotation_from_rpy(attitude.roll, -attitude.pitch, vehicle.yaw + attitude.yaw)
+    body = rotation_from_rpy(vehicle.roll, vehicle.pitch, vehicle.yaw)
+    roll, pitch, yaw = angles_of_rotation(body.T @ look)
+    return replace(camera, roll=roll, pitch=pitch, yaw=yaw)

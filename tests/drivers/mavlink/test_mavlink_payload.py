@@ -1,0 +1,344 @@
+"""Gimbals and cameras by MAVLink's protocols v2: found, aimed, heard, and lost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stepped import Stepped
+
+from aerodaas.config.model import MissionConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure, PhotoOutcome
+from aerodaas.types.status import MissionState
+from aerodaas.types.waypoints import Waypoint
+from tools.mavlink_vehicle import AutopilotOptions
+from tools.mavlink_vehicle.payload import EmulatedPayload
+
+FAMILIES = ("px4", "ardupilot")
+
+
+@pytest.fixture(params=FAMILIES)
+def ends(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Stepped:
+    """Both families, with both components."""
+    return Stepped(monkeypatch, AutopilotOptions(family=request.param, gimbal=True, camera=True))
+
+
+def carried(ends: Stepped) -> EmulatedPayload:
+    """What goes wrong with them."""
+    return ends.autopilot.firmware.payload
+
+
+def wait(ends: Stepped, condition: Callable[[], object], timeout: float = 15.0) -> None:
+    """Turn both ends until `condition` holds."""
+    end = ends.now + timeout
+    while not condition():
+        assert ends.now < end, "waited in vain"
+        ends.turn()
+
+
+def found(ends: Stepped) -> None:
+    """Wait for both components, and the gimbal's first word."""
+    vehicle = ends.vehicle
+    wait(ends, lambda: vehicle.gimbal and vehicle.photo_camera and vehicle.gimbal.attitude)
+
+
+def outcome(ends: Stepped, timeout: float = 15.0) -> PhotoOutcome:
+    """The next word of a picture."""
+    said: list[PhotoOutcome] = []
+
+    def look() -> bool:
+        camera = ends.vehicle.photo_camera
+        assert camera is not None
+        said.extend(camera.outcomes())
+        return bool(said)
+
+    wait(ends, look, timeout)
+    (one,) = said
+    return one
+
+
+def take(ends: Stepped, label: str = "wp1") -> int:
+    """Ask for a picture."""
+    camera = ends.vehicle.photo_camera
+    assert camera is not None
+    return camera.take_photo(label)
+
+
+def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
+    """Ours are counted upwards and to the left; MAVLink's upwards and to the right."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        assert gimbal.aim(GimbalTarget(-0.8, 0.5)) == GimbalTarget(-0.8, 0.5)
+        ends.watch(3.0)
+        theirs = carried(ends)
+        assert theirs.pitch == pytest.approx(-0.8, abs=1e-3)
+        assert theirs.right == pytest.approx(-0.5, abs=1e-3)
+        state = ends.turn()
+        assert state.gimbal is not None
+        assert state.gimbal.pitch == pytest.approx(-0.8, abs=1e-3)
+        assert state.gimbal.yaw == pytest.approx(0.5, abs=1e-3)
+        assert state.stamp - state.gimbal.stamp < 0.5e9
+        assert theirs.controller == (-2.0, 0.0)
+
+
+def test_a_target_is_clipped_to_what_the_gimbal_told(ends: Stepped) -> None:
+    """Its range is in GIMBAL_MANAGER_INFORMATION: 90 degrees down, 20 up, 170 to either side."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        clipped = gimbal.aim(GimbalTarget(1.0, -3.1))
+        assert clipped.pitch == pytest.approx(math.radians(20))
+        assert clipped.yaw == pytest.approx(-math.radians(170))
+
+
+def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
+    """Above the sea, with number and label of the request."""
+    with ends:
+        found(ends)
+        number = take(ends)
+        photo = outcome(ends)
+        assert isinstance(photo, Photo)
+        assert (photo.number, photo.label) == (number, "wp1")
+        assert photo.place is not None
+        assert photo.place.latitude == pytest.approx(47.397742, abs=1e-6)
+        assert photo.place.longitude == pytest.approx(8.545594, abs=1e-6)
+        assert photo.place.altitude == pytest.approx(488.0, abs=0.5)
+        assert photo.place.datum == "sea"
+        assert photo.odometry is not None
+        assert photo.gimbal is not None
+        assert photo.file in {"DCIM/0001.JPG", "picture 1"}
+        assert take(ends) == number + 1
+        assert isinstance(outcome(ends), Photo)
+        assert len(carried(ends).taken) == 2
+
+
+def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
+    """Such as one by the pilot's switch, or by the autopilot's own distance trigger."""
+    with ends:
+        found(ends)
+        carried(ends)._take()
+        photo = outcome(ends)
+        assert isinstance(photo, Photo)
+        assert photo.number is None
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [("camera_refuses", "failed"), ("blind", "does not tell of the picture")],
+)
+def test_a_picture_that_fails_is_told(ends: Stepped, fault: str, said: str) -> None:
+    """At once where it is refused, after some seconds where nothing comes."""
+    with ends:
+        found(ends)
+        setattr(carried(ends), fault, True)
+        number = take(ends)
+        failure = outcome(ends)
+        assert isinstance(failure, PhotoFailure)
+        assert failure.number == number
+        assert said in failure.reason
+        setattr(carried(ends), fault, False)
+        take(ends)
+        assert isinstance(outcome(ends), Photo)
+
+
+def test_a_gimbal_that_refuses_says_so(ends: Stepped) -> None:
+    """The result of the command, in words."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        carried(ends).gimbal_refuses = True
+        gimbal.aim(GimbalTarget(-1.0, 0.0))
+        ends.watch(1.0)
+        assert gimbal.fault == "denied"
+        carried(ends).gimbal_refuses = False
+        gimbal.aim(GimbalTarget(-1.0, 0.0))
+        ends.watch(1.0)
+        assert gimbal.fault == ""
+
+
+def test_an_attitude_that_is_none_is_no_word(ends: Stepped) -> None:
+    """The last one ages, and in the end the gimbal counts as gone; it may come back."""
+    with ends:
+        found(ends)
+        carried(ends).nonsense = True
+        ends.watch(1.0)
+        state = ends.turn()
+        assert state.gimbal is not None
+        assert math.isfinite(state.gimbal.pitch)
+        ends.watch(5.0)
+        assert ends.vehicle.gimbal is None
+        carried(ends).nonsense = False
+        ends.watch(1.0)
+        assert ends.vehicle.gimbal is not None
+
+
+def test_a_gimbal_that_vanishes_is_gone(ends: Stepped) -> None:
+    """After five seconds without a word; the vehicle itself is heard all the while."""
+    with ends:
+        found(ends)
+        carried(ends).has_gimbal = False
+        ends.watch(6.0)
+        assert ends.vehicle.gimbal is None
+        assert ends.vehicle.read().extra["silence"] < 1.0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_vehicle_without_them_is_left_alone(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
+    """It is asked once for each, refuses, and is not asked again."""
+    with Stepped(monkeypatch, AutopilotOptions(family=family)) as ends:  # type: ignore[arg-type]
+        ends.watch(12.0)
+        assert ends.vehicle.gimbal is None
+        assert ends.vehicle.photo_camera is None
+        asked = [
+            message.param1
+            for _, message in ends.autopilot.heard
+            if message.get_type() == "COMMAND_LONG"
+            and message.command == mavlink.MAV_CMD_REQUEST_MESSAGE
+        ]
+        for wanted in (280, 259):
+            assert asked.count(wanted) == 1
+
+
+def gimbal_of(*ranges: float) -> MavlinkGimbal:
+    """A gimbal whose manager told these ranges."""
+    told = mavlink.MAVLink_gimbal_manager_information_message(0, 0, 1, *ranges)
+    return MavlinkGimbal(told, Commander(lambda _: None, (1, 1), 245))
+
+
+def status(flags: int, quaternion: list[float], device: int = 1) -> object:
+    """One attitude, as it is told."""
+    message = mavlink.MAVLink_gimbal_device_attitude_status_message(
+        0, 0, 0, flags, quaternion, math.nan, math.nan, math.nan, 0
+    )
+    message.gimbal_device_id = device
+    return message
+
+
+FREE = (-math.inf, math.inf, -math.inf, math.inf, -math.inf, math.inf)
+
+
+def test_a_yaw_from_north_is_turned_to_the_nose() -> None:
+    """A locked gimbal tells it so: looking east (90 degrees) from a nose to the north."""
+    gimbal = gimbal_of(*FREE)
+    east = [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
+    gimbal.take(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, 0.0)
+    assert gimbal.attitude is not None
+    assert gimbal.attitude.yaw == pytest.approx(-math.pi / 2)
+    gimbal.take(status(0, east), 0.0, 7, 1.0)
+    assert gimbal.attitude.yaw == pytest.approx(-math.pi / 2)
+    gimbal.take(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, math.pi / 2)
+    assert gimbal.attitude.yaw == pytest.approx(0.0)
+
+
+def test_another_gimbals_attitude_is_not_ours() -> None:
+    """Several may speak on one link."""
+    gimbal = gimbal_of(*FREE)
+    gimbal.take(status(0, [1.0, 0.0, 0.0, 0.0], device=2), 0.0, 7, 0.0)
+    assert gimbal.attitude is None
+    assert gimbal.silence(100.0) == 0.0
+
+
+@given(
+    st.integers(0, 65535),
+    st.lists(st.floats(width=32), min_size=4, max_size=4),
+    st.integers(0, 255),
+)
+def test_no_attitude_is_anything_but_finite(
+    flags: int, quaternion: list[float], device: int
+) -> None:
+    """Whatever a gimbal tells."""
+    gimbal = gimbal_of(*FREE)
+    gimbal.take(status(flags, quaternion, device), 0.0, 7, 0.0)
+    seen = gimbal.attitude
+    assert seen is None or all(map(math.isfinite, (seen.pitch, seen.yaw, seen.roll)))
+
+
+class _Clock:
+    """The mission's clock: that of both ends."""
+
+    def __init__(self, ends: Stepped) -> None:
+        self._ends = ends
+
+    def now(self) -> int:
+        """Nanoseconds."""
+        return round(self._ends.now * 1e9)
+
+
+def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
+    """A whole mission of two pictures; `each` is called at each turn."""
+    clock = _Clock(ends)
+    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
+    mission = Mission(
+        ends.robot.model_copy(update={"mission": MissionConfig(photo_timeout=4.0)}),
+        InlinePlanner(OrderedScheduler()),
+        takeoff=ends.vehicle.read().odometry.position,
+        payload=ends.vehicle,
+    )
+    loop = SetpointLoop(ends.vehicle, mission)
+    stops = [
+        Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
+        Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
+    ]
+    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
+    mission.handle(Start(), clock.now())
+    end = ends.now + 120.0
+    while not mission.finished and ends.now < end:
+        ends.advance(0.05)
+        loop.turn(clock.now())
+        each(mission)
+    return mission
+
+
+def told(mission: Mission) -> list[str]:
+    """What people were told of pictures."""
+    return [alert.text for alert in mission.alerts if alert.kind == "photo"]
+
+
+def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
+    """Each once the gimbal looks there, straight down included."""
+    with ends:
+        mission = fly(ends)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert told(mission) == []
+        first, second = mission.photographer.photos
+        assert first.gimbal is not None
+        assert second.gimbal is not None
+        assert first.gimbal.pitch == pytest.approx(-math.pi / 2, abs=0.06)
+        assert second.gimbal.pitch == pytest.approx(-0.5, abs=0.06)
+        assert second.gimbal.yaw == pytest.approx(0.7, abs=0.06)
+        assert [photo.label for photo in (first, second)] == ["a", "b"]
+
+
+@pytest.mark.parametrize("fault", ["stuck", "nonsense", "blind", "gone", "camera_refuses"])
+def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, fault: str) -> None:
+    """It is told, and the drone flies on, comes home and lands."""
+
+    def strike(mission: Mission) -> None:
+        theirs = carried(ends)
+        if mission.status.visits and fault == "gone":
+            theirs.has_gimbal = theirs.has_camera = False
+        elif mission.status.visits:
+            setattr(theirs, fault, True)
+
+    with ends:
+        mission = fly(ends, strike)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert list(mission.status.visited) == ["a", "b"]
+        assert mission.status.photos == (1, 1)
+        assert any(text.startswith("b: no picture: ") for text in told(mission))

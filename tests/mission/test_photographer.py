@@ -1,0 +1,310 @@
+"""Pictures at waypoints: taken when the gimbal is there; lost, and the flight not, by any fault."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+from flights import Flight, KinematicVehicle, add, flight
+
+from aerodaas.config.model import MissionConfig
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.payload import (
+    GimbalAttitude,
+    GimbalTarget,
+    Photo,
+    PhotoFailure,
+    PhotoOutcome,
+)
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+DOWN = -math.pi / 2
+
+
+class Clock:
+    """The mission clock of a test."""
+
+    now = 0
+
+
+@dataclass
+class Gimbal:
+    """Turns at 1 rad/s, or does as a test says."""
+
+    clock: Clock
+    pitch: float = 0.0
+    yaw: float = 0.0
+    fault: str = ""
+    stuck: bool = False
+    nonsense: bool = False
+    stale: bool = False
+    aims: list[GimbalTarget] = field(default_factory=list)
+    _seen: int = 0
+
+    def aim(self, target: GimbalTarget) -> GimbalTarget:
+        """Turn from now on."""
+        self.aims.append(target)
+        return target
+
+    @property
+    def attitude(self) -> GimbalAttitude:
+        """Where it looks, or says so."""
+        most = (self.clock.now - self._seen) / NANOSECONDS
+        self._seen = self.clock.now
+        if self.aims and not self.stuck:
+            target = self.aims[-1]
+            self.pitch += min(max(target.pitch - self.pitch, -most), most)
+            self.yaw += min(max(target.yaw - self.yaw, -most), most)
+        stamp = 0 if self.stale else self.clock.now
+        return GimbalAttitude(stamp, math.nan if self.nonsense else self.pitch, self.yaw)
+
+
+@dataclass
+class Camera:
+    """Takes pictures at once, or does as a test says."""
+
+    clock: Clock
+    gimbal: Gimbal | None
+    refuses: str = ""
+    silent: bool = False
+    lies: bool = False
+    """Answers with other numbers."""
+    asked: list[str] = field(default_factory=list)
+    _ready: list[PhotoOutcome] = field(default_factory=list)
+
+    def take_photo(self, label: str) -> int:
+        """Take one."""
+        self.asked.append(label)
+        number = len(self.asked)
+        if self.refuses:
+            self._ready.append(PhotoFailure(number, self.refuses))
+        elif not self.silent:
+            attitude = self.gimbal.attitude if self.gimbal else None
+            told = number + 100 if self.lies else number
+            self._ready.append(Photo(told, self.clock.now, label, gimbal=attitude))
+        return number
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """What came of it."""
+        ready, self._ready = self._ready, []
+        return ready
+
+
+class Surveyor(KinematicVehicle):
+    """A vehicle with both, unless a test takes them away."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clock = Clock()
+        self.gimbal: Gimbal | None = Gimbal(self.clock)
+        self.photo_camera: Camera | None = Camera(self.clock, self.gimbal)
+
+    def read(self) -> VehicleState:
+        """Let its components know the time."""
+        state = super().read()
+        self.clock.now = state.stamp
+        return state
+
+
+STOPS = (
+    Waypoint("north", 0, 5, 2, gimbal_pitch=DOWN, photo=True),
+    Waypoint("east", 5, 5, 2, gimbal_pitch=-0.5, gimbal_yaw=1.0, photo=True),
+)
+
+
+def flown(vehicle: KinematicVehicle, *waypoints: Waypoint, timeout: float = 4.0) -> Flight:
+    """A whole flight over `waypoints`, with `timeout` seconds for each picture."""
+    made = flight(
+        add(*(waypoints or STOPS)),
+        vehicle=vehicle,
+        options=MissionConfig(photo_timeout=timeout),
+    )
+    made.run()
+    return made
+
+
+def lost(made: Flight) -> list[str]:
+    """What people were told of pictures."""
+    return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
+
+
+def unharmed(made: Flight) -> None:
+    """The flight ended as it would without a camera."""
+    made.expect(MissionState.LANDED)
+    assert list(made.status.visited) == ["north", "east"]
+
+
+def test_each_picture_is_taken_once_the_gimbal_looks_there() -> None:
+    """The picture has the attitude that the waypoint asks for."""
+    vehicle = Surveyor()
+    made = flown(vehicle)
+    unharmed(made)
+    assert vehicle.photo_camera is not None
+    assert vehicle.photo_camera.asked == ["north", "east"]
+    first, second = made.mission.photographer.photos
+    assert first.gimbal is not None
+    assert second.gimbal is not None
+    assert abs(first.gimbal.pitch - DOWN) < 0.06
+    assert abs(second.gimbal.pitch + 0.5) < 0.06
+    assert abs(second.gimbal.yaw - 1.0) < 0.06
+    assert not lost(made)
+    assert made.status.photos == (2, 0)
+
+
+def test_the_gimbal_turns_on_the_way() -> None:
+    """It is told when the drone sets out, not when it has arrived."""
+    vehicle = Surveyor()
+    made = flight(add(*STOPS), vehicle=vehicle)
+    made.run_to(MissionState.ENROUTE)
+    made.turn()
+    assert vehicle.gimbal is not None
+    assert vehicle.gimbal.aims
+
+
+def test_the_drone_stays_until_the_picture_is_there() -> None:
+    """Without a hover of its own, and no longer than that."""
+    vehicle = Surveyor()
+    assert vehicle.photo_camera is not None
+    vehicle.photo_camera.silent = True
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made.run_to(MissionState.LOITERING)
+    began = made.seconds
+    made.run(until=lambda: made.mission.state is not MissionState.LOITERING)
+    assert 3.5 < made.seconds - began < 4.5
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("no gimbal", "no gimbal"),
+        ("no camera", "no camera"),
+        ("stuck", "it looks at pitch 0, yaw 0 degrees: motor hot"),
+        ("nonsense", "it does not say where it looks"),
+        ("stale", "it does not say where it looks"),
+        ("refuses", "no card"),
+        ("silent", "took none within 4 s"),
+        ("lies", "took none within 4 s"),
+    ],
+)
+def test_a_component_at_fault_costs_its_picture_and_not_the_flight(fault: str, told: str) -> None:
+    """Each is told with its reason, and the waypoint counts as visited."""
+    vehicle = Surveyor()
+    gimbal, camera = vehicle.gimbal, vehicle.photo_camera
+    assert gimbal is not None
+    assert camera is not None
+    if fault == "no gimbal":
+        vehicle.gimbal = None
+    elif fault == "no camera":
+        vehicle.photo_camera = None
+    elif fault == "refuses":
+        camera.refuses = "no card"
+    elif fault in {"silent", "lies"}:
+        setattr(camera, fault, True)
+    else:
+        setattr(gimbal, fault, True)
+        gimbal.fault = "motor hot"
+    made = flown(vehicle)
+    unharmed(made)
+    assert made.status.photos[1] == 2
+    assert any("north: no picture: " in text and told in text for text in lost(made)), lost(made)
+
+
+def test_a_vehicle_without_any_of_it_flies_on() -> None:
+    """No driver needs to know of pictures."""
+    made = flown(KinematicVehicle())
+    unharmed(made)
+    assert made.status.photos == (0, 2)
+    assert len(lost(made)) >= 1
+
+
+def test_components_that_vanish_in_mid_flight() -> None:
+    """What was taken before stays; what follows is lost and told."""
+    vehicle = Surveyor()
+    made = flight(add(*STOPS), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made.run(until=lambda: made.status.visits == 1)
+    vehicle.gimbal = vehicle.photo_camera = None
+    made.run()
+    unharmed(made)
+    assert made.status.photos == (1, 1)
+    assert any(text.startswith("east: no picture") for text in lost(made))
+
+
+@pytest.mark.parametrize("error", [VehicleError("link down"), RuntimeError("a bug"), KeyError(1)])
+def test_what_a_component_raises_ends_no_flight(error: Exception) -> None:
+    """An exception is its picture alone."""
+
+    class Broken:
+        """Raises whatever it is asked."""
+
+        def __getattr__(self, _: str) -> object:
+            raise error
+
+    vehicle = Surveyor()
+    vehicle.gimbal = vehicle.photo_camera = Broken()  # type: ignore[assignment]
+    made = flown(vehicle)
+    unharmed(made)
+    assert lost(made)
+
+
+def test_a_gimbal_is_aimed_without_a_picture() -> None:
+    """Yaw alone leaves the pitch level."""
+    vehicle = Surveyor()
+    made = flown(vehicle, Waypoint("north", 0, 5, 2, gimbal_yaw=0.5))
+    assert vehicle.photo_camera is not None
+    assert vehicle.gimbal is not None
+    assert vehicle.photo_camera.asked == []
+    assert vehicle.gimbal.aims[0] == GimbalTarget(0.0, 0.5)
+    assert not lost(made)
+
+
+def test_a_deaf_gimbal_is_told_again() -> None:
+    """Every two seconds, not at each turn."""
+    vehicle = Surveyor()
+    assert vehicle.gimbal is not None
+    vehicle.gimbal.stuck = True
+    flown(vehicle)
+    assert 4 <= len(vehicle.gimbal.aims) <= 20
+
+
+def test_a_failsafe_does_not_wait_for_a_picture() -> None:
+    """The battery is minded while the drone hovers for a camera that never answers."""
+    vehicle = Surveyor()
+    assert vehicle.photo_camera is not None
+    vehicle.photo_camera.silent = True
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=100.0))
+    made.run_to(MissionState.LOITERING)
+    vehicle.charge = 0.2
+    made.run(2.0)
+    made.expect(MissionState.RETURNING)
+
+
+def test_an_interrupted_stop_has_its_picture_later() -> None:
+    """Once, however often the drone comes."""
+    vehicle = Surveyor()
+    assert vehicle.gimbal is not None
+    made = flight(add(STOPS[0]), vehicle=vehicle)
+    made.run_to(MissionState.LOITERING)
+    made.tell(add(Waypoint("urgent", 3, 5, 2, priority=1)))
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert set(made.status.visited) == {"urgent", "north"}
+    assert made.status.photos == (1, 0)
+
+
+def test_the_time_out_begins_anew_after_an_interruption() -> None:
+    """A long detour takes nothing from what gimbal and camera get."""
+    vehicle = Surveyor()
+    assert vehicle.gimbal is not None
+    vehicle.gimbal.stuck = True
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made.run_to(MissionState.LOITERING)
+    made.tell(add(Waypoint("urgent", 3, 5, 2, priority=1, hover_duration=5)))
+    made.run(until=lambda: "urgent" in made.status.visited)
+    vehicle.gimbal.stuck = False
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert made.status.photos == (1, 0)

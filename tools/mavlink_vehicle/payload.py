@@ -1,0 +1,134 @@
+"""An emulated gimbal and camera by the protocols v2, as autopilots have them on board."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+if TYPE_CHECKING:
+    from tools.mavlink_vehicle.firmware import Firmware
+
+__all__ = ["EmulatedPayload"]
+
+_OK = mavlink.MAV_RESULT_ACCEPTED
+_RATE = math.radians(60.0)
+"""rad/s at which it turns."""
+_DEVICE = 1
+_LOWEST, _HIGHEST, _WIDEST = math.radians(-90.0), math.radians(20.0), math.radians(170.0)
+_SHUTTER = 0.3
+"""Seconds from a request to the word of its picture."""
+
+
+class EmulatedPayload:
+    """Gimbal and camera of one vehicle; its attributes are what goes wrong with them."""
+
+    def __init__(self, firmware: Firmware, say: Callable[[Any], None]) -> None:
+        """Carry what the firmware's options say; `say` sends a message."""
+        options = firmware.options
+        self.has_gimbal, self.has_camera = options.gimbal, options.camera
+        self.gimbal_refuses = self.camera_refuses = False
+        self.stuck = False
+        """It acknowledges and does not turn."""
+        self.nonsense = False
+        """Its attitude is not a number."""
+        self.blind = False
+        """Pictures are acknowledged, and not taken."""
+        self.pitch = self.right = 0.0
+        """Where it looks: radians, up and to the right of the nose."""
+        self.controller: tuple[float, float] | None = None
+        self.taken: list[float] = []
+        """Pitch of each picture."""
+        self._wanted = (0.0, 0.0)
+        self._firmware = firmware
+        self._say = say
+        self._due: list[float] = []
+        self._then = 0.0
+
+    def obey(self, number: int, values: tuple[float, ...]) -> Any | None:  # noqa: ANN401
+        """Obey a command; None for one that is not a gimbal's or a camera's."""
+        if number == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE and self.has_gimbal:
+            self.controller = values[0], values[1]
+            return _OK
+        if number == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW and self.has_gimbal:
+            if self.gimbal_refuses or self.controller is None:
+                return mavlink.MAV_RESULT_DENIED
+            pitch, right = (math.radians(value) for value in values[:2])
+            self._wanted = (
+                min(max(pitch, _LOWEST), _HIGHEST),
+                min(max(right, -_WIDEST), _WIDEST),
+            )
+            return _OK
+        if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE and self.has_camera:
+            if self.camera_refuses:
+                return mavlink.MAV_RESULT_FAILED
+            if not self.blind:
+                self._due.append(self._firmware.now + _SHUTTER)
+            return _OK
+        return None
+
+    def advance(self) -> None:
+        """Let time pass until the firmware's."""
+        now = self._firmware.now
+        most = _RATE * max(0.0, now - self._then)
+        self._then = now
+        if not self.stuck:
+            self.pitch += min(max(self._wanted[0] - self.pitch, -most), most)
+            self.right += min(max(self._wanted[1] - self.right, -most), most)
+        while self._due and now >= self._due[0]:
+            self._due.pop(0)
+            self._take()
+
+    def _take(self) -> None:
+        flight = self._firmware.flight
+        self.taken.append(self.pitch)
+        lat, lon, _ = flight.origin.to_geodetic(flight.believed.position)
+        stamp, place = round(self._firmware.now * 1e3), (round(lat * 1e7), round(lon * 1e7))
+        index = len(self.taken)
+        if self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
+            name = f"DCIM/{index:04d}.JPG".encode()
+            height = (round(flight.altitude * 1e3), 0)
+            self._say(
+                mavlink.MAVLink_camera_image_captured_message(
+                    stamp, 0, 1, *place, *height, self._quaternion(), index, 1, name
+                )
+            )
+            return
+        self._say(
+            mavlink.MAVLink_camera_feedback_message(
+                *(stamp * 1000, 0, 0, index, *place, flight.altitude, 0.0),
+                *(0.0, math.degrees(self.pitch), 0.0, 0.0, 0),
+            )
+        )
+
+    def message(self, number: int) -> Any | None:  # noqa: ANN401
+        """Its message of that number; None if it has none."""
+        stamp = round(self._firmware.now * 1e3)
+        if number == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION and self.has_gimbal:
+            ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -_WIDEST, _WIDEST)
+            return mavlink.MAVLink_gimbal_manager_information_message(stamp, 0, _DEVICE, *ranges)
+        if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS and self.has_gimbal:
+            flags = mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
+            unknown = (math.nan, math.nan, math.nan)
+            return mavlink.MAVLink_gimbal_device_attitude_status_message(
+                0, 0, stamp, flags, self._quaternion(), *unknown, 0
+            )
+        if number == mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION and self.has_camera:
+            name = list(b"emulated".ljust(32, b"\0"))
+            return mavlink.MAVLink_camera_information_message(
+                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, 0, 0, b""
+            )
+        return None
+
+    def _quaternion(self) -> list[float]:
+        if self.nonsense:
+            return [math.nan] * 4
+        pitch, yaw = self.pitch / 2, self.right / 2
+        return [
+            math.cos(pitch) * math.cos(yaw),
+            -math.sin(pitch) * math.sin(yaw),
+            math.sin(pitch) * math.cos(yaw),
+            math.cos(pitch) * math.sin(yaw),
+        ]
