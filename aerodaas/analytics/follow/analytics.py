@@ -255,11 +255,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if identity.certainty is Certainty.CERTAIN:
             return mine
         shown = {item.track_id: item for item in tracked.labelled(*self.labels)}
-        verdicts = {
-            track: identity.is_mine(track)
-            for track in tracks
-            if track.id in shown and track.age == 0.0
-        }
+        verdicts = identity.compare(one for one in tracks if one.id in shown and one.age == 0.0)
         found = next((track for track, verdict in verdicts.items() if verdict), None)
         if found is not None:
             if found is not held:

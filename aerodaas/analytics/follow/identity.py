@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import enum
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from aerodaas.analytics.detection.looks import touches
 from aerodaas.analytics.detection.tracking import Track
@@ -28,8 +28,9 @@ _MARGIN = 2.0
 """How much more an appearance must be like that of one person than like that of another."""
 _ALIKE = 6.0
 """Unlikeness of two people below which looks do not tell them apart."""
-_OTHER = 10.0
-"""Unlikeness from which on somebody is not the followed one."""
+_OTHER, _STRANGER = 13.0, 10.0
+"""Unlikeness from which on somebody is not the followed one, beside others who are known and where
+nobody else is."""
 _RECENT = 0.5
 """Seconds since its last detection for which a track's box counts as touched."""
 _PATIENCE = 1.5
@@ -92,13 +93,23 @@ class TargetIdentity:
         elif self.certainty is Certainty.CERTAIN and len(target.looks):
             self._looks = target.looks.since()
 
-    def is_mine(self, candidate: Track) -> bool | None:
-        """Whether a track shows the followed person, by its looks since; None if unsure."""
-        fresh = candidate.looks.since(self._touched)
-        if len(fresh) < _LOOKS:
-            return None
-        lead = self._lead(fresh)
-        return None if lead is None or abs(lead) < _MARGIN else lead > 0.0
+    def compare(self, tracks: Iterable[Track]) -> dict[Track, bool | None]:
+        """Tell by their looks since the touch which of the tracks in sight is the followed person.
+
+        None where that is unsure. Each is compared with how those who touched looked before, and
+        with the others in sight.
+        """
+        fresh = {one: looks for one in tracks if len(looks := one.looks.since(self._touched))}
+        leads: dict[Track, float | None] = {}
+        for track, looks in fresh.items():
+            beside = [
+                unlikeness(self._looks, other) for one, other in fresh.items() if one is not track
+            ]
+            leads[track] = self._lead(looks, beside) if len(looks) >= _LOOKS else None
+        return {
+            track: None if lead is None or abs(lead) < _MARGIN else lead > 0.0
+            for track, lead in leads.items()
+        }
 
     def may_be_mine(self, track: int | None, looks: Sequence[bytes]) -> bool:
         """Whether a box of this `track` may show the followed person while theirs is not seen."""
@@ -127,18 +138,23 @@ class TargetIdentity:
         self.certainty = Certainty.UNCERTAIN if self._looks else Certainty.CERTAIN
         return True
 
-    def _lead(self, looks: Sequence[bytes]) -> float | None:
+    def _lead(self, looks: Sequence[bytes], beside: Sequence[float | None] = ()) -> float | None:
         """How much more these looks are like the followed person's than like anybody else's.
 
-        None if they cannot be compared, or somebody looks like the followed person.
+        `beside` is how unlike the followed person others in sight are. None if looks cannot be
+        compared, or somebody looks like the followed person.
         """
         mine = unlikeness(self._looks, looks)
         if mine is None:
             return None
-        least = _OTHER
-        for rival in self._rivals.values():
+        known = [one for one in self._rivals.values() if len(one) >= _LOOKS]
+        unlike = [one for one in beside if one is not None]
+        if len(known) < len(self._rivals) and not unlike:
+            return None
+        least = _OTHER if known or unlike else _STRANGER
+        for rival in known:
             theirs, apart = unlikeness(rival, looks), unlikeness(self._looks, rival)
             if theirs is None or apart is None or apart < _ALIKE:
                 return None
             least = min(least, theirs)
-        return least - mine
+        return min([least, *unlike]) - mine
