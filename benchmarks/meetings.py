@@ -103,7 +103,7 @@ class Flight:
         chase = Chase(person, "vest", self.rate, self.latency, seed=self.seed)
         if self.eyes is Sight.TRUTH:
             # Without the guard, nobody knew of those without a vest.
-            seen = others if self.guarded else []
+            seen = [(one, "person") for one in others] if self.guarded else []
             sight = TruthPerception(person, "vest", TELLO, bystanders=seen, seed=self.seed)
             flown = chase.fly(follow, sight, turn + lasts, monitor=near)
         else:

@@ -186,6 +186,9 @@ class Person(_Placed):
     height: Annotated[float, Field(ge=1.0, le=2.2)] | None = None
     vest: Literal["none", "any", "yellow", "lime", "orange", "pink"] = "none"
     """Colour of a hazard vest; with `any`, it is drawn from the seed."""
+    clothes: Annotated[int, Field(ge=0)] | None = None
+    """Number that skin, hair and clothes are drawn from, the same for the same; by default they are
+    drawn from the seed."""
     motion: Motion | None = None
     gestures: list[Gesture] = Field(default_factory=list)
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.types.appearance import appearance_in_box
 from aerodaas.types.depth import depth_in_box, nearest_in_cells
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import Box, CameraModel, Vector
@@ -171,6 +172,8 @@ class Detection:
     """K x 3: pixel u, pixel v, confidence; None where the model gives none."""
     depth: float | None = None
     """Metres along the optical axis to its surface, where the camera measured that."""
+    appearance: bytes | None = None
+    """A person's colours, for `types.appearance.unlikeness`; None for other things."""
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -204,8 +207,14 @@ class Detections(Sequence[Detection]):
 
     @classmethod
     def of(cls, frame: Frame, items: Iterable[Detection]) -> Detections:
-        """Gather `items` found in `frame`, ordered by score, each with its depth if measured."""
-        ordered = tuple(sorted(items, key=lambda item: -item.score))
+        """Gather `items` found in `frame`, ordered by score, with the appearance of people.
+
+        Each has its depth, where that is measured.
+        """
+        ordered = tuple(
+            replace(one, appearance=appearance_in_box(frame.image, one.box, one.label))
+            for one in sorted(items, key=lambda item: -item.score)
+        )
         nearest = None
         if (depth := frame.depth) is not None:
             ordered = tuple(replace(one, depth=depth_in_box(depth, one.box)) for one in ordered)

@@ -15,13 +15,13 @@ from aerodaas.simulation.world import Thing, World
 from aerodaas.types.data import Odometry
 from tools.tuning.walk import PERSON
 
-__all__ = ["CONTACT", "STRANGER", "Nearest", "NoGuard", "returning", "stranger"]
+__all__ = ["CONTACT", "STRANGER", "Nearest", "NoGuard", "crossing", "returning", "stranger"]
 
 CONTACT = 0.35
 """Distance in metres of the drone's centre from a person's axis below which they touch: half a
 pair of shoulders, and half a small drone."""
 STRANGER = "stranger"
-"""Name of the person without a vest."""
+"""Name of the person who is not followed."""
 _BEYOND = 12.0
 """Metres that a walker goes on, towards the drone and past where it took off."""
 _PACE = 0.7
@@ -77,7 +77,7 @@ def returning(speed: float, seed: int) -> tuple[World, float]:
     away, aside = draw.uniform(5.0, 10.0) * speed, draw.uniform(-0.3, 0.3)
     start = 6.0
     points = [(3.0, 0.0), (3.0 + away, 0.0), (3.0 - _BEYOND, aside)]
-    return World(_scenario([_walker(PERSON, points, speed, start, vest=True)]), seed), (
+    return World(_scenario([_walker(PERSON, points, speed, start, vest="any")]), seed), (
         start + away / speed
     )
 
@@ -97,10 +97,36 @@ def stranger(speed: float, seed: int) -> tuple[World, float]:
     points = [tuple(np.array([drone, 0.0]) + far * towards) for far in (length, -_BEYOND)]
     followed = [(3.0, 0.0), (200.0, 0.0)]
     people = [
-        _walker(PERSON, followed, _PACE, start, vest=True),
-        _walker(STRANGER, points, speed, setting_out, vest=False),
+        _walker(PERSON, followed, _PACE, start, vest="any"),
+        _walker(STRANGER, points, speed, setting_out),
     ]
     return World(_scenario(people), seed), setting_out
+
+
+def crossing(speed: float, seed: int, *, alike: bool) -> tuple[World, float]:
+    """Somebody in a vest of the same colour crosses closely behind the one who is followed.
+
+    They come from one side at `speed` m/s, pass half a metre to a metre and a half behind the
+    followed person, who walks at 0.4 to 1 m/s, and so before the drone, and go on straight. With
+    `alike` they wear the same clothes. Returns the world, and the second of the crossing.
+    """
+    draw = random.Random(f"{seed}/crossing")
+    pace, start = draw.uniform(0.4, 1.0), 6.0
+    crossed = start + draw.uniform(5.0, 7.0)
+    behind, side = draw.uniform(0.5, 1.5), draw.choice((-1.0, 1.0))
+    heading = side * math.radians(draw.uniform(50.0, 130.0))
+    towards = np.array([math.cos(heading), math.sin(heading)])
+    place = np.array([3.0 + pace * (crossed - start) - behind, 0.0])
+    before = speed * (crossed - start)
+    points = [tuple(place - before * towards), tuple(place + _BEYOND * towards)]
+    vest = draw.choice(("yellow", "lime", "orange"))
+    followed = [(3.0, 0.0), (200.0, 0.0)]
+    clothes = (seed, seed if alike else seed + 1)
+    people = [
+        _walker(PERSON, followed, pace, start, vest=vest, clothes=clothes[0]),
+        _walker(STRANGER, points, speed, start, vest=vest, clothes=clothes[1]),
+    ]
+    return World(_scenario(people), seed), crossed
 
 
 def _walker(
@@ -109,11 +135,12 @@ def _walker(
     speed: float,
     start: float,
     *,
-    vest: bool,
+    vest: str = "none",
+    clothes: int | None = None,
 ) -> dict[str, object]:
     motion = {"points": points, "speed": speed, "start": start, "variation": 0.0, "corner": 0.0}
-    clothes = {"vest": "any"} if vest else {}
-    return {"kind": "person", "id": name, "at": points[0], "motion": motion, **clothes}
+    worn = {"vest": vest, "clothes": clothes}
+    return {"kind": "person", "id": name, "at": points[0], "motion": motion, **worn}
 
 
 def _scenario(people: Sequence[Mapping[str, object]]) -> Scenario:

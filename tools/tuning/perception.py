@@ -8,7 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.simulation.scenario import Person
 from aerodaas.simulation.world import Thing, World
+from aerodaas.types.appearance import ZONE_BYTES, ZONES
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
 from aerodaas.types.geometry import CameraModel, rotation_from_rpy
@@ -19,6 +21,10 @@ _OUTLINE = np.array([0.92, 0.95])
 """Width and height of a person's or vest's outline in parts of the box in space around it."""
 _SMALLEST = 4.0
 """Pixels; no detector finds less."""
+_COLOUR_NOISE = 2.0
+"""Standard deviation of a person's colours from one frame to the next, of 255."""
+_ZONE_HIDDEN = 0.2
+"""Part of the frames in which a zone of a person's appearance cannot be told."""
 _HIDDEN = 0.6
 """Part of a box behind another person's body from which on it is not seen."""
 
@@ -64,19 +70,23 @@ class TruthPerception:
         label: str,
         camera: CameraModel,
         *,
-        bystanders: Sequence[Thing] = (),
+        bystanders: Sequence[tuple[Thing, str]] = (),
         seed: int,
         noise: float = 0.02,
         misses: float = 0.03,
+        looks: bool = True,
     ) -> None:
         """`noise` is a standard deviation in parts of the box's height, `misses` a share.
 
-        `thing` is seen with `label`, each of `bystanders` as a person.
+        `thing` is seen with `label`, each of `bystanders` with its own; people have appearances if
+        `looks`.
         """
-        self._labels = [(thing, label), *((one, "person") for one in bystanders)]
+        self._labels = [(thing, label), *bystanders]
         self._camera = camera
         self._noise, self._misses = noise, misses
+        self._has_looks = looks
         self._random = np.random.default_rng(seed)
+        self._colours = np.random.default_rng([seed, 1])
 
     def look(
         self, header: Header, pose: Odometry, believed: Odometry, context: Context
@@ -98,8 +108,20 @@ class TruthPerception:
             noisy = np.clip(outline + errors * (edges[3] - edges[1]), 0, size)
             left, top, right, bottom = noisy.tolist()
             if min(right - left, bottom - top) > _SMALLEST:
-                items.append(Detection((left, top, right, bottom), label, 0.9))
+                looks = self._looks(thing)
+                items.append(Detection((left, top, right, bottom), label, 0.9, appearance=looks))
         return Detections(header, tuple(items), camera.width, camera.height, camera, believed)
+
+    def _looks(self, thing: Thing) -> bytes | None:
+        """Appearance of a person, drawn from their clothes, with noise and hidden zones."""
+        if not (self._has_looks and isinstance(thing.spec, Person)):
+            return None
+        clothes = thing.spec.clothes
+        worn = np.random.default_rng(list(thing.seed.encode()) if clothes is None else clothes)
+        colours = worn.uniform(30, 220, (ZONES, ZONE_BYTES))
+        noisy = colours + self._colours.normal(0, _COLOUR_NOISE, colours.shape)
+        noisy[self._colours.random(ZONES) < _ZONE_HIDDEN] = 0.0
+        return bytes(np.clip(noisy, 0, 255).astype(np.uint8).reshape(-1))
 
     def _is_hidden(self, thing: Thing, edges: Edges, time: float, pose: Odometry) -> bool:
         """Whether most of a box is behind the body of somebody nearer."""

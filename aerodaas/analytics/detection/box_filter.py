@@ -57,6 +57,10 @@ class BoxFilter:
         self._covariance = self._covariance + dt * self._velocity_variance + noise * dt**3 / 2
         self._velocity_variance = self._velocity_variance + noise * dt**2
 
+    def shift(self, u: float, v: float) -> None:
+        """Move the estimate by pixels, as the camera has turned."""
+        self.value = self.value + np.array([u, v, 0.0, 0.0])
+
     def distance(self, box: Box) -> tuple[float, float]:
         """Squared Mahalanobis distance of a detected `box`, and log determinant of the covariance.
 

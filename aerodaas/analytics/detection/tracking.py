@@ -1,23 +1,28 @@
 """Multi-object tracking: persistent identities through misses, crossings and occlusions.
 
-Each target has a Kalman filter of its box. Targets and detections are associated in order of
-likelihood (greedy global nearest neighbour), so that a new, uncertain track does not take the
-detection of an established one. Detections of low score may only continue a track, after those of
-high score (ByteTrack, Zhang et al. 2022). The optimal assignment differs from this only in crowds,
-and would need scipy.
+Each target has a Kalman filter of its box, and people have an appearance. Targets and detections
+are associated in order of likelihood by both (greedy global nearest neighbour), so that a new,
+uncertain track does not take the detection of an established one. Detections of low score may only
+continue a track, after those of high score (ByteTrack, Zhang et al. 2022). The optimal assignment
+differs from this only in crowds, and would need scipy.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.detection.box_filter import BoxFilter
+from aerodaas.analytics.detection.looks import Looks, touches
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Detection, Detections
+from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["Track", "Tracker", "TrackingAnalytics"]
 
@@ -25,6 +30,9 @@ _NEWEST = 0.2
 """Weight of the newest detection in the score of a track, a mean over about five detections."""
 _GATE = 25.0
 """Squared Mahalanobis distance, four degrees of freedom, exceeded by 1 in 20,000 true boxes."""
+_COLOURS, _UNLIKE = 5.0, 14.0
+"""Standard deviation of the unlikeness of one person's appearances, and its gate, which 1 in 100
+of them exceeds."""
 
 
 @dataclass(eq=False)
@@ -37,10 +45,13 @@ class Track:
     filter: BoxFilter
     score: float
     """Mean confidence of its detections, weighted towards the newest."""
+    born: int = 0
+    """Mission time of its first detection, nanoseconds."""
     hits: int = 1
     """Number of its detections."""
     age: float = 0.0
     """Seconds since its last detection."""
+    looks: Looks = field(default_factory=Looks)
 
 
 class Tracker:
@@ -57,6 +68,8 @@ class Tracker:
         self.tracks: list[Track] = []
         """All tracks that are not lost, including those out of sight."""
         self._stamp: int | None = None
+        self._attitude: NDArray[np.float64] | None = None
+        """Rotation (3, 3) from the body to the local frame at the last frame."""
         self._next_id = 1
 
     def update(self, detections: Detections) -> Detections:
@@ -69,9 +82,12 @@ class Tracker:
         if dt < 0:
             return detections
         self._stamp = stamp
+        turned = self._turned(detections)
         for track in self.tracks:
             track.filter.predict(dt)
             track.age += dt
+            if turned is not None:
+                _turn(track.filter, turned, detections)
         items = [item for item in detections if all(map(math.isfinite, item.box))]
         owners = self._associate(items)
         self.tracks = [track for track in self.tracks if track.age <= self.max_age]
@@ -84,6 +100,17 @@ class Tracker:
     def find(self, track_id: int | None) -> Track | None:
         """Return the track of this id; None if it is unknown or lost."""
         return next((track for track in self.tracks if track.id == track_id), None)
+
+    def _turned(self, detections: Detections) -> NDArray[np.float64] | None:
+        """Rotation (3, 3) of body vectors of the last frame into those of this one, if known."""
+        before, pose = self._attitude, detections.odometry
+        self._attitude = None
+        if pose is None or detections.camera is None:
+            return None
+        if not math.isfinite(pose.roll + pose.pitch + pose.yaw):
+            return None
+        self._attitude = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+        return None if before is None else self._attitude.T @ before
 
     def _associate(self, items: Sequence[Detection]) -> list[Track | None]:
         """Assign each detection an existing track, or a new one if its score suffices."""
@@ -105,7 +132,7 @@ class Tracker:
                 continue
             if track is None:
                 track = owners[column] = Track(
-                    self._next_id, item, BoxFilter(item.box), item.score, hits=0
+                    self._next_id, item, BoxFilter(item.box), item.score, self._stamp or 0, hits=0
                 )
                 self._next_id += 1
                 self.tracks.append(track)
@@ -115,6 +142,8 @@ class Tracker:
             track.detection = replace(item, track_id=track.id)
             track.hits += 1
             track.age = 0.0
+            if item.appearance is not None and not _is_touched(item, items):
+                track.looks.add(self._stamp or 0, item.appearance)
         return [owners.get(column) for column in range(len(items))]
 
 
@@ -139,9 +168,33 @@ class TrackingAnalytics(Analytics[Detections]):
         return self.tracker.update(item)
 
 
+def _is_touched(item: Detection, items: Sequence[Detection]) -> bool:
+    """Whether another box with the same label touches this one, and may hide part of it."""
+    others = (one for one in items if one is not item and one.label == item.label)
+    return any(touches(item.box, one.box) for one in others)
+
+
+def _turn(box: BoxFilter, turned: NDArray[np.float64], detections: Detections) -> None:
+    """Move a box to where a camera that has turned shows what was there."""
+    camera = detections.camera
+    if camera is None:
+        return
+    scale_u, scale_v = camera.width / detections.width, camera.height / detections.height
+    u, v = float(box.value[0]), float(box.value[1])
+    towards = turned @ camera.ray(u * scale_u, v * scale_v)
+    new_u, new_v, depth = camera.project(towards + np.array(camera.mount))
+    if depth > 0.0:
+        box.shift(new_u / scale_u - u, new_v / scale_v - v)
+
+
 def _cost(track: Track, item: Detection) -> float | None:
     """Twice the negative log-likelihood of the pair, up to a constant; None beyond the gate."""
     if track.detection.label != item.label:
         return None
     distance, spread = track.filter.distance(item.box)
-    return distance + spread if distance < _GATE else None
+    if distance >= _GATE:
+        return None
+    unlike = track.looks.unlike(item.appearance)
+    if unlike is not None and unlike > _UNLIKE:
+        return None
+    return distance + spread + (1.0 if unlike is None else (unlike / _COLOURS) ** 2)

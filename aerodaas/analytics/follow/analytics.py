@@ -15,6 +15,7 @@ from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.detection.overlap import one_for_each
 from aerodaas.analytics.detection.tracking import Tracker
+from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.analytics.people.debounce import Debounce
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -38,8 +39,12 @@ _ALOFT = (1.0, 0.6)
 """Height in metres, or fraction of the following height, above which all near people are seen:
 from the ground, the chest of a person 3 m away is above the image, but that of a more distant
 passer-by is not."""
+_BLINK = 0.5
+"""Seconds for which a detector may miss a target before another one is chosen."""
 _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
+_NOBODY = 0
+"""No track has this id."""
 _PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55, widest=0.9)
 """Label and size of a bystander."""
 _WORN = 0.8
@@ -136,7 +141,10 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             max_age=self.controller.lost.slow, min_hits=self.choice.looks, sure=self.choice.sure
         )
         self.target: int | None = None
-        """Id of the followed track."""
+        """Id of the followed track; `_NOBODY` while none is known to be the followed person's."""
+        self._given_up = False
+        """Whether a target was given up, so that the next one may be another."""
+        self._identity = TargetIdentity()
         self._blocked = Debounce(*_BLOCKED)
         self._alarm = Debounce(1, 1)
         self._aloft = 0
@@ -154,7 +162,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._aloft = self._aloft + 1 if self._is_aloft(item) else 0
         phase = self.controller.phase
         tracked = self.tracker.update(self._possible(item))
-        detection = self._target_in(tracked)
+        detection = self._identified(self._target_in(tracked), tracked, context)
         sighting = None if detection is None else self._sight(detection, item)
         others = self._others(tracked, detection)
         bystanders = self._bystanders(item, sighting)
@@ -193,6 +201,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self.target is None and self._aloft < self.choice.looks:
             return None
         lost = mine is None and self._is_lost()
+        if lost:
+            trusted = [item for item in trusted if self._may_be_mine(item)]
         least = self.choice.score if lost or self.target is None else self._score_to_displace(mine)
         chosen = [
             item
@@ -204,11 +214,66 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if not chosen:
             return mine
         best = max(chosen, key=lambda item: item.area * item.score)
+        if self.target is None and self._is_surpassed(best):
+            return None
         if mine is not None:
             self.controller.change_target()
+        if not lost:
+            self._identity.reset()
         self.target = best.track_id
         self._width = self.size.width
         return best
+
+    def _is_surpassed(self, best: Detection) -> bool:
+        """Whether this frame only missed a better target than `best`."""
+        return any(
+            0.0 < track.age <= _BLINK
+            and track.detection.label in self.labels
+            and track.detection.area * track.score > best.area * best.score
+            for track in self.tracker.tracks
+        )
+
+    def _may_be_mine(self, item: Detection) -> bool:
+        """Whether a box may show the followed person, by its looks."""
+        track = self.tracker.find(item.track_id)
+        looks = () if track is None else track.looks.since()
+        if not looks and item.appearance is not None:
+            looks = (item.appearance,)
+        return self._identity.may_be_mine(item.track_id, looks)
+
+    def _identified(
+        self, mine: Detection | None, tracked: Detections, context: Context
+    ) -> Detection | None:
+        """Return the box that shows the followed person, or None if it is not known which does."""
+        if self.target is None:
+            return mine
+        identity, stamp = self._identity, tracked.header.stamp
+        held = self.tracker.find(self.target)
+        # Nobody without a vest is taken for somebody in one; their own body's box touches a vest.
+        tracks = [one for one in self.tracker.tracks if one.detection.label in self.labels]
+        identity.watch(held, [one for one in tracks if one is not held], stamp)
+        if identity.certainty is Certainty.CERTAIN:
+            return mine
+        shown = {item.track_id: item for item in tracked.labelled(*self.labels)}
+        verdicts = identity.compare(one for one in tracks if one.id in shown and one.age == 0.0)
+        found = next((track for track, verdict in verdicts.items() if verdict), None)
+        if found is not None:
+            if found is not held:
+                self.controller.change_target()
+                self.target = found.id
+            identity.settle(found)
+            return shown[found.id]
+        if identity.doubt(stamp):
+            holds = identity.certainty is Certainty.UNCERTAIN
+            then = "the drone holds" if holds else "the drone follows the likelier one"
+            what = " or ".join(self.labels)
+            text = f"Another {what} came close. Which is which is unknown; {then}."
+            context.alert(Alert(tracked.header, "target_uncertain", text))
+        if identity.certainty is Certainty.UNCERTAIN or (
+            held is not None and verdicts.get(held) is False
+        ):
+            self.target = _NOBODY
+        return None if self.target == _NOBODY else mine
 
     def _is_aloft(self, item: Detections) -> bool:
         """Whether the drone is high enough to see all near people for a first choice."""
@@ -237,6 +302,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
 
     def _let_go(self, item: Detections, context: Context) -> None:
         self.target = None
+        self._identity.reset()
         self.controller.give_up()
         text = f"The {' or '.join(self.labels)} has left the area; following ends."
         context.alert(Alert(item.header, "target_left_area", text))
@@ -275,6 +341,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         for detection in found:
             sighting = sight(detection, item, self.size.with_width(self._width))
             if sighting is None:
+                continue
+            if not self._may_be_mine(detection):
                 continue
             off = float(np.linalg.norm(sighting.offset - expected.offset))
             if sighting.bound or expected.bound:
@@ -356,10 +424,15 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             return
         _log.info("following: %s, was %s", phase.value, before.value)
         what = " or ".join(self.labels)
+        if before is FollowPhase.WAITING and self._given_up:
+            text = f"A {what} is followed again; it may be another one."
+            context.alert(Alert(item.header, "target_chosen", text))
         if phase is FollowPhase.SEARCHING:
             context.alert(Alert(item.header, "target_lost", f"The {what} is out of sight."))
         elif phase is FollowPhase.WAITING:
             self.target = None
+            self._given_up = True
+            self._identity.reset()
             text = f"The {what} was not found again; following ends."
             context.alert(Alert(item.header, "target_given_up", text))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from panda3d.core import NodePath
 
 from aerodaas.simulation.scenario import (
@@ -40,7 +41,9 @@ class Looks:
         """Choose the outfit of a person."""
         if not isinstance(thing.spec, Person):
             raise TypeError(f"{thing.id} is no person")
-        return Outfit.draw(thing.spec, rng_of(thing))
+        number = thing.spec.clothes
+        rng = rng_of(thing) if number is None else np.random.default_rng(number)
+        return Outfit.draw(thing.spec, rng)
 
     def car(self, thing: Thing) -> CarShape:
         """Choose the shape of a car."""

@@ -22,7 +22,7 @@ def meet(
     follow = VipFollowAnalytics()
     if not guarded:
         follow.controller.guard = NoGuard(follow.controller.limits)
-    seen = others if guarded else []
+    seen = [(one, "person") for one in others] if guarded else []
     eyes = TruthPerception(person, "vest", TELLO, bystanders=seen, seed=seed)
     chase = Chase(person, "vest", rate, 0.25, seed=seed)
     flown = chase.fly(follow, eyes, turn + 6.0 / speed + 3.0, monitor=near)
