@@ -110,6 +110,8 @@ class Recording:
             RecordingError: If the file is no MCAP recording or cannot be read.
         """
         path = Path(path)
+        if path.is_dir():
+            raise RecordingError(f"{path} is a folder{_recordings_in(path)}")
         try:
             size = path.stat().st_size
             file = path.open("rb")
@@ -315,3 +317,13 @@ class Recording:
             self._loaded[block.offset] = messages
             while len(self._loaded) > _KEPT_BLOCKS:
                 self._loaded.popitem(last=False)
+
+
+def _recordings_in(folder: Path) -> str:
+    """Say which recording of a folder may be meant."""
+    found = [one for one in folder.glob("*.mcap") if one.is_file()]
+    if not found:
+        return " without recordings"
+    newest = max(found, key=lambda one: one.stat().st_mtime)
+    more = f"; {len(found) - 1} more are there" if len(found) > 1 else ""
+    return f": give a recording, such as its newest, {newest}{more}"

@@ -329,10 +329,20 @@ def test_a_file_that_cannot_be_read_is_closed(
 
 
 def test_a_folder_is_no_recording(tmp_path: Path) -> None:
-    """The path and the reason are named."""
+    """The newest recording in it is named, if there is any."""
     with pytest.raises(RecordingError) as refused:
         Recording.open(tmp_path)
-    assert str(refused.value) == f"cannot open the recording {tmp_path}: Is a directory"
+    assert str(refused.value) == f"{tmp_path} is a folder without recordings"
+    for age, name in enumerate(("b.mcap", "a.mcap", "c.mcap")):
+        write_file(tmp_path / name, FLIGHT)
+        os.utime(tmp_path / name, (1000 - age, 1000 - age))
+    with pytest.raises(RecordingError) as refused:
+        Recording.open(tmp_path)
+    newest = tmp_path / "b.mcap"
+    said = (
+        f"{tmp_path} is a folder: give a recording, such as its newest, {newest}; 2 more are there"
+    )
+    assert str(refused.value) == said
 
 
 def test_a_recording_is_closed_by_leaving_it(tmp_path: Path) -> None:
