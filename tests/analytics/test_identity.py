@@ -99,6 +99,16 @@ def test_of_somebody_who_was_never_seen_well_another_in_sight_tells() -> None:
     assert verdicts == {scene.mine: True, scene.other: False}
 
 
+def test_of_somebody_alike_who_was_never_seen_well_nothing_tells() -> None:
+    """Neither of two in sight who look the same is taken for the followed one."""
+    scene = Scene(7, -1)
+    scene.touch()
+    for _ in range(3):
+        scene.show((7, 7))
+    verdicts = scene.identity.compare([scene.mine, scene.other])
+    assert verdicts == {scene.mine: None, scene.other: None}
+
+
 def test_the_followed_person_found_again_is_nobody_else() -> None:
     """A track that began after the touch is not kept as another person's looks."""
     scene = Scene(7, 8)
