@@ -12,7 +12,6 @@ from aerodaas.analytics import CarFollowAnalytics, PersonFollowAnalytics, VipFol
 from aerodaas.analytics.boxes import shipped_detector
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.follow.analytics import FollowAnalytics, _is_near
-from aerodaas.following.follow_controller import FollowPhase
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
@@ -234,9 +233,9 @@ def test_who_was_seen_beside_the_lost_one_does_not_replace_them() -> None:
     for _ in range(20):
         assert watched.show(vest(2.0, 0.0), other) is not None or watched.step < 10
     lost = [watched.show(other) for _ in range(170)]
-    assert watched.follow.controller.phase is FollowPhase.SEARCHING
+    assert watched.follow.controller.phase.value == "searching"
     assert all(command is None or command.velocity[0] <= 0.0 for command in lost[40:])
     for _ in range(30):
         watched.show(other)
-    assert watched.follow.controller.phase is FollowPhase.FOLLOWING
+    assert watched.follow.controller.phase.value == "following"
     assert watched.told == ["target_lost", "target_given_up", "target_chosen"]
