@@ -90,7 +90,9 @@ _ROBOT: dict[str, Rule] = {
     "settings": dict.fromkeys(("max_speed", "max_climb", "full_speed", "full_climb"), _number),
     "sensors": [_SENSOR],
     "limits": _LIMITS,
-    "mission": _fields("on_complete", "resume_after", "plan_timeout", "stall_timeout"),
+    "mission": _fields(
+        "on_complete", "resume_after", "plan_timeout", "stall_timeout", "photo_timeout"
+    ),
 }
 _TASK = _fields(
     "benefit",

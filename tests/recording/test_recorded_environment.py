@@ -20,6 +20,7 @@ from aerodaas.cli.flown_tasks import Flown
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.tello.settings import TelloSettings
 from aerodaas.recording.export.track import write_gpx
@@ -51,6 +52,12 @@ LOCAL_ALONE = {
     "robots.sensors.settings.topic",
     "sensors.settings.path",
     "sensors.settings.topic",
+    # No replay turns a gimbal: its camera shows the recorded pictures.
+    *(
+        f"{place}sensors.settings.gimbal.{name}"
+        for place in ("robots.", "")
+        for name in GimbalConfig.model_fields
+    ),
     "compute.node",
     "compute.endpoint.url",
     "compute.endpoint.protocol",
