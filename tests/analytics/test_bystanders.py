@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -239,3 +240,31 @@ def test_who_was_seen_beside_the_lost_one_does_not_replace_them() -> None:
         watched.show(other)
     assert watched.follow.controller.phase.value == "following"
     assert watched.told == ["target_lost", "target_given_up", "target_chosen"]
+
+
+def test_the_followed_one_is_found_on_the_other_side_by_their_looks() -> None:
+    """Two in vests changed places while nobody's clothes could be seen."""
+    watched = Watched(VipFollowAnalytics())
+    random = np.random.default_rng(3)
+    mine, theirs = (random.integers(40, 200, 24).astype(np.uint8).tobytes() for _ in range(2))
+
+    def both(left: float, *, seen: bool = True) -> tuple[Detection, Detection]:
+        boxes = vest(2.5, left), vest(2.8, -left)
+        looks = (mine, theirs) if seen else (None, None)
+        first, second = (
+            replace(box, appearance=look) for box, look in zip(boxes, looks, strict=True)
+        )
+        return first, second
+
+    for _ in range(20):
+        watched.show(*both(0.5))
+    for left in np.linspace(0.5, 0.0, 6).tolist() + np.linspace(0.0, 0.5, 6).tolist():
+        # What boxes alone suggest: they met, and went back to where they came from.
+        watched.show(*both(left, seen=False))
+    for _ in range(20):
+        watched.show(*both(-0.5))
+    held = watched.follow.tracker.find(watched.follow.target)
+    assert held is not None
+    assert held.detection.appearance == mine
+    assert held.detection.centre[0] > TELLO.cx
+    assert "target_uncertain" not in watched.told

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from aerodaas.analytics.detection.tracking import Tracker, TrackingAnalytics
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection, Detections, Header
+from aerodaas.types.data import Detection, Detections, Header, Odometry
+from aerodaas.types.geometry import CameraModel
 
 
 def detections(step: int, boxes: Sequence[tuple[float, ...]], label: str = "person") -> Detections:
@@ -149,3 +150,39 @@ def test_the_unsure_continue_a_track_and_begin_none() -> None:
     both = unsure(detections(4, [person(300), person(306)]), 0)
     assert ids(tracker.update(both)) == [None, 1]
     assert len(tracker.tracks) == 1
+
+
+def test_somebody_who_looks_otherwise_takes_no_track_over() -> None:
+    """In the very place of somebody just hidden, another one is another one."""
+    tracker = Tracker()
+    random = np.random.default_rng(3)
+    first, second = (random.integers(40, 200, 24).astype(np.uint8).tobytes() for _ in range(2))
+
+    def seen(step: int, appearance: bytes) -> list[int | None]:
+        found = detections(step, [person(300)])
+        shown = tuple(replace(item, appearance=appearance) for item in found)
+        return ids(tracker.update(replace(found, items=shown)))
+
+    for step in range(5):
+        seen(step, first)
+    assert seen(5, first) == [1]
+    seen(6, second)
+    assert seen(7, second) == [2]
+    assert seen(8, first) == [1]
+
+
+@pytest.mark.parametrize(("told", "kept"), [(True, 1), (False, None)])
+def test_a_camera_that_turns_loses_nobody(told: bool, kept: int | None) -> None:  # noqa: FBT001
+    """A step of 0.35 rad moves the picture by more than anybody walks, if the attitude is told."""
+    camera = CameraModel.from_fov(1280, 720, math.radians(82.6))
+    tracker = Tracker()
+
+    def seen(step: int, yaw: float) -> list[int | None]:
+        pose = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), yaw)
+        u, v, _ = camera.project(np.array([math.cos(-yaw), math.sin(-yaw), 0.0]))
+        found = detections(step, [person(u, v)])
+        return ids(tracker.update(replace(found, camera=camera, odometry=pose) if told else found))
+
+    for step in range(6):
+        seen(step, 0.0)
+    assert seen(6, 0.35) == [kept]
