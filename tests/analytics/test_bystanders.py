@@ -243,7 +243,7 @@ def test_who_was_seen_beside_the_lost_one_does_not_replace_them() -> None:
 
 
 def test_the_followed_one_is_found_on_the_other_side_by_their_looks() -> None:
-    """Two in vests changed places while nobody's clothes could be seen."""
+    """Two in vests met and went back while nobody's clothes could be seen."""
     watched = Watched(VipFollowAnalytics())
     random = np.random.default_rng(3)
     mine, theirs = (random.integers(40, 200, 24).astype(np.uint8).tobytes() for _ in range(2))
@@ -257,14 +257,14 @@ def test_the_followed_one_is_found_on_the_other_side_by_their_looks() -> None:
         return first, second
 
     for _ in range(20):
-        watched.show(*both(0.5))
-    for left in np.linspace(0.5, 0.0, 6).tolist() + np.linspace(0.0, 0.5, 6).tolist():
-        # What boxes alone suggest: they met, and went back to where they came from.
+        watched.show(*both(0.9))
+    towards = np.linspace(0.9, 0.1, 7).tolist()
+    for left in (*towards, *reversed(towards)):
         watched.show(*both(left, seen=False))
     for _ in range(20):
-        watched.show(*both(-0.5))
+        watched.show(*both(0.9))
     held = watched.follow.tracker.find(watched.follow.target)
     assert held is not None
     assert held.detection.appearance == mine
-    assert held.detection.centre[0] > TELLO.cx
+    assert held.detection.centre[0] < TELLO.cx
     assert "target_uncertain" not in watched.told
