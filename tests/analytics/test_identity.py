@@ -88,6 +88,17 @@ def test_who_looks_the_same_cannot_be_told() -> None:
     assert scene.identity.compare([scene.mine]) == {scene.mine: None}
 
 
+def test_a_small_difference_between_two_does_not_tell_them_apart() -> None:
+    """Light and side change somebody's looks by more, so the exact match is no proof."""
+    scene = Scene(7, -1)
+    for stamp in range(1, 6):
+        scene.other.looks.add(stamp, look(7, noise=2))
+    scene.touch()
+    for _ in range(3):
+        scene.show((7, -1))
+    assert scene.identity.compare([scene.mine]) == {scene.mine: None}
+
+
 def test_of_somebody_who_was_never_seen_well_another_in_sight_tells() -> None:
     """Whose looks are unknown is told by whoever in sight looks otherwise; nobody else tells."""
     scene = Scene(7, -1)
