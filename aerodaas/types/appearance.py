@@ -94,7 +94,7 @@ def appearance_in_box(image: NDArray[np.uint8], box: Box, label: str) -> bytes |
     """Describe the person of whom `box` (left, top, right, bottom in pixels) shows `label`.
 
     `image` is height x width x 3, BGR. None for labels of other things, if the picture's edge
-    cuts the box, and if fewer than two zones can be told.
+    cuts the box, for who lies, and if fewer than two zones can be told.
     """
     if label not in _CHEST or not all(map(np.isfinite, box)):
         return None
@@ -105,6 +105,8 @@ def appearance_in_box(image: NDArray[np.uint8], box: Box, label: str) -> bytes |
     if min(left, top) < _EDGE or right > width - _EDGE or bottom > height - _EDGE:
         return None
     tall = bottom - top
+    if right - left > tall:
+        return None
     middle, neck, chest = (left + right) / 2, top + start * tall, share * tall
     if chest < _SMALLEST:
         return None

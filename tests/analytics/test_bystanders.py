@@ -268,3 +268,16 @@ def test_the_followed_one_is_found_on_the_other_side_by_their_looks() -> None:
     assert held.detection.appearance == mine
     assert held.detection.centre[0] < TELLO.cx
     assert "target_uncertain" not in watched.told
+
+
+def test_a_followed_person_who_looks_otherwise_where_they_were_stays_followed() -> None:
+    """Who falls or turns shows other colours; with nobody else about, the place is enough."""
+    watched = Watched(VipFollowAnalytics())
+    random = np.random.default_rng(3)
+    before, after = (random.integers(40, 200, 24).astype(np.uint8).tobytes() for _ in range(2))
+    for _ in range(20):
+        watched.show(replace(vest(2.0, 0.0), appearance=before))
+    for _ in range(60):
+        watched.show(replace(vest(2.0, 0.0), appearance=after))
+    assert watched.follow.controller.phase.value == "following"
+    assert not watched.told

@@ -142,6 +142,7 @@ def test_while_contested_only_looks_open_the_way_back() -> None:
     """A box that cannot be compared may show the followed person only while nobody came close."""
     scene = Scene(7, 8)
     assert scene.identity.may_be_mine(3, ())
+    assert scene.identity.may_be_mine(3, (look(9),))
     scene.touch()
     assert not scene.identity.may_be_mine(3, ())
     assert not scene.identity.may_be_mine(3, (look(8),))

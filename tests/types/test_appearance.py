@@ -71,11 +71,12 @@ def test_shade_changes_little() -> None:
         ("vest", (300.0, 0.0, 356.0, 80.0)),
         ("vest", (300.0, 280.0, 356.0, 360.0)),
         ("vest", (300.0, 120.0, 304.0, 130.0)),
+        ("vest", (280.0, 120.0, 376.0, 180.0)),
         ("vest", (float("nan"), 120.0, 356.0, 200.0)),
     ],
 )
 def test_what_does_not_show_clothes_has_no_appearance(label: str, box: Box) -> None:
-    """Other things, boxes that the picture's edge cuts, and what is far away."""
+    """Other things, boxes that the picture's edge cuts, what is far away, and who lies."""
     image, _ = picture(ANNA)
     assert appearance_in_box(image, box, label) is None
 

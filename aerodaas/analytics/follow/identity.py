@@ -113,11 +113,12 @@ class TargetIdentity:
 
     def may_be_mine(self, track: int | None, looks: Sequence[bytes]) -> bool:
         """Whether a box of this `track` may show the followed person while theirs is not seen."""
-        if self.certainty is Certainty.CERTAIN and self._together[track or 0] >= _TOGETHER:
-            return False
+        if self.certainty is Certainty.CERTAIN:
+            # Where nobody came close, the place tells more than looks, as of who has fallen.
+            return self._together[track or 0] < _TOGETHER
         lead = self._lead(looks)
         if lead is None:
-            return self.certainty is Certainty.CERTAIN or not self._looks
+            return not self._looks
         return lead > 0.0
 
     def settle(self, target: Track) -> None:
