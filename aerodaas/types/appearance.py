@@ -129,9 +129,7 @@ def appearance_in_box(image: NDArray[np.uint8], box: Box, label: str) -> bytes |
 def unlikeness(some: Sequence[bytes], others: Sequence[bytes]) -> float | None:
     """Difference between appearances of two people, 0 to 20, in parts of 255.
 
-    The median over all pairs; None if no pair can be compared. On renders of 16 people in yellow
-    vests, one picture against twelve: 4 for the same person in the median and below 11 in nine of
-    ten, 12 and above 8 for two people.
+    The median over all pairs; None if no pair can be compared.
     """
     if not (some and others):
         return None

@@ -31,8 +31,7 @@ _NEWEST = 0.2
 _GATE = 25.0
 """Squared Mahalanobis distance, four degrees of freedom, exceeded by 1 in 20,000 true boxes."""
 _COLOURS, _UNLIKE = 5.0, 14.0
-"""Standard deviation of the unlikeness of one person's appearances, and its gate, which 1 in 100
-of them exceeds."""
+"""Standard deviation of the unlikeness of one person's appearances from one side, and its gate."""
 
 
 @dataclass(eq=False)
@@ -82,12 +81,10 @@ class Tracker:
         if dt < 0:
             return detections
         self._stamp = stamp
-        turned = self._turned(detections)
         for track in self.tracks:
             track.filter.predict(dt)
             track.age += dt
-            if turned is not None:
-                _turn(track.filter, turned, detections)
+        self._follow_camera(detections)
         items = [item for item in detections if all(map(math.isfinite, item.box))]
         owners = self._associate(items)
         self.tracks = [track for track in self.tracks if track.age <= self.max_age]
@@ -101,16 +98,23 @@ class Tracker:
         """Return the track of this id; None if it is unknown or lost."""
         return next((track for track in self.tracks if track.id == track_id), None)
 
-    def _turned(self, detections: Detections) -> NDArray[np.float64] | None:
-        """Rotation (3, 3) of body vectors of the last frame into those of this one, if known."""
-        before, pose = self._attitude, detections.odometry
+    def _follow_camera(self, detections: Detections) -> None:
+        """Move each box to where the camera, if it has turned since the last frame, shows it."""
+        before, pose, camera = self._attitude, detections.odometry, detections.camera
         self._attitude = None
-        if pose is None or detections.camera is None:
-            return None
-        if not math.isfinite(pose.roll + pose.pitch + pose.yaw):
-            return None
+        if pose is None or camera is None or not math.isfinite(pose.roll + pose.pitch + pose.yaw):
+            return
         self._attitude = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
-        return None if before is None else self._attitude.T @ before
+        if before is None:
+            return
+        turned = self._attitude.T @ before
+        scale_u, scale_v = camera.width / detections.width, camera.height / detections.height
+        for track in self.tracks:
+            u, v = float(track.filter.value[0]), float(track.filter.value[1])
+            towards = turned @ camera.ray(u * scale_u, v * scale_v)
+            new_u, new_v, depth = camera.project(towards + np.array(camera.mount))
+            if depth > 0.0:
+                track.filter.shift(new_u / scale_u - u, new_v / scale_v - v)
 
     def _associate(self, items: Sequence[Detection]) -> list[Track | None]:
         """Assign each detection an existing track, or a new one if its score suffices."""
@@ -172,19 +176,6 @@ def _is_touched(item: Detection, items: Sequence[Detection]) -> bool:
     """Whether another box with the same label touches this one, and may hide part of it."""
     others = (one for one in items if one is not item and one.label == item.label)
     return any(touches(item.box, one.box) for one in others)
-
-
-def _turn(box: BoxFilter, turned: NDArray[np.float64], detections: Detections) -> None:
-    """Move a box to where a camera that has turned shows what was there."""
-    camera = detections.camera
-    if camera is None:
-        return
-    scale_u, scale_v = camera.width / detections.width, camera.height / detections.height
-    u, v = float(box.value[0]), float(box.value[1])
-    towards = turned @ camera.ray(u * scale_u, v * scale_v)
-    new_u, new_v, depth = camera.project(towards + np.array(camera.mount))
-    if depth > 0.0:
-        box.shift(new_u / scale_u - u, new_v / scale_v - v)
 
 
 def _cost(track: Track, item: Detection) -> float | None:

@@ -100,23 +100,20 @@ class TargetIdentity:
         with the others in sight.
         """
         fresh = {one: looks for one in tracks if len(looks := one.looks.since(self._touched))}
-        leads: dict[Track, float | None] = {}
+        unlike = {track: unlikeness(self._looks, looks) for track, looks in fresh.items()}
+        found: dict[Track, bool | None] = {}
         for track, looks in fresh.items():
-            beside = [
-                unlikeness(self._looks, other) for one, other in fresh.items() if one is not track
-            ]
-            leads[track] = self._lead(looks, beside) if len(looks) >= _LOOKS else None
-        return {
-            track: None if lead is None or abs(lead) < _MARGIN else lead > 0.0
-            for track, lead in leads.items()
-        }
+            beside = [off for one, off in unlike.items() if one is not track and off is not None]
+            lead = self._lead(looks, unlike[track], beside) if len(looks) >= _LOOKS else None
+            found[track] = None if lead is None or abs(lead) < _MARGIN else lead > 0.0
+        return found
 
     def may_be_mine(self, track: int | None, looks: Sequence[bytes]) -> bool:
         """Whether a box of this `track` may show the followed person while theirs is not seen."""
         if self.certainty is Certainty.CERTAIN:
             # Where nobody came close, the place tells more than looks, as of who has fallen.
             return self._together[track or 0] < _TOGETHER
-        lead = self._lead(looks)
+        lead = self._lead(looks, unlikeness(self._looks, looks))
         if lead is None:
             return not self._looks
         return lead > 0.0
@@ -139,23 +136,23 @@ class TargetIdentity:
         self.certainty = Certainty.UNCERTAIN if self._looks else Certainty.CERTAIN
         return True
 
-    def _lead(self, looks: Sequence[bytes], beside: Sequence[float | None] = ()) -> float | None:
+    def _lead(
+        self, looks: Sequence[bytes], mine: float | None, beside: Sequence[float] = ()
+    ) -> float | None:
         """How much more these looks are like the followed person's than like anybody else's.
 
-        `beside` is how unlike the followed person others in sight are. None if looks cannot be
-        compared, or somebody looks like the followed person.
+        `mine` is how unlike the followed person they are, `beside` the same of others in sight.
+        None if looks cannot be compared, or somebody looks like the followed person.
         """
-        mine = unlikeness(self._looks, looks)
         if mine is None:
             return None
         known = [one for one in self._rivals.values() if len(one) >= _LOOKS]
-        unlike = [one for one in beside if one is not None]
-        if len(known) < len(self._rivals) and not unlike:
+        if len(known) < len(self._rivals) and not beside:
             return None
-        least = _OTHER if known or unlike else _STRANGER
+        least = _OTHER if known or beside else _STRANGER
         for rival in known:
             theirs, apart = unlikeness(rival, looks), unlikeness(self._looks, rival)
             if theirs is None or apart is None or apart < _ALIKE:
                 return None
             least = min(least, theirs)
-        return min([least, *unlike]) - mine
+        return min([least, *beside]) - mine
