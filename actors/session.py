@@ -79,6 +79,11 @@ class Session:
         """True if mission time advances only when all actors have processed its data."""
         return self.speed is None
 
+    @property
+    def simulates_executions(self) -> bool:
+        """True in lockstep, if tasks of the analytics scheduler take mission time."""
+        return self.lockstep and self.environment.simulation.execution_times is not None
+
     def clock(self) -> Clock:
         """New mission clock for a process of this run."""
         if self.speed is None:

@@ -77,6 +77,8 @@ class Managed:
     open_times: frozenset[str] = frozenset()
     """Times of the profile that are to be measured, because the user gave none."""
     triggers: tuple[TriggerSpec, ...] = ()
+    offloadable: bool = True
+    """Whether anything in the cloud runs it."""
 
 
 class DispatcherActor(StreamActor):
@@ -486,13 +488,17 @@ class DispatcherActor(StreamActor):
             complain = partial(self._complain, node)
             self._triggers[node].fire(item, origin, self._stamp(origin), complain)
         if item is not None or self.answers_always:
-            self._answers[node].derive(item, origin, host_time_ns(), origin.stamp)
+            self._answers[node].derive(item, origin, host_time_ns(), self._answered_at(origin))
         if node in self._acks:
             done = ((origin.header.source, origin.header.stamp),)
             self._acks[node].derive(done, origin, host_time_ns(), origin.stamp)
 
     def _complain(self, node: str, error: Exception) -> None:
         self.alert("analysis_failed", f"{node}: {failure_line(error)}")
+
+    def _answered_at(self, origin: Message[Any]) -> int:
+        """Mission time of an answer: that of the execution's own, or of the frame."""
+        return origin.stamp
 
     def _stamp(self, origin: Message[Any]) -> int:
         """Mission time of what follows from `origin`: now."""

@@ -34,6 +34,9 @@ class _LockstepWorker(Worker):
     """Worker whose time is that of the messages."""
 
     state_depth = MESSAGE_DEPTH
+    _at = 0
+    """Mission time of the message in process: that of its measurement, or later where a simulated
+    execution made it."""
 
     def open(self) -> None:
         super().open()
@@ -48,9 +51,17 @@ class _LockstepWorker(Worker):
             self._acks = known or self._actor.publisher(stream)
 
     def vehicle(self) -> VehicleState | None:
-        """The newest vehicle state at the item's own time; None before the first."""
+        """The newest vehicle state at the message's own time; None before the first."""
         states = reversed(self._states)
-        return next((state for at, state in states if at <= self._now), None)
+        return next((state for at, state in states if at <= self._at), None)
+
+    def _produce(self, stamp: int) -> None:
+        self._at = stamp
+        super()._produce(stamp)
+
+    def _work(self, message: Message[Any]) -> None:
+        self._at = message.stamp
+        super()._work(message)
 
     def _run_external(self) -> None:
         """Measure at the timestamps of the drone's states."""

@@ -14,15 +14,26 @@ from aerodaas.dataflow.graph import Graph
 __all__ = ["Barrier", "paths", "widest"]
 
 
-def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> int:
+def paths(
+    graph: Graph,
+    stream: str,
+    steering: set[str],
+    *,
+    recorded: bool,
+    later: frozenset[str] = frozenset(),
+) -> int:
     """Number of acknowledgements that one message of `stream` leads to.
 
     The recorder, the drones' actor if the stream is among the `steering` ones, and an analysis
-    whose results have no reader each give one.
+    whose results have no reader each give one. The analyses `later` answer at a later mission
+    time, and a dispatcher acknowledges for them once that it has the message.
     """
-    ends = int(recorded) + (stream in steering)
-    for node in graph.downstream(stream):
-        ends += max(1, paths(graph, node.id, steering, recorded=recorded))
+    readers = graph.downstream(stream)
+    ends = int(recorded) + (stream in steering) + any(node.id in later for node in readers)
+    for node in readers:
+        if node.id not in later:
+            further = paths(graph, node.id, steering, recorded=recorded, later=later)
+            ends += max(1, further)
     return ends
 
 
@@ -48,19 +59,20 @@ class Barrier:
         """Newest timestamp of each source that is no longer waited for."""
 
     def expect(self, source: str, stamp: int, acknowledgements: int) -> None:
-        """Add a measurement for which this number of acknowledgements is expected."""
+        """Expect this number of acknowledgements, or so many more, of a measurement.
+
+        Sources without a window, and measurements that are waited for no longer, are ignored.
+        """
+        if source not in self.windows or stamp <= self._forgotten.get(source, -1):
+            return
         missing = self._missing[source]
         missing[stamp] = missing.get(stamp, 0) + acknowledgements
         if not missing[stamp]:
             del missing[stamp]
 
     def acknowledge(self, source: str, stamp: int) -> None:
-        """Count one acknowledgement, which may precede the call of `expect`.
-
-        Sources without a window are ignored.
-        """
-        if source in self.windows and stamp > self._forgotten.get(source, -1):
-            self.expect(source, stamp, -1)
+        """Count one acknowledgement, which may precede the call of `expect`."""
+        self.expect(source, stamp, -1)
 
     def forget(self) -> None:
         """Stop waiting for all current measurements, because a reader is gone."""

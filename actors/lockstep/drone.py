@@ -13,12 +13,15 @@ from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleControlle
 from aerodaas.actors.lockstep.actor import LockstepActor
 from aerodaas.actors.lockstep.barrier import Barrier
 from aerodaas.actors.lockstep.growth_gate import GrowthGate
+from aerodaas.actors.lockstep.progress import Progress
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.session import CONTROL_RATE, MESSAGE_DEPTH, NEVER, Session, next_due
-from aerodaas.actors.stream_names import ACKS, end_stream
+from aerodaas.actors.stream_names import ACKS, ADVANCE, end_stream
+from aerodaas.actors.streams import Publisher
 from aerodaas.mission.planner import InlinePlanner, Planner
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import LockstepClock
+from aerodaas.types.clock import LockstepClock, host_time_ns
+from aerodaas.types.data import Header
 from aerodaas.types.status import Message
 
 __all__ = ["LockstepDroneActor"]
@@ -44,7 +47,13 @@ class LockstepDroneActor(LockstepActor, DroneActor):
         self._schedule = schedule
         self._barrier = Barrier(schedule.windows)
         self._gate = GrowthGate(self._calls.serve)
+        self._steps: Publisher | None = None
         self._due: dict[str, int] = {}
+
+    def _open(self) -> None:
+        super()._open()
+        if self._schedule.answers:
+            self._steps = self.publisher(ADVANCE)
 
     def hold(self, timeout: float) -> bool:
         """Hold mission time; returns False if not held within `timeout` wall seconds."""
@@ -86,8 +95,7 @@ class LockstepDroneActor(LockstepActor, DroneActor):
         due = 0
         while not self._over():
             self._gate.visit(lambda: self._await(drain=True))
-            readings = [controller.next_reading for controller in self._controllers.values()]
-            now = min([due, *self._due.values(), *readings])
+            now = self._next(due)
             if now == NEVER:
                 break
             self.clock.advance_to(now)
@@ -100,7 +108,20 @@ class LockstepDroneActor(LockstepActor, DroneActor):
             self._measure(now)
             self._publish_reports()
             self._await(drain=False)
+            if self._steps is not None:
+                self._let_executions_end(self._steps, now, self._next(due))
         self._await(drain=True)
+
+    def _next(self, due: int) -> int:
+        """The next moment at which something is due, `due` being the loop's next turn."""
+        readings = [controller.next_reading for controller in self._controllers.values()]
+        return min([due, *self._due.values(), *readings])
+
+    def _let_executions_end(self, steps: Publisher, now: int, until: int) -> None:
+        """Wait for the results of simulated executions that end before `until`."""
+        self._barrier.expect(ADVANCE, now, 1)
+        steps.measure(until, Header(steps.sent, now, ADVANCE), host_time_ns())
+        self._await(drain=False)
 
     def _next_due(self, source: str, after: int) -> int:
         return self.session.next_due(source, self._schedule.rates[source], after)
@@ -142,7 +163,12 @@ class LockstepDroneActor(LockstepActor, DroneActor):
             self._take(message, now)
 
     def _acknowledge(self, message: Message[Any]) -> None:
-        if message.stream.startswith(ACKS):
+        if isinstance(message.item, Progress):
+            for stream, source, stamp in message.item.answered:
+                self._barrier.expect(source, stamp, self._schedule.answers[stream])
+            for source, stamp in message.item.received:
+                self._barrier.acknowledge(source, stamp)
+        elif message.stream.startswith(ACKS):
             for source, stamp in message.item or ():
                 self._barrier.acknowledge(source, stamp)
         elif any(message.stream in spec.navigation for spec in self._specs):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 __all__ = ["LockstepSchedule"]
 
@@ -19,5 +19,8 @@ class LockstepSchedule:
     """Most unprocessed measurements while time advances, by source."""
     readers: tuple[str, ...] = ()
     """Streams of acknowledgements."""
+    answers: dict[str, int] = field(default_factory=dict)
+    """Number of acknowledgements of one result, by stream, of the analyses whose executions are
+    simulated; empty where all work is done in the moment of its measurement."""
     patience: float = 20.0
     """Timeout of an acknowledgement in wall seconds."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.dispatch.dispatcher import DispatcherActor
@@ -12,6 +12,7 @@ from aerodaas.actors.lockstep.dispatcher import LockstepDispatcherActor
 from aerodaas.actors.lockstep.drone import LockstepDroneActor
 from aerodaas.actors.lockstep.recorder import LockstepRecorderActor
 from aerodaas.actors.lockstep.sensor import LockstepSensorActor
+from aerodaas.actors.lockstep.timed_dispatcher import TimedDispatcherActor
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
 from aerodaas.actors.session import Session
@@ -42,4 +43,6 @@ _LOCKSTEP = ActorClasses(
 
 def actor_classes(session: Session) -> ActorClasses:
     """Return the classes of a run's actors."""
+    if session.simulates_executions:
+        return replace(_LOCKSTEP, dispatcher=TimedDispatcherActor)
     return _LOCKSTEP if session.lockstep else _REAL_TIME

@@ -16,13 +16,16 @@ from aerodaas.actors.dispatch.offload import (
 )
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.lockstep.barrier import paths, widest
+from aerodaas.actors.lockstep.executions import Executions
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.run.checks import check_graph, check_plugins, check_tasks
 from aerodaas.actors.run.hosting import by_actor
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.actors.stream_names import (
     ACKS,
+    ADVANCE,
     DECISIONS,
+    PROGRESS,
     alert_stream,
     done_stream,
     end_stream,
@@ -177,11 +180,20 @@ class _Planner:
         )
 
     def acknowledgements(self, stream: str) -> int:
-        return paths(self.graph, stream, self.steering, recorded=self.recorded)
+        later = self.simulated()
+        return paths(self.graph, stream, self.steering, recorded=self.recorded, later=later)
 
     def is_waited_for(self, node: Node) -> bool:
         """Whether mission time waits for the analysis itself, for want of a reader."""
+        if node.id in self.simulated():
+            return False  # it answers when its execution is over
         return self.session.lockstep and not self.acknowledgements(node.id)
+
+    def simulated(self) -> frozenset[str]:
+        """Analyses whose executions take mission time in lockstep."""
+        if not self.session.simulates_executions:
+            return frozenset()
+        return frozenset(node.id for node in self.managed())
 
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
@@ -209,30 +221,39 @@ class _Planner:
         nodes = self.managed()
         if self.dispatch_with is None or not nodes:
             return None
-        # In lockstep time is held while an analysis runs, so offloading has no benefit.
+        Executions.of(self.session.environment.simulation)  # so that a wrong one is told here
+        # In lockstep the cloud has no processes: it is simulated, or of no benefit, because time
+        # is held while an analysis runs.
         compute = {} if self.session.lockstep else self.compute
         envs = {node.id: self.runtime_env_of(node) for node in nodes}
-        processes = cloud_processes(nodes, compute, envs)
-        slots = {process.site: process.slots for process in processes}
         return DispatchPlan(
             scheduler=self.dispatch_with,
             managed=tuple(self.managed_one(node) for node in nodes),
-            resources=Resources(cloud_slots=sum(slots.values())),
-            cloud=processes,
+            resources=Resources(cloud_slots=self.cloud_slots(nodes)),
+            cloud=cloud_processes(nodes, compute, envs),
         )
+
+    def cloud_slots(self, nodes: list[Node]) -> int:
+        """Executions that the cloud has room for at once."""
+        if self.session.lockstep and not self.session.simulates_executions:
+            return 0
+        sites = {one.id: one for node in nodes for one in allowed(node, self.compute)}
+        return sum(one.executors for one in sites.values())
 
     def managed_one(self, node: Node) -> Managed:
         schedulers = self.session.environment.schedulers
         own = told(node.id, schedulers.tasks) or TaskConfig()
         times = ("edge_time", "cloud_time")
         profile = told_profile(node.id, schedulers)
+        sites = allowed(node, self.compute)
         return Managed(
             stream=node.id,
             inputs=tuple(node.inputs),
-            profile=priced(profile, allowed(node, self.compute)),
+            profile=priced(profile, sites),
             acknowledges=self.is_waited_for(node),
             open_times=frozenset(time for time in times if getattr(own, time) is None),
             triggers=self.triggers_of(node),
+            offloadable=bool(sites),
         )
 
     @staticmethod
@@ -350,6 +371,20 @@ class _Planner:
         """Most measurements, beyond the newest, whose results fit into the readers' queues."""
         return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
 
+    def is_awaited(self, source: str) -> bool:
+        """Whether time stands still until all that a measurement of `source` leads to is done.
+
+        A dispatcher with simulated executions has to have all frames of a moment.
+        """
+        return self.reaches_a_drone(source) or self.reaches_simulated(source)
+
+    def reaches_simulated(self, stream: str) -> bool:
+        """Whether an analysis whose executions are simulated is downstream."""
+        return any(
+            node.id in self.simulated() or self.reaches_simulated(node.id)
+            for node in self.graph.downstream(stream)
+        )
+
     def conduct(
         self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]
     ) -> LockstepSchedule:
@@ -366,7 +401,7 @@ class _Planner:
             )
         ]
         windows = {
-            source: 0 if self.reaches_a_drone(source) else min(size, self._room(source))
+            source: 0 if self.is_awaited(source) else min(size, self._room(source))
             for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
             for source in sources
         }
@@ -375,11 +410,16 @@ class _Planner:
         ]
         if self.recorded:
             readers.append(f"{ACKS}/recorder")
+        simulated = self.simulated()
+        if simulated:
+            windows[ADVANCE] = 0
+            readers.append(PROGRESS)
         return LockstepSchedule(
             rates=rates,
             acknowledgements={source: self.acknowledgements(source) for source in windows},
             windows=windows,
             readers=tuple(readers),
+            answers={stream: self.acknowledgements(stream) for stream in simulated},
         )
 
 

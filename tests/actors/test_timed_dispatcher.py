@@ -1,0 +1,261 @@
+"""Lockstep with executions that take mission time, on the edge and in a simulated cloud."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from analyses import FrameNumbers
+from flying import Flyer, hop, recorded, robot
+
+from aerodaas import (
+    AeroNavigation,
+    Environment,
+    Frame,
+    NavigableAnalytics,
+    NavigationType,
+    VelocityCommand,
+)
+from aerodaas.actors.lockstep.executions import Executions
+from aerodaas.analytics.base import Context
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.environment.run import Run
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.schedulers.analytics.base import MILLISECOND, Resources, Task, TaskOutcome, TaskPlace
+from aerodaas.schedulers.analytics.published.profiles import told_profile
+from aerodaas.schedulers.analytics.registry import load_scheduler
+from aerodaas.schedulers.lab.sample import SamplePath
+from aerodaas.schedulers.lab.simulator import simulate
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Readings
+from aerodaas.types.errors import AeroDaaSError
+
+_CAMERA = {"driver": "simulated", "rate": 4, "settings": {"width": 64, "height": 36}}
+
+
+def _content(**simulation: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Two cameras' frames, two analyses of each, an edge that is too slow for all of them."""
+    return {
+        "robots": [robot(sensors=[{"id": f"camera{n}", **_CAMERA} for n in range(2)])],
+        "compute": [{"id": "edge"}, {"id": "cloud", "kind": "cloud", "executors": 2}],
+        "schedulers": {
+            "tasks": {
+                "one": {"benefit": 30, "edge_time": 110, "cloud_time": 260, "cloud_cost": 5,
+                        "deadline": 400},
+                "two": {"benefit": 20, "edge_time": 70, "cloud_time": 190, "cloud_cost": 8,
+                        "deadline": 500},
+            },
+        },
+        "recording": {"images": "none"},
+        "simulation": {"world": "empty", "execution_times": "nominal", **simulation},
+    }  # fmt: skip
+
+
+class Mortal(FrameNumbers):
+    """Ends its process at one frame, once."""
+
+    name = "one"
+    isolated = True
+
+    def __init__(self, mark: Path) -> None:
+        self._mark = mark
+
+    def process(self, item: Frame, context: Context) -> Readings:
+        """Die at frame 12."""
+        if item.header.id == 12 and not self._mark.exists():
+            self._mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().process(item, context)
+
+
+class One(FrameNumbers):
+    """The first of two analyses."""
+
+    name = "one"
+
+
+class Two(FrameNumbers):
+    """The second one."""
+
+    name = "two"
+
+
+def _fly(flyer: Flyer, content: dict[str, Any], scheduler: str, seed: int = 5) -> Run:
+    def watch(env: Environment) -> None:
+        env.set_analytics_scheduler(scheduler)
+        drone = env.get_robot_by_id("drone")
+        for model in (One(), Two()):
+            model.deploy(env.get_compute_resource_by_id("edge"))
+            for camera in ("camera0", "camera1"):
+                model.analyse(drone.get_sensor_by_id(camera).get_data_stream())
+        drone.navigate(hop((2, 0), hover=9.0))
+
+    count = len(list(flyer.folder.glob("flight-*")))
+    run = flyer.fly(watch, content, seed=seed, record=flyer.folder / f"flight-{count}")
+    assert run.lockstep
+    assert recorded(run).robots["drone"].outcome.startswith("landed")
+    return run
+
+
+def _decisions(run: Run) -> list[dict[str, Any]]:
+    assert run.recording is not None
+    with Recording.open(run.recording) as recording:
+        return [record.value for record in recording.records(schemas=["aerodaas.Decision"])]
+
+
+def _ends(decision: dict[str, Any]) -> bool:
+    return decision["action"] not in {"edge", "cloud", "retry"}
+
+
+def _tasks(decisions: list[dict[str, Any]], environment: EnvironmentConfig) -> list[Task]:
+    """Tasks of a flight as its dispatcher made them."""
+    found: dict[str, Task] = {}
+    for one in decisions:
+        model, _, frame = one["task"].partition("#")
+        source, _, segment = frame.rpartition(":")
+        profile = told_profile(model, environment.schedulers)
+        arrival = one["stamp"] - round(one["values"]["waited_ms"] * MILLISECOND)
+        number = int(one["values"]["number"])
+        task = Task(number, profile, arrival, arrival + profile.deadline, source, int(segment))
+        found.setdefault(one["task"], task)
+    return sorted(found.values(), key=lambda task: task.id)
+
+
+def _by_number(tasks: list[Task], time: Callable[[Task], int]) -> list[int]:
+    """Times by a task's number; the last ones have none, for nothing was decided about them."""
+    times = {task.id: time(task) for task in tasks}
+    return [times.get(number, 0) for number in range(max(times) + 1)]
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "times", "network"),
+    [("dems", "lognormal:0.3", "outage:4-6"), ("margin", "gamma:0.2", "trapezium:300")],
+)
+def test_a_flight_agrees_with_the_laboratory(
+    flyer: Flyer, scheduler: str, times: str, network: str
+) -> None:
+    """Each task ends where, how and when the laboratory says, to the nanosecond."""
+    content = _content(execution_times=times, network=network, network_period=16)
+    run = _fly(flyer, content, scheduler)
+    environment = EnvironmentConfig.model_validate(content)
+    executions = Executions.of(environment.simulation.model_copy(update={"seed": 5}))
+    assert executions is not None
+    decisions = _decisions(run)
+    tasks = _tasks(decisions, environment)
+    path = SamplePath(
+        tasks,
+        _by_number(tasks, executions.edge_time),
+        _by_number(tasks, executions.cloud_time),
+        executions.network,
+    )
+    trace = simulate(path, load_scheduler(scheduler), Resources(2))
+    end = decisions[-1]["stamp"] - NANOSECONDS
+    wanted = [one for one in trace.results if one.finished < end]
+    ended = {int(one["values"]["number"]): one for one in decisions if _ends(one)}
+    for result in wanted:
+        found = ended[result.task.id]
+        assert found["stamp"] == result.finished
+        if result.outcome is TaskOutcome.DROPPED:
+            assert found["action"] in {"drop", "dropped"}
+        else:
+            assert found["action"] == result.outcome.value
+            assert found["reason"].partition(":")[0] == result.place.value
+    assert len(wanted) > 100
+    assert {one.place for one in wanted} == set(TaskPlace)
+
+
+class Swerve(NavigableAnalytics):
+    """Steers by the frame's number and by where the drone is when the result is there."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Readings,)
+
+    def process(self, item: Readings, context: Context) -> AeroNavigation:
+        """Swing from side to side."""
+        state = context.vehicle()
+        assert state is not None
+        side = 0.5 if int(item.values["number"]) % 8 < 4 else -0.5
+        climb = 0.2 * (2.0 - float(state.odometry.position[2]))
+        command = VelocityCommand(0.5, side, climb, 0.0)
+        return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+
+
+def _swerve(flyer: Flyer, number: int) -> Recording:
+    def build(env: Environment) -> None:
+        env.set_analytics_scheduler("ec_edf")
+        drone = env.get_robot_by_id("drone")
+        edge = env.get_compute_resource_by_id("edge")
+        frames = drone.get_sensor_by_id("camera0").get_data_stream()
+        one = One().deploy(edge)
+        one.trigger(drone.end_mission, when=lambda item: item.values["number"] >= 30)
+        numbers = one.analyse(frames)
+        drone.navigate(Swerve().deploy(edge).analyse(numbers))
+
+    content = _content()
+    del content["schedulers"]["tasks"]["two"]
+    content["schedulers"]["tasks"]["one"]["edge_time"] = 130
+    run = flyer.fly(build, content, seed=5, record=flyer.folder / f"swerve-{number}")
+    assert run.recording is not None
+    return Recording.open(run.recording)
+
+
+def test_a_drone_flies_by_results_as_old_as_they_would_be(flyer: Flyer) -> None:
+    """Results come when their executions are over; two flights agree to the last bit."""
+    with _swerve(flyer, 1) as recording:
+        ages = [
+            (record.stamp - record.captured) / MILLISECOND
+            for record in recording.records(topics=["/drone/swerve/navigation"])
+        ]
+        first = RecordedFlight.read(recording)
+    assert len(ages) > 30
+    assert set(ages) == {130.0}
+    with _swerve(flyer, 2) as recording:
+        again = RecordedFlight.read(recording)
+    assert np.array_equal(*(one.robots["drone"]._columns for one in (first, again)))
+    assert np.ptp(first.robots["drone"].position[:, 1]) > 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.wall_clock
+def test_an_executor_that_dies_is_waited_for(flyer: Flyer) -> None:
+    """Mission time waits for it, and its work is done again: no task is lost."""
+
+    def watch(env: Environment) -> None:
+        env.set_analytics_scheduler("ec_edf")
+        drone = env.get_robot_by_id("drone")
+        model = Mortal(flyer.folder / "died")
+        model.deploy(env.get_compute_resource_by_id("edge"))
+        model.analyse(drone.get_sensor_by_id("camera0").get_data_stream())
+        drone.navigate(hop((2, 0), hover=8.0))
+
+    content = _content()
+    del content["schedulers"]["tasks"]["two"]
+    run = flyer.fly(watch, content, seed=5)
+    assert (flyer.folder / "died").exists()
+    actions = {one["action"] for one in _decisions(run) if _ends(one)}
+    assert actions == {"done"}
+    assert recorded(run).robots["drone"].outcome.startswith("landed")
+    numbers = [int(one["values"]["number"]) for one in _decisions(run) if _ends(one)]
+    assert len(numbers) == len(set(numbers))
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ({"execution_times": "normal:0.1"}, "nominal, lognormal or gamma"),
+        ({"execution_times": "lognormal:x"}, "write nominal"),
+        ({"network": "dial-up"}, "dial-up"),
+        ({"network": "outage:7-3"}, "outage"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_before_the_flight(
+    flyer: Flyer, setting: dict[str, Any], said: str
+) -> None:
+    """A misspelt network or distribution is told, with what there is."""
+    with pytest.raises(AeroDaaSError, match=said):
+        _fly(flyer, _content(**setting), "dems")
