@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = [
     "check_environment",
     "check_graph",
+    "check_places",
     "check_plugins",
     "check_served",
     "check_tasks",
@@ -136,6 +137,17 @@ def _check_process(node: Node) -> None:
             f"{name} ({node.id}): process must take an item and a context, as in "
             f"process(self, item, context): {error}"
         ) from None
+
+
+def check_places(graph: Graph, compute: Collection[str]) -> None:
+    """Raise GraphError for an analysis on a simulated resource that is not among `compute`."""
+    for node in graph.nodes.values():
+        if node.compute is not None and node.compute not in compute:
+            raise GraphError(
+                f"{node.id} is deployed on {node.compute}, which is simulated: it is there with "
+                "--speed max alone, if simulation.execution_times is set and an analytics "
+                "scheduler sends tasks there; deploy it on an edge"
+            )
 
 
 def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:

@@ -18,7 +18,7 @@ from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleControlle
 from aerodaas.actors.lockstep.barrier import paths, widest
 from aerodaas.actors.lockstep.executions import Executions
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.run.checks import check_graph, check_plugins, check_tasks
+from aerodaas.actors.run.checks import check_graph, check_places, check_plugins, check_tasks
 from aerodaas.actors.run.hosting import by_actor
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.actors.stream_names import (
@@ -132,7 +132,9 @@ class _Planner:
         self.graph = graph
         self.scheduler = scheduler
         self.dispatch_with = dispatch_with
-        self.compute = {resource.id: resource for resource in compute}
+        self.compute = {
+            one.id: one for one in compute if session.simulates_executions or not one.simulated
+        }
         named = {edge.robot for edge in graph.navigation}
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
@@ -443,6 +445,7 @@ def make_plan(
     if not planner.robots and not senses_only:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
     check_graph(graph, session.environment, {robot.id for robot in planner.robots})
+    check_places(graph, planner.compute)
     if dispatch_with is not None:
         check_tasks(graph, session.environment)
     lenses = [node.work for node in planner.sensors() if node.work.type == "camera"]

@@ -87,6 +87,9 @@ def run(
         int | None,
         typer.Option(min=0, help="Seed of the simulation; with --seeds, the first (0)."),
     ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Analytics scheduler instead of the application's own.")
+    ] = None,
     seeds: Annotated[
         int | None,
         typer.Option(
@@ -153,6 +156,7 @@ def run(
         aerodaas run farm_survey --console
         aerodaas run farm_survey --seeds 16 --csv farm.csv
         aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run situation_awareness --scheduler margin --set simulation.network=outage:60-90
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
     """
@@ -167,6 +171,7 @@ def run(
         speed=factor,
         lockstep=lockstep,
         seed=seed,
+        scheduler=scheduler,
         record=record,
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),

@@ -92,6 +92,9 @@ class ComputeConfig(Strict):
     kind: Literal["edge", "cloud", "http"] = "edge"
     node: str | None = None
     """A named node's address, where the kind alone does not say."""
+    simulated: bool = False
+    """Of the kind `cloud`: it is there in lockstep alone, if `simulation.execution_times` says how
+    long executions take, and left out in real time."""
     executors: Annotated[int, Field(ge=1, le=256)] = 1
     """Inferences that may run at once."""
     compression: Literal["jpeg", "png", "none"] = "jpeg"
@@ -108,5 +111,8 @@ class ComputeConfig(Strict):
             raise ValueError(message)
         if self.kind == "http" and self.node is not None:
             message = 'the kind "http" has no node; its address is endpoint.url'
+            raise ValueError(message)
+        if self.simulated and (self.kind != "cloud" or self.node is not None):
+            message = 'what is simulated is of the kind "cloud", and has no node'
             raise ValueError(message)
         return self

@@ -68,6 +68,12 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
         content["terrain"]["files"] = [_absolute(file, folder) for file in files]
     if content["simulation"]["world"].endswith(".json"):
         content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
+    content["simulation"]["network"] = "+".join(
+        f"trace:{_absolute(part.removeprefix('trace:'), folder)}"
+        if part.startswith("trace:")
+        else part
+        for part in content["simulation"]["network"].split("+")
+    )
     return validated(content, "environment")
 
 

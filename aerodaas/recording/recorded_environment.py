@@ -110,7 +110,12 @@ _ALLOWED: dict[str, Rule] = {
     "home": _fields("latitude", "longitude", "altitude"),
     "robots": [_ROBOT],
     "sensors": [_SENSOR],
-    "compute": [{"id": _word, **_fields("kind", "executors", "compression", "jpeg_quality")}],
+    "compute": [
+        {
+            "id": _word,
+            **_fields("kind", "simulated", "executors", "compression", "jpeg_quality"),
+        }
+    ],
     "schedulers": {
         "trajectory": _named("trajectory_schedulers"),
         "analytics": _named("analytics_schedulers"),
@@ -126,6 +131,8 @@ _NOT_MISSED = (
     "compute",
     "recording.*",
     "simulation.world",
+    "simulation.execution_times",
+    "simulation.network*",
     "robots.*.settings.*",
     "robots.*.sensors.*",
     "sensors.*",

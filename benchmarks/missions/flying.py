@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,9 +52,13 @@ def fly(
     speed: str = "max",
     settings: Mapping[str, object] | None = None,
     environment: Path | None = None,
+    options: Sequence[str] = (),
     timeout: float = 1800.0,
 ) -> Flown:
-    """Fly `mission` into `folder`, which must be empty or new; raises TimeoutExpired."""
+    """Fly `mission` into `folder`, which must be empty or new; raises TimeoutExpired.
+
+    `options` are further ones of `aerodaas run`.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     port = _free_port()
     laid_over: dict[str, object] = {"remote.port": port, **(settings or {})}
@@ -63,6 +67,7 @@ def fly(
     command = [sys.executable, "-m", "aerodaas", "run", str(mission.application), "--no-view"]
     command += ["--seed", str(seed), "--speed", speed, "--record", str(folder / "flight")]
     command += ["--env", str(environment)] if environment else []
+    command += options
     for name, value in laid_over.items():
         text = value if isinstance(value, str) else json.dumps(value)
         command += ["--set", f"{name}={text}"]

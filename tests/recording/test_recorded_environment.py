@@ -83,6 +83,10 @@ LOCAL_ALONE = {
     "remote.port",
     "remote.token",
     "simulation.world",
+    # An application that is replayed runs in its own time; a network may name a file.
+    "simulation.execution_times",
+    "simulation.network",
+    "simulation.network_period",
     # What a take-off is refused for is the policy of who flies.
     *(f"robots.preflight.{name}" for name in PreflightConfig.model_fields),
 }
