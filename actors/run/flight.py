@@ -471,8 +471,10 @@ class Flight:
         return executor
 
     def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
+        # Before the calls: on a busy machine the first is done before the last is made.
+        began = host_time_ns()
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
-        deadline, began = time.monotonic() + _PREPARE_TIMEOUT, host_time_ns()
+        deadline = time.monotonic() + _PREPARE_TIMEOUT
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
             if not ready:
