@@ -231,3 +231,50 @@ def test_triggers_belong_to_whoever_publishes_the_results(environment: Environme
     counts = {node.stream: len(node.triggers) for actor in made.analyses for node in actor.nodes}
     assert sorted(counts.values()) == [0, 1]
     assert counts["drone/above"] == 1
+
+
+def _watched(folder: Path, simulation: dict[str, Any]) -> Environment:
+    """Two analyses of a camera, one that follows the first; an edge and a simulated cloud."""
+    compute = [{"id": "edge"}, {"id": "far", "kind": "cloud", "simulated": True, "executors": 3}]
+    content = {**CONTENT, "compute": compute, "simulation": {"world": "empty", **simulation}}
+    env = Environment(Flyer(folder).write(content))
+    edge = env.get_compute_resource_by_id("edge")
+    for name in ("one", "two"):
+        SyntheticAnalytics(name, 0, 0).deploy(edge).analyse(camera(env))
+    env.get_robot_by_id("drone").navigate(hop((1, 0)))
+    return env
+
+
+def _dispatched(env: Environment, speed: float | None = None) -> FlightPlan:
+    session, dems = Session(env.config, speed), load_scheduler("dems")
+    return make_plan(session, env.graph, env.compute(), env.trajectory_scheduler(), dems)
+
+
+def test_a_simulated_cloud_is_there_where_executions_take_mission_time(tmp_path: Path) -> None:
+    """It has slots and no process; in real time, and where nothing takes time, it is left out."""
+    env = _watched(tmp_path, {"execution_times": "nominal"})
+    dispatch, conduct = _dispatched(env).dispatch, _dispatched(env).conduct
+    assert dispatch is not None
+    assert conduct is not None
+    assert (dispatch.resources.cloud_slots, dispatch.cloud) == (3, ())
+    assert all(one.offloadable and not one.acknowledges for one in dispatch.managed)
+    # A frame is acknowledged by recorder and dispatcher, a result by the recorder.
+    assert conduct.acknowledgements["drone/cam"] == 2
+    assert conduct.answers == {"drone/one": 1, "drone/two": 1}
+    assert conduct.windows["drone/cam"] == 0
+    for speed, simulation in ((1.0, {"execution_times": "nominal"}), (None, {})):
+        dispatch = _dispatched(_watched(tmp_path, simulation), speed).dispatch
+        assert dispatch is not None
+        assert (dispatch.resources.cloud_slots, dispatch.cloud) == (0, ())
+        assert not any(one.offloadable for one in dispatch.managed)
+
+
+def test_nothing_flies_on_a_simulated_cloud_in_real_time(tmp_path: Path) -> None:
+    """An analysis that is deployed there has no place; in lockstep it has one."""
+    env = _watched(tmp_path, {"execution_times": "nominal"})
+    SyntheticAnalytics("far_off", 0, 0).deploy(env.get_compute_resource_by_id("far")).analyse(
+        camera(env)
+    )
+    assert _dispatched(env).dispatch is not None
+    with pytest.raises(GraphError, match=r"far_off is deployed on far, which is simulated"):
+        _dispatched(env, 1.0)

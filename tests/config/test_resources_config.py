@@ -62,3 +62,18 @@ def test_wheels_are_looked_for_beside_the_file(tmp_path: Path) -> None:
     env = {"a": {"packages": [wheel.name, "other==1.0"]}}
     config = located(validated(file(runtime_env=env), "environment.json"), tmp_path)
     assert config.runtime_env["a"].packages == [str(wheel), "other==1.0"]
+
+
+@pytest.mark.parametrize("wrong", [{"kind": "edge"}, {"kind": "cloud", "node": "10.0.0.1"}])
+def test_only_a_cloud_without_a_node_is_simulated(wrong: dict[str, Any]) -> None:
+    """An edge is where the drone is, and a node is real."""
+    with pytest.raises(ConfigError, match='simulated is of the kind "cloud"'):
+        validated(file(compute=[{"id": "a", "simulated": True, **wrong}]), "environment.json")
+
+
+def test_a_network_may_name_files_beside_the_environment(tmp_path: Path) -> None:
+    """Relative to the environment file, as all its paths."""
+    (tmp_path / "link.csv").write_text("0,10\n")
+    simulation = {"network": "outage:3-4+trace:link.csv"}
+    config = located(validated(file(simulation=simulation), "environment.json"), tmp_path)
+    assert config.simulation.network == f"outage:3-4+trace:{tmp_path / 'link.csv'}"
