@@ -7,6 +7,7 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -21,20 +22,32 @@ from aerodaas import (
     NavigationType,
     VelocityCommand,
 )
+from aerodaas.actors.dispatch.dispatcher import Managed
 from aerodaas.actors.lockstep.executions import Executions
+from aerodaas.actors.lockstep.timed_dispatcher import TimedDispatcherActor
+from aerodaas.actors.session import Session
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.schedulers.analytics.base import MILLISECOND, Resources, Task, TaskOutcome, TaskPlace
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    Profile,
+    Resources,
+    Task,
+    TaskOutcome,
+    TaskPlace,
+)
+from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Readings
+from aerodaas.types.data import Header, Readings
 from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.status import Message
 
 _CAMERA = {"driver": "simulated", "rate": 4, "settings": {"width": 64, "height": 36}}
 
@@ -259,3 +272,44 @@ def test_what_cannot_be_simulated_is_refused_before_the_flight(
     """A misspelt network or distribution is told, with what there is."""
     with pytest.raises(AeroDaaSError, match=said):
         _fly(flyer, _content(**setting), "dems")
+
+
+@pytest.mark.parametrize(
+    ("cloud_ms", "offloadable", "ends_ms", "failure"),
+    [
+        (4000, True, 5000, None),
+        (4001, True, 5000, TaskOutcome.TIMEOUT),
+        (100, False, 1000, TaskOutcome.FAILED),
+    ],
+)
+def test_a_cloud_that_takes_too_long_or_cannot_do_it_gives_no_result(
+    cloud_ms: int,
+    offloadable: bool,
+    ends_ms: int,
+    failure: TaskOutcome | None,  # noqa: FBT001
+) -> None:
+    """What takes exactly the time-out is answered, longer is lost; what nothing runs fails."""
+    profile = Profile("model", 10.0, 9000 * MILLISECOND, MILLISECOND, cloud_ms * MILLISECOND)
+    environment = EnvironmentConfig.model_validate(
+        {"robots": [robot()], "simulation": {"execution_times": "nominal"}}
+    )
+    actor = TimedDispatcherActor(
+        Session(environment, None),
+        Dems(),
+        (Managed("model", ("camera",), profile, offloadable=offloadable),),
+        Resources(2, 4000 * MILLISECOND),
+    )
+    sent: list[Task] = []
+    told: list[tuple[Any, ...]] = []
+    task = Task(1, profile, 1000 * MILLISECOND, 9999 * MILLISECOND)
+    with (
+        patch.object(actor, "_send_task", lambda task, _: sent.append(task)),
+        patch.object(actor, "_guarded", lambda *words: told.append(words)),
+    ):
+        actor._frames[1] = Message("camera", 0, 0, Header(0, 0, "camera"), 0, (), None)
+        actor.run_cloud(task, 1000 * MILLISECOND)
+        (event,) = actor._events
+        assert event.at == ends_ms * MILLISECOND
+        actor._happen(event, event.at)
+    assert sent == ([task] if failure is None else [])
+    assert told == [("finished", task, event.at, *([failure] if failure else []))]
