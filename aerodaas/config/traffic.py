@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from aerodaas.config.strict import NotNegative, Positive, Strict
+from aerodaas.config.strict import Positive, Strict
 
 __all__ = ["TrafficConfig"]
 
@@ -22,8 +22,8 @@ class TrafficConfig(Strict):
     """Metres along the ground."""
     height: Positive = 150.0
     """Metres above and below; one whose height is not known is at every height."""
-    lookahead: NotNegative = 20.0
-    """Seconds ahead for which its way and the drone's are judged; 0: only where they are now."""
+    lookahead: Annotated[float, Field(ge=2, le=300)] = 20.0
+    """Seconds ahead for which its way and the drone's are judged."""
     own_address: Annotated[str, Field(pattern=r"^[0-9A-Fa-f]{6}$")] | None = None
     """24-bit address (six hexadecimal digits) of the drone's own transponder, whose echo is no
     traffic."""

@@ -113,7 +113,7 @@ class Checklist:
         config = self._limits.traffic
         if config.action == "ignore" or not state.traffic:
             return []
-        near = encounters(state, config)
+        near = encounters(state, state.traffic, config)
         value = "; ".join(one.text.removeprefix("traffic: ") for one in near)
         bound = f"none within {config.distance:g} m and {config.height:g} m of height"
         verdict = Verdict.REFUSED if config.action in DEMANDS else Verdict.WARNING

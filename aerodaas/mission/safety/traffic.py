@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerodaas.config.traffic import TrafficConfig
@@ -22,8 +23,10 @@ DEMANDS = {
 }
 """What an aircraft that is too near demands, by `TrafficConfig.action`."""
 _CLEAR = 5.0
-"""Seconds for which an aircraft counts as near after it was last: reports come each second, and
-nothing is to start and stop at the edge."""
+"""Seconds for which an aircraft counts as near after it was last, for reports come each second."""
+_RELEASE = 1.2
+"""Multiple of distance and height beyond which it is near no more: nothing is to start and stop at
+the edge."""
 _STEP = 10.0
 """Metres to which distances are told: a text that changes with each reading tells nobody more."""
 
@@ -59,13 +62,19 @@ class TrafficWatch:
     def __init__(self, config: TrafficConfig) -> None:
         """Judge by `config`."""
         self._config = config
+        further = {"distance": _RELEASE * config.distance, "height": _RELEASE * config.height}
+        self._further = config.model_copy(update=further)
         self._near: dict[int, tuple[int, Fault]] = {}
         """When each aircraft was last too near (mission clock, ns), and what was said of it."""
 
     def assess(self, state: VehicleState, now: int) -> list[Fault]:
         """A fault for each aircraft that is too near to `state`, or was until a moment ago."""
         demand = DEMANDS.get(self._config.action, FailsafeAction.NOTHING)
-        for one in encounters(state, self._config):
+        known = [one for one in state.traffic if one.address in self._near]
+        for one in (
+            *encounters(state, state.traffic, self._config),
+            *encounters(state, known, self._further),
+        ):
             address = one.aircraft.address
             self._near[address] = now, Fault(demand, "traffic", one.text, f"{address:06X}")
         self._near = {
@@ -76,14 +85,16 @@ class TrafficWatch:
         return [fault for _, fault in self._near.values()]
 
 
-def encounters(state: VehicleState, config: TrafficConfig) -> list[Encounter]:
-    """The aircraft that are too near to the vehicle, or will be within the time looked ahead."""
+def encounters(
+    state: VehicleState, traffic: Sequence[Traffic], config: TrafficConfig
+) -> list[Encounter]:
+    """Those of `traffic` that are too near to the vehicle, or will be in the time looked ahead."""
     odometry = state.odometry
     known = is_finite(odometry.position) and is_finite(odometry.velocity)
     if config.action == "ignore" or not known:
         return []
     found = []
-    for aircraft in state.traffic:
+    for aircraft in traffic:
         way = aircraft.position - odometry.position
         after = meets_in(way, aircraft.velocity - odometry.velocity, config)
         if after is not None:
