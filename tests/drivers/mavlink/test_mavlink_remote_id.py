@@ -54,11 +54,15 @@ def ends_of(
     return Stepped(monkeypatch, options, **{"remote_id": WHO, "preflight": REQUIRED, **settings})
 
 
-def item(ends: Stepped) -> HealthItem | None:
-    """Remote ID in the list before take-off."""
+def listed(ends: Stepped) -> list[HealthItem]:
+    """The list before take-off."""
     robot = ends.robot
-    items = Checklist(ends.vehicle, robot.limits, robot.preflight).examine(ends.vehicle.read())
-    return next((one for one in items if one.name == "remote_id"), None)
+    return Checklist(ends.vehicle, robot.limits, robot.preflight).examine(ends.vehicle.read())
+
+
+def item(ends: Stepped) -> HealthItem | None:
+    """Remote ID in it."""
+    return next((one for one in listed(ends) if one.name == "remote_id"), None)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -202,12 +206,13 @@ def test_the_list_before_take_off_has_the_transmitters_own_words(
         ends.autopilot.transmitter.error = error
         ends.watch(6.0)
         found = item(ends)
+        # It is in the list once.
+        assert not any("Remote ID" in one.value for one in listed(ends))
         if value is None:
             assert found is None
             return
         assert found is not None
-        said = found.value.removeprefix("Remote ID: ")
-        assert (said, found.verdict) == (value, verdict)
+        assert (found.value, found.verdict) == (value, verdict)
         assert bool(found.remedy) is (verdict in {Verdict.WARNING, Verdict.REFUSED})
 
 
@@ -418,12 +423,17 @@ def test_only_the_vehicles_own_transmitter_is_heard(
     vehicle.vehicle.close()
 
 
-def test_a_transmitter_does_not_speak_for_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its words, and its traffic's, hide no silent autopilot."""
+@pytest.mark.parametrize("flies", [True, False])
+def test_a_transmitter_does_not_speak_for_the_vehicle(
+    flies: bool,  # noqa: FBT001
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its words hide no silent autopilot, in the air and on the ground."""
     vehicle = Handmade(monkeypatch, remote_id=WHO)
     vehicle.connect()
-    vehicle.fly()
-    vehicle.speaks = False
+    if flies:
+        vehicle.fly()
+    vehicle.speaks, vehicle.result = False, None
     codec = mavlink.MAVLink(None, 1, 236)
     autopilot = mavlink.MAVLink(None, 1, 1)
     for _ in range(60):
@@ -434,6 +444,7 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(monkeypatch: pytest.Monkey
             vehicle.receive_also(bytes(message.pack(own)), None)
         mode = vehicle.turn()
     assert mode is VehicleMode.LOST
+    assert "no word from the vehicle for 3 s" in vehicle.vehicle.preflight()
     assert vehicle.vehicle.health().remote_id == ""
     assert math.isclose(vehicle.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
     vehicle.vehicle.close()

@@ -227,7 +227,7 @@ def test_an_older_report_takes_no_newer_ones_place() -> None:
     """Two receivers may tell of one aircraft."""
     known = table()
     take(known, 10.0)
-    take(known, 10.0, tslc=2, **at(0.0, 900.0))
+    take(known, 10.0, tslc=1)
     assert known.ignored == 1
     (one,) = known.around(HERE, 10.0)
     assert (one.age, one.position[1]) == (0.0, pytest.approx(1000.0, abs=0.1))
