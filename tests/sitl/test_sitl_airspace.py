@@ -155,6 +155,7 @@ def test_a_helicopter_on_the_way(autopilot: Autopilot) -> None:
         flight.run(150.0, each=aboard.turn)
         assert flight.mission.state is S.LANDED, flight.story
         assert list(flight.status.visited) == ["wp1"]
+        assert flight.states.count(S.HOLDING) == 1
         (told,) = {alert.text for alert in flight.mission.alerts if alert.kind == "traffic"}
         assert "HBXYZ" in told
         flight.tell_outcome("a helicopter on the way")

@@ -67,7 +67,7 @@ class Supervisor:
         self._home = home
         self._fence = fence
         self._meter = meter
-        self._traffic = TrafficWatch(limits.traffic)
+        self._traffic = TrafficWatch(limits)
         self._lost_since: int | None = None
         self._blind_for = 0
         """Nanoseconds with a link since the vehicle last had a position."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerodaas.config.robot import LimitsConfig
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.neighbours import Neighbour
@@ -25,8 +26,8 @@ DEMANDS = {
 _CLEAR = 5.0
 """Seconds for which an aircraft counts as near after it was last, for reports come each second."""
 _RELEASE = 1.2
-"""Multiple of distance and height beyond which it is near no more: nothing is to start and stop at
-the edge."""
+"""Multiple of distance and height beyond which it is near no more, beside the drone's own way:
+nothing is to start and stop at the edge."""
 _STEP = 10.0
 """Metres to which distances are told: a text that changes with each reading tells nobody more."""
 
@@ -59,10 +60,14 @@ class Encounter:
 class TrafficWatch:
     """What the traffic around one drone demands, turn by turn."""
 
-    def __init__(self, config: TrafficConfig) -> None:
-        """Judge by `config`."""
-        self._config = config
-        further = {"distance": _RELEASE * config.distance, "height": _RELEASE * config.height}
+    def __init__(self, limits: LimitsConfig) -> None:
+        """Judge for a drone of these `limits`."""
+        self._config = config = limits.traffic
+        # It would be near again at once if the drone flew on.
+        further = {
+            "distance": _RELEASE * config.distance + limits.cruise_speed * config.lookahead,
+            "height": _RELEASE * config.height + limits.max_climb * config.lookahead,
+        }
         self._further = config.model_copy(update=further)
         self._near: dict[int, tuple[int, Fault]] = {}
         """When each aircraft was last too near (mission clock, ns), and what was said of it."""

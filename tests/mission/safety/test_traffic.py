@@ -116,6 +116,11 @@ def test_it_agrees_with_a_look_at_every_moment(way: Vector, closing: Vector) -> 
         assert abs(there[2]) <= CLOSE.height + 1e-6
 
 
+def watching(config: TrafficConfig) -> TrafficWatch:
+    """For a drone of 2 m/s that climbs at 1.5 m/s."""
+    return TrafficWatch(LimitsConfig(traffic=config, cruise_speed=2.0, max_climb=1.5))
+
+
 @pytest.mark.parametrize(
     ("action", "demand"),
     [
@@ -127,7 +132,7 @@ def test_it_agrees_with_a_look_at_every_moment(way: Vector, closing: Vector) -> 
 )
 def test_the_action_is_what_is_demanded(action: Any, demand: FailsafeAction) -> None:  # noqa: ANN401
     """And it is told of whom, how far and how high."""
-    watch = TrafficWatch(CLOSE.model_copy(update={"action": action}))
+    watch = watching(CLOSE.model_copy(update={"action": action}))
     (fault,) = watch.assess(state(aircraft((60.0, 0.0, 40.0))), 0)
     assert fault.demand is demand
     assert fault.kind == "traffic"
@@ -164,15 +169,19 @@ def test_nothing_is_judged_that_is_to_be_ignored_or_from_nowhere() -> None:
 
 
 def test_an_aircraft_counts_for_five_seconds_after_it_was_near() -> None:
-    """And for no longer; one that is told no more, too. It is near until it is a fifth further."""
-    watch = TrafficWatch(CLOSE)
-    near, far = aircraft((60.0, 0.0, 10.0)), aircraft((120.1, 0.0, 10.0))
-    leaving = aircraft((120.0, 0.0, 10.0))
-    assert watch.assess(state(far), 0) == []
-    assert watch.assess(state(leaving), 0) == []
+    """And for no longer; one that is told no more, too.
+
+    It is near until it is a fifth further, and as far as the drone flies in the time looked ahead.
+    """
+    watch = watching(CLOSE)
+    near, far = aircraft((60.0, 0.0, 10.0)), aircraft((140.1, 0.0, 10.0))
+    leaving = aircraft((140.0, 0.0, 85.0))
+    higher = aircraft((60.0, 0.0, 85.1))
+    for one in (far, leaving, higher):
+        assert watch.assess(state(one), 0) == []
     assert len(watch.assess(state(near), 0)) == 1
     assert len(watch.assess(state(leaving), NANOSECONDS)) == 1
-    assert len(watch.assess(state(far), 6 * NANOSECONDS)) == 1
+    assert len(watch.assess(state(higher), 6 * NANOSECONDS)) == 1
     assert watch.assess(state(far), 6 * NANOSECONDS + 1) == []
     assert len(watch.assess(state(near), 7 * NANOSECONDS)) == 1
     assert len(watch.assess(state(), 12 * NANOSECONDS)) == 1
@@ -309,6 +318,7 @@ def test_a_drone_waits_until_the_aircraft_is_gone() -> None:
     assert S.HOLDING in flying.states[flying.states.index(S.ENROUTE) :]
     told = [alert.text for alert in flying.mission.alerts if alert.kind == "traffic"]
     assert told == ["traffic: HBXYZ is 30 m away, 0 m above, coming nearer"]
+    assert flying.states.count(S.ENROUTE) == 2
     assert nearest(flying) > 29.5
 
 
