@@ -292,14 +292,13 @@ class Mission:
         if self._motors_stopped(state):
             return Wait()
         self._protect(state)
-        if self.state in _LEAVING and self._lost_for_good():
+        if self.finished or (self.state in _LEAVING and self._lost_for_good()):
             return Wait()
         turns = {
             MissionState.TAKING_OFF: self._take_off,
             MissionState.PAUSED: self._stay,
             MissionState.RETURNING: self._return,
             MissionState.LANDING: self._land,
-            MissionState.ABORTED: lambda _: Wait(),
         }
         return turns.get(self.state, self._fly)(state)
 

@@ -442,8 +442,8 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
             (mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b""), autopilot),
         ):
             vehicle.receive_also(bytes(message.pack(own)), None)
-        mode = vehicle.turn()
-    assert mode is VehicleMode.LOST
+        vehicle.turn()
+    assert vehicle.turn() is VehicleMode.LOST
     assert "no word from the vehicle for 3 s" in vehicle.vehicle.preflight()
     assert vehicle.vehicle.health().remote_id == ""
     assert math.isclose(vehicle.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)

@@ -164,7 +164,7 @@ def test_nothing_is_judged_that_is_to_be_ignored_or_from_nowhere() -> None:
     beside = aircraft((10.0, 0.0, 10.0))
     ignoring = CLOSE.model_copy(update={"action": "ignore"})
     assert near(state(beside), ignoring) == []
-    assert near(state(beside, at=(math.nan,) * 3), CLOSE) == []
+    assert near(state(beside, at=(math.nan, math.nan, math.nan)), CLOSE) == []
     assert near(state(beside), CLOSE) != []
 
 
