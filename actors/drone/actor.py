@@ -27,7 +27,7 @@ from aerodaas.actors.session import (
 )
 from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
 from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.mission.safety.setpoint_filter import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message

@@ -38,7 +38,7 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.mission.safety.setpoint_filter import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.terrain.ground import agreed_sea_level
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns

@@ -18,6 +18,7 @@ from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvCon
 from aerodaas.config.home import HomeConfig
 from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import (
     CameraConfig,
     GeofenceConfig,
@@ -29,6 +30,7 @@ from aerodaas.config.robot import (
 )
 from aerodaas.config.strict import Finite, NotNegative, Positive, Strict
 from aerodaas.config.terrain import TerrainConfig
+from aerodaas.config.traffic import TrafficConfig
 from aerodaas.types.identifiers import Identifier, ScopedName
 
 __all__ = [
@@ -41,9 +43,11 @@ __all__ = [
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",
+    "OperatorPlaceConfig",
     "PreflightConfig",
     "RecordingConfig",
     "RemoteConfig",
+    "RemoteIdConfig",
     "RobotConfig",
     "RuntimeEnvConfig",
     "SchedulersConfig",
@@ -52,6 +56,7 @@ __all__ = [
     "TaskConfig",
     "TenantConfig",
     "TerrainConfig",
+    "TrafficConfig",
     "as_runtime_env",
     "validated",
 ]

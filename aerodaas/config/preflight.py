@@ -44,7 +44,7 @@ class PreflightConfig(Strict):
     """Age of the vehicle's last word."""
     fallback: PreflightLevel = "warn"
     """Whether it comes home by itself once this process is gone."""
-    remote_id: PreflightLevel = "ignore"
+    remote_id: PreflightLevel = "warn"
     """Whether a Remote ID transmitter says that it is ready."""
     cell_voltage: Positive = 3.5
     """Volts of a cell at least."""

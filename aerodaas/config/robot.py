@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.strict import Finite, NotNegative, Positive, Settings, Strict
+from aerodaas.config.traffic import TrafficConfig
 from aerodaas.types.identifiers import Identifier
 
 __all__ = [
@@ -21,6 +23,11 @@ __all__ = [
     "RobotConfig",
     "SensorConfig",
 ]
+
+
+T = TypeVar("T")
+Personal = Annotated[T, PlainSerializer(lambda _: None, return_type=None, when_used="json")]
+"""A setting about a person, which no recording and no other JSON has."""
 
 
 class GeofenceConfig(Strict):
@@ -84,6 +91,7 @@ class LimitsConfig(Strict):
     battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
     """Charge at which it lands where it is, and that a return keeps in reserve."""
     geofence: GeofenceConfig = GeofenceConfig()
+    traffic: TrafficConfig = TrafficConfig()
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -200,6 +208,7 @@ class RobotConfig(Strict):
     limits: LimitsConfig = LimitsConfig()
     preflight: PreflightConfig = PreflightConfig()
     mission: MissionConfig = MissionConfig()
+    remote_id: Personal[RemoteIdConfig | None] = None
     edge: Identifier | None = None
     """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)

@@ -68,9 +68,12 @@ class MissionLog:
             self.distance += way
             self._counted_at = position
 
-    def alert(self, now: int, kind: str, text: str) -> None:
-        """Raise an alert; a repetition that differs only in its figures waits for `_AGAIN`."""
-        subject = kind, words(text)
+    def alert(self, now: int, kind: str, text: str, about: str = "") -> None:
+        """Raise an alert; a repetition that differs only in its figures waits for `_AGAIN`.
+
+        With `about` it is one about the same, whatever it says.
+        """
+        subject = kind, about or words(text)
         told_at = self._told.get(subject)
         if told_at is not None and now - told_at < _AGAIN:
             return
@@ -89,6 +92,6 @@ def words(text: str) -> str:
     return re.sub(r"\d+(\.\d+)?", "#", text)
 
 
-def subject(kind: str, text: str) -> tuple[str, str]:
-    """Key by which faults are the same: several of the vehicle share one kind."""
-    return kind, words(text) if kind == "vehicle" else ""
+def subject(kind: str, text: str, about: str = "") -> tuple[str, str]:
+    """Key by which faults are the same: several of the vehicle share one kind, and of traffic."""
+    return kind, words(text) if kind == "vehicle" else about

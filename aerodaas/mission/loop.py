@@ -10,7 +10,9 @@ import numpy as np
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
-from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
+from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.mission.safety.setpoint_filter import SetpointFilter
+from aerodaas.mission.safety.traffic import traffic_neighbours
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Header
 from aerodaas.types.errors import VehicleError
@@ -134,7 +136,8 @@ class SetpointLoop:
         cause: Header | None = None,
     ) -> SetpointRecord:
         duration = _PERIOD if self._before is None else seconds(now - self._before)
-        clamped = self.guard.clamp(asked, state.odometry, duration, neighbours)
+        others = [*neighbours, *traffic_neighbours(state, self.mission.limits.traffic)]
+        clamped = self.guard.clamp(asked, state.odometry, duration, others)
         sent = self.vehicle.send(clamped.setpoint)
         names = clamped.clipped_by
         if sent is not clamped.setpoint and not _same(sent, clamped.setpoint):

@@ -42,10 +42,11 @@ from aerodaas.mission.photographer import Photographer
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
+from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import Motors, MotorWatch
-from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Supervisor, has_position
+from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.braking import stopping_point
@@ -291,14 +292,13 @@ class Mission:
         if self._motors_stopped(state):
             return Wait()
         self._protect(state)
-        if self.state in _LEAVING and self._lost_for_good():
+        if self.finished or (self.state in _LEAVING and self._lost_for_good()):
             return Wait()
         turns = {
             MissionState.TAKING_OFF: self._take_off,
             MissionState.PAUSED: self._stay,
             MissionState.RETURNING: self._return,
             MissionState.LANDING: self._land,
-            MissionState.ABORTED: self._release,
         }
         return turns.get(self.state, self._fly)(state)
 
@@ -389,15 +389,15 @@ class Mission:
         return Wait()
 
     def _protect(self, state: VehicleState) -> None:
-        before = {subject(finding.kind, finding.text) for finding in self._assessment.findings}
+        before = {subject(one.kind, one.text, one.about) for one in self._assessment.findings}
         self._assessment = self._supervisor.assess(state, self._now)
         demand, reason = self._assessment.demand, self._assessment.gravest.text
         for finding in self._assessment.findings:
             # The reason for a takeover or a lost position already names the faults behind it.
             named = demand is not FailsafeAction.NOTHING and finding.text in reason
             told = named and finding.kind == "vehicle"
-            if subject(finding.kind, finding.text) not in before and not told:
-                self._log.alert(self._now, finding.kind, finding.text)
+            if subject(finding.kind, finding.text, finding.about) not in before and not told:
+                self._log.alert(self._now, finding.kind, finding.text, finding.about)
         if demand is FailsafeAction.RELEASE:
             self._to(MissionState.ABORTED, reason)
         elif demand is FailsafeAction.LAND and self.state is not MissionState.LANDING:
@@ -562,10 +562,6 @@ class Mission:
     def _land(self, _: VehicleState) -> Action:
         self._leg = None
         return Land()
-
-    @staticmethod
-    def _release(_: VehicleState) -> Action:
-        return Wait()
 
     def _plan(self, state: VehicleState) -> None:
         if not has_position(state):

@@ -10,6 +10,8 @@ import numpy as np
 
 from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.geometry import Vector
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["odometry_of", "state_of", "vehicle_states"]
@@ -34,10 +36,7 @@ def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
     """Decode odometry from its JSON without loss of precision; None for None."""
     if value is None:
         return None
-    position, velocity = (
-        np.array([_number(value[name][axis]) for axis in "xyz"], dtype=np.float64)
-        for name in ("position", "velocity")
-    )
+    position, velocity = _vector(value["position"]), _vector(value["velocity"])
     angles = (value[name] for name in ("yaw", "roll", "pitch", "yaw_rate", "position_sigma"))
     return Odometry(position, velocity, *map(_number, angles))
 
@@ -58,7 +57,17 @@ def state_of(value: dict[str, Any]) -> VehicleState:
         tuple(value["faults"]),
         dict(value["extra"]),
         FlightEnd(ended) if ended else None,
+        traffic=tuple(map(_traffic_of, value.get("traffic", ()))),
     )
+
+
+def _traffic_of(value: dict[str, Any]) -> Traffic:
+    place, velocity = _vector(value["position"]), _vector(value["velocity"])
+    return Traffic(value["address"], value["callsign"], place, velocity, value["age"])
+
+
+def _vector(value: dict[str, float | None]) -> Vector:
+    return np.array([_number(value[axis]) for axis in "xyz"], dtype=np.float64)
 
 
 def _number(value: float | None) -> Any:  # noqa: ANN401 - an int stays one

@@ -15,6 +15,7 @@ from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.geometry import Vector
 from aerodaas.types.payload import Gimbal, GimbalAttitude, PhotoCamera
 from aerodaas.types.records import fast_pickle
+from aerodaas.types.traffic import Traffic
 
 __all__ = [
     "Capabilities",
@@ -128,6 +129,8 @@ class VehicleState:
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
     gimbal: GimbalAttitude | None = None
     """Where its gimbal looks; None without one, and where it does not say."""
+    traffic: tuple[Traffic, ...] = ()
+    """Other aircraft that it hears of, the nearest first."""
 
 
 @runtime_checkable

@@ -15,7 +15,8 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
 from aerodaas.mission.planner import BackgroundPlanner
 from aerodaas.mission.queue import WaypointQueue
-from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
+from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry

@@ -20,6 +20,7 @@ from aerodaas.cli.flown_tasks import Flown
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.tello.settings import TelloSettings
@@ -87,6 +88,10 @@ LOCAL_ALONE = {
     "simulation.execution_times",
     "simulation.network",
     "simulation.network_period",
+    # Who operates it and from where is personal; recorded traffic has no echo of its own.
+    *(f"robots.remote_id.{name}" for name in RemoteIdConfig.model_fields if name != "operator"),
+    *(f"robots.remote_id.operator.{name}" for name in OperatorPlaceConfig.model_fields),
+    "robots.limits.traffic.own_address",
     # What a take-off is refused for is the policy of who flies.
     *(f"robots.preflight.{name}" for name in PreflightConfig.model_fields),
 }

@@ -18,6 +18,7 @@ from aerodaas.recording.report.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
 from aerodaas.types.data import Battery, GpsFix, Header, Odometry
 from aerodaas.types.status import RECENT, Message, MissionState, MissionStatus
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -34,6 +35,10 @@ FULL = VehicleState(
     faults=("compass", "link weak"),
     extra={"temperature": 60.5, "link": 0.25},
     ended=FlightEnd.FELL,
+    traffic=(
+        Traffic(0x4B1234, "HBXYZ", np.array([1 / 3, -2.0, 80.5]), np.array([50.0, 0.1, -2.0]), 0.3),
+        Traffic(7, "000007", np.array([9.0, 8.0, math.nan]), np.zeros(3)),
+    ),
 )
 SPARE = VehicleState(6_000_000_000, TRUTH, Battery(0.5), VehicleMode.MANUAL, armed=False)
 

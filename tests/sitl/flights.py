@@ -47,11 +47,16 @@ FAR = survey((0, 60))
 def robot_at(
     url: str,
     settings: Mapping[str, Any] | None = None,
+    own: Mapping[str, Any] | None = None,
     **limits: Any,  # noqa: ANN401
 ) -> RobotConfig:
-    """The robot that flies what is found at `url`; `settings` of its driver go on top."""
+    """The robot that flies what is found at `url`.
+
+    `settings` of its driver, its `own` ones and its `limits` go on top.
+    """
     return RobotConfig.model_validate(
         {
+            **(own or {}),
             "id": "drone",
             "driver": "mavlink",
             "settings": {"url": url, "ready_timeout": 120.0, **(settings or {})},
@@ -77,13 +82,14 @@ class SitlFlight:
         url: str,
         *commands: Command,
         settings: Mapping[str, Any] | None = None,
+        own: Mapping[str, Any] | None = None,
         link: Impairment = PERFECT,
         **limits: Any,  # noqa: ANN401
     ) -> None:
         """Connect through a relay with `link`'s faults, and start the mission of `commands`."""
         self.relay = Relay(url)
         self.relay.spoil(link)
-        robot = robot_at(self.relay.url, settings, **limits)
+        robot = robot_at(self.relay.url, settings, own, **limits)
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
         try:
             self._connect(robot, commands)

@@ -63,6 +63,10 @@ class Relay:
             elif outer is not None and self._autopilot is not None:
                 outer.sendto(packet, self._autopilot)
 
+    def say(self, packet: bytes) -> None:
+        """Say something to the driver, as from the autopilot's wire."""
+        self._pass_down(packet, self._driver)
+
     def close(self) -> None:
         """Stop."""
         self._closing.set()

@@ -42,6 +42,8 @@ class Witness:
         self.modes: list[int] = []
         """The custom modes of its HEARTBEATs, each change once."""
         self.texts: list[str] = []
+        self.remote_id: list[Any] = []
+        """What it tells a Remote ID transmitter."""
 
     @property
     def away(self) -> float:
@@ -60,6 +62,8 @@ class Witness:
                 self._truth(message)
             elif kind == "STATUSTEXT":
                 self.texts.append(str(message.text))
+            elif kind.startswith("OPEN_DRONE_ID_"):
+                self.remote_id.append(message)
         return packets
 
     def _heartbeat(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types

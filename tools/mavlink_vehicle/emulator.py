@@ -21,6 +21,7 @@ from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.px4 import EmulatedPX4
 from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
+from tools.mavlink_vehicle.transmitter import EmulatedTransmitter
 
 __all__ = ["EmulatedAutopilot"]
 
@@ -68,10 +69,11 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         self._peers: set[tuple[str, int]] = {self.options.peer}
         kind = EmulatedPX4 if self.options.family == "px4" else EmulatedArduPilot
         self.firmware: Firmware = kind(self.options, self._flight, self._say)
-        self._mav: Any = mavlink.MAVLink(None, self.options.system, 1)
-        self._mav.robust_parsing = True
-        if self.options.key is not None:
-            sign_with(self._mav, self.options.key)
+        self._mav = self._codec(1)
+        aside = self._codec(EmulatedTransmitter.component)
+        self.transmitter = EmulatedTransmitter(
+            lambda message: self._say(message, aside), present=self.options.remote_id
+        )
         seed = self.options.seed
         self._up = Channel(self.options.uplink, f"{seed}/up", self._hear)
         self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
@@ -80,6 +82,13 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         self._now = 0.0
         """Seconds of the latest turn."""
         self._flown_to: float | None = None
+
+    def _codec(self, component: int) -> Any:  # noqa: ANN401 - pymavlink has no types
+        codec = mavlink.MAVLink(None, self.options.system, component)
+        codec.robust_parsing = True
+        if self.options.key is not None:
+            sign_with(codec, self.options.key)
+        return codec
 
     @property
     def armed(self) -> bool:
@@ -187,6 +196,7 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         firmware = self.firmware
         if getattr(message, "target_system", 0) not in {0, self.options.system}:
             return
+        self.transmitter.hear(message, self._now)
         if kind == "COMMAND_LONG":
             values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
             self._acknowledge(message, firmware.obey(message.command, values, None))
@@ -218,10 +228,12 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             message = self.firmware.message(number)
             if message is not None:
                 self._say(message)
+        self.transmitter.turn(now)
 
-    def _say(self, message: Any) -> None:  # noqa: ANN401
-        packet = message.pack(self._mav)
-        self._mav.seq = (self._mav.seq + 1) % 256
+    def _say(self, message: Any, codec: Any = None) -> None:  # noqa: ANN401
+        codec = codec or self._mav
+        packet = message.pack(codec)
+        codec.seq = (codec.seq + 1) % 256
         for peer in self._peers:
             self._down.send(packet, peer, self._now)
 

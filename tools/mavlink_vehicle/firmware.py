@@ -13,6 +13,7 @@ import shapely
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.geometry import enu_to_ned, ned_to_enu, yaw_enu_to_ned, yaw_ned_to_enu
 from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
@@ -94,6 +95,7 @@ class Firmware(ABC):
         self._say = say
         self._extras = Extras(self)
         self.payload = EmulatedPayload(self, say)
+        self.traffic = EmulatedTraffic(self)
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False
@@ -372,6 +374,7 @@ class Firmware(ABC):
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._time,
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self.route.current,
+            mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE: self.traffic.message,
         }
         needs_place = {
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,

@@ -17,8 +17,10 @@ import numpy as np
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.control.permission import flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
+from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
 from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
@@ -58,7 +60,6 @@ _PARTING = 4.0
 to stop."""
 _SHORT = 1.5
 """Metres below the commanded height within which an autopilot may report a take-off as done."""
-_STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
 class MavlinkVehicle:
@@ -90,7 +91,8 @@ class MavlinkVehicle:
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
-        self._report = VehicleReport(self._telemetry, self._phase, self._touchdown)
+        self._airspace = Airspace(self._robot, self._telemetry, observes=self._settings.observe)
+        self._report = VehicleReport(self._telemetry, self._phase, self._touchdown, self._airspace)
         self._steering = Steering(self._robot, self._settings)
         self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
@@ -173,6 +175,7 @@ class MavlinkVehicle:
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
             self._payload.search(commander)
+            self._airspace.begin(link, commander, self._connection.alignment)
         except BaseException:
             self.close()
             raise
@@ -459,6 +462,9 @@ class MavlinkVehicle:
                 if kind == "HEARTBEAT":
                     self._finder.take(message, peer)
                 return
+            if kind in Airspace.messages:
+                self._airspace.take(message, now)
+                return
             reboots = self._telemetry.reboots
             self._telemetry.take(message, now)
             if self._telemetry.reboots != reboots:
@@ -520,6 +526,7 @@ class MavlinkVehicle:
             self._rates.turn(self._telemetry, now)
             self._touchdown.turn(now)
             self._payload.turn(now)
+            self._airspace.turn(now)
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
@@ -580,16 +587,6 @@ class MavlinkVehicle:
     ) -> Connection:
         connection, mode = self._connected(), self._report.mode
         self._require_control(deed)
-        if mode is VehicleMode.MANUAL:
-            raise VehicleError(f"{self._name} cannot {deed}: a pilot flies it")
-        if mode is VehicleMode.FAILSAFE:
-            raise VehicleError(f"{self._name} cannot {deed}: its own protection flies it")
-        if mode is VehicleMode.GROUNDED:
-            raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
-        allowed = mode in _STEERED
-        allowed |= climbing and mode is VehicleMode.TAKING_OFF
-        allowed |= landing and mode is VehicleMode.LANDING
-        if not allowed:
-            doing = mode.value.replace("_", " ")
-            raise VehicleError(f"{self._name} cannot {deed} while it is {doing}")
+        if objection := flight_objection(mode, climbing=climbing, landing=landing):
+            raise VehicleError(f"{self._name} cannot {deed}{objection}")
         return connection

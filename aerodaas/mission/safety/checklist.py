@@ -11,6 +11,7 @@ from aerodaas.config.model import LimitsConfig
 from aerodaas.config.preflight import PreflightConfig, PreflightLevel
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
+from aerodaas.mission.safety.traffic import DEMANDS, encounters
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import OWN_CHECKS, HealthItem, HealthReadings, MeasuredVehicle, Verdict
 from aerodaas.types.sun import sun_elevation
@@ -21,6 +22,7 @@ __all__ = ["Checklist", "concerns", "refusals"]
 _NOT_KNOWN = "not known"
 _SUBJECTS = {
     "GPS": "gps",
+    "Remote ID": "remote_id",
     "battery": "cells",
     "compass": "compass",
     "compasses": "compass",
@@ -45,7 +47,8 @@ _REMEDIES = {
     "fence": "move the drone, or mend limits.geofence",
     "fallback": '"fallback": "set" in the settings of the robot (docs/mavlink.md)',
     "link": "look at antennas, cables and the address",
-    "remote_id": "switch the transmitter on, and wait for its GPS",
+    "remote_id": "switch the transmitter on, wait for its GPS, and fill in the robot's remote_id",
+    "traffic": "wait until it is gone",
     OWN_CHECKS: "do what it says",
 }
 
@@ -76,6 +79,7 @@ class Checklist:
             level: PreflightLevel = getattr(self._policy, item.name)
             if level != "ignore":
                 items.append(_judged(item, level, faults.get(item.name, [])))
+        items += self._traffic(state)
         others = [text for text in faults.get("", []) if text not in objections]
         if others:
             items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
@@ -103,6 +107,19 @@ class Checklist:
         objections = place_objections(state, self._limits, self._fence)
         value = "; ".join(objections) or "inside, and so is the take-off"
         return _by(objections, HealthItem("fence", value, "inside", Verdict.GOOD))
+
+    def _traffic(self, state: VehicleState) -> list[HealthItem]:
+        """Other aircraft, where the vehicle hears of any, judged by `limits.traffic`."""
+        config = self._limits.traffic
+        if config.action == "ignore" or not state.traffic:
+            return []
+        near = encounters(state, state.traffic, config)
+        value = "; ".join(one.text.removeprefix("traffic: ") for one in near)
+        bound = f"none within {config.distance:g} m and {config.height:g} m of height"
+        verdict = Verdict.REFUSED if config.action in DEMANDS else Verdict.WARNING
+        return [
+            HealthItem("traffic", value or "none near", bound, verdict if near else Verdict.GOOD)
+        ]
 
     def _health(self, state: VehicleState, told: HealthReadings) -> Iterator[HealthItem]:
         policy = self._policy

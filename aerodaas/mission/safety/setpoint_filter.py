@@ -1,9 +1,9 @@
 """The final safety filter on every setpoint: limits that clamp, boundaries to stop before.
 
-Boundaries (geofence, range, ground, other drones) bound the speed towards them by the remaining
-braking distance, a control barrier: whatever the previous setpoints, the drone can still stop in
-time, and standing still is always allowed. Motion along a boundary or away from it is left alone,
-so that a drone that was blown outside can come back.
+Boundaries (geofence, range, ground, other drones, aircraft) bound the speed towards them by the
+remaining braking distance, a control barrier: whatever the previous setpoints, the drone can still
+stop in time, and standing still is always allowed. Motion along a boundary or away from it is left
+alone, so that a drone that was blown outside can come back.
 """
 
 from __future__ import annotations
@@ -17,26 +17,19 @@ import numpy as np
 from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector, is_close, is_finite, length
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
-__all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
+__all__ = ["FilteredSetpoint", "SetpointFilter"]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
 _FEW = 4
 """Neighbours up to which it takes longer to tell the near ones than to bound by all."""
 _ROUNDING = 1e-3
 """Metres by which a neighbour is taken to be nearer than it is."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Neighbour:
-    """Another drone's position (ENU metres) and velocity (ENU m/s)."""
-
-    position: Vector
-    velocity: Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,7 +218,13 @@ class SetpointFilter:
         if away > 0.0:
             room = self.limits.max_range - away
             bounds.append(self._bound("max_range", outwards / away, room, odometry))
-        for neighbour in self._near(velocity, odometry, list(neighbours)):
+        drones = list[Neighbour]()
+        for neighbour in neighbours:
+            if neighbour.apart is None:
+                drones.append(neighbour)
+            else:
+                bounds += self._aircraft_bounds(neighbour, neighbour.apart, odometry)
+        for neighbour in self._near(velocity, odometry, drones):
             way = neighbour.position - position
             distance = length(way)
             # Both drones brake, so each may use half of the room between them.
@@ -233,6 +232,31 @@ class SetpointFilter:
             if distance > 0.0:
                 bounds.append(self._bound("separation", way / distance, room, odometry))
         return bounds
+
+    def _aircraft_bounds(
+        self, aircraft: Neighbour, apart: tuple[float, float], odometry: Odometry
+    ) -> list[_Bound]:
+        """Bounds towards an aircraft, which flies on while this drone brakes.
+
+        Distance or height keeps them apart, and that is kept of which there is more.
+        """
+        way = aircraft.position - odometry.position
+        limits, rooms = self.limits, list[tuple[float, Vector]]()
+        braking = limits.reaction_time + limits.max_speed / limits.max_acceleration
+        for part, least in ((_level(way), apart[0]), (way - _level(way), apart[1])):
+            distance = length(part)
+            if not math.isfinite(distance):
+                continue  # its height is not known, and keeps nothing apart
+            # Right above or below, and at the very same height, every way leads away.
+            towards = part / distance if distance > 0.0 else np.zeros(3)
+            nearer = max(0.0, -float(aircraft.velocity @ towards)) * braking
+            rooms.append((distance - least - nearer, towards))
+        most = max(room for room, _ in rooms)
+        return [
+            self._bound("traffic", towards, room, odometry)
+            for room, towards in rooms
+            if room == most or most <= 0.0
+        ]
 
     def _near(
         self, velocity: Vector, odometry: Odometry, neighbours: list[Neighbour]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from aerodaas.config.model import LimitsConfig
+from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
+from aerodaas.mission.safety.traffic import TrafficWatch
 from aerodaas.types.clock import seconds
 from aerodaas.types.energy import EnergyMeter
 from aerodaas.types.geometry import Vector, is_finite
@@ -19,36 +20,11 @@ from aerodaas.types.vehicle import VehicleMode, VehicleState
 __all__ = [
     "CALM",
     "Assessment",
-    "FailsafeAction",
-    "Fault",
     "Supervisor",
     "charge_objection",
     "has_position",
     "place_objections",
 ]
-
-
-class FailsafeAction(enum.IntEnum):
-    """Failsafe actions in increasing severity."""
-
-    NOTHING = 0
-    HOLD = 1
-    """Stand still: the link is lost, perhaps only for a moment."""
-    RETURN = 2
-    LAND = 3
-    RELEASE = 4
-    """Stop sending setpoints: a pilot or the autopilot's own failsafe flies."""
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One fault and the failsafe action that it demands."""
-
-    demand: FailsafeAction
-    kind: str
-    """Short machine-readable name, such as `battery_low`."""
-    text: str
-    """One sentence for the operator."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +48,7 @@ CALM = Assessment(Fault(FailsafeAction.NOTHING, "", ""))
 
 
 class Supervisor:
-    """Watches battery, link, position and mode of one vehicle in flight."""
+    """Watches battery, link, position, mode and traffic of one vehicle in flight."""
 
     _STALE = 1.0
     """Age in seconds from which a vehicle's state no longer shows its position."""
@@ -91,6 +67,7 @@ class Supervisor:
         self._home = home
         self._fence = fence
         self._meter = meter
+        self._traffic = TrafficWatch(limits)
         self._lost_since: int | None = None
         self._blind_for = 0
         """Nanoseconds with a link since the vehicle last had a position."""
@@ -108,6 +85,7 @@ class Supervisor:
         )
         self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
+        findings += self._traffic.assess(state, now)
         findings += [Fault(FailsafeAction.NOTHING, "vehicle", text) for text in state.faults]
         if not findings:
             return CALM

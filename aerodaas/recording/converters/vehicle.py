@@ -20,6 +20,7 @@ from aerodaas.recording.rotation import from_rpy
 from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.payload import Photo
 from aerodaas.types.status import Message, SetpointRecord
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
 __all__ = ["body_frame", "odometry_json"]
@@ -111,9 +112,21 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         state["gps"] = item.gps
     if item.gimbal is not None:
         state["gimbal"] = item.gimbal
+    if item.traffic:
+        state["traffic"] = [_traffic_json(one) for one in item.traffic]
     if item.truth is not None:
         state["truth"] = odometry_json(item.truth)
     yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)
+
+
+def _traffic_json(aircraft: Traffic) -> dict[str, Any]:
+    return {
+        "address": aircraft.address,
+        "callsign": aircraft.callsign,
+        "position": xyz(aircraft.position),
+        "velocity": xyz(aircraft.velocity),
+        "age": aircraft.age,
+    }
 
 
 @convert.register

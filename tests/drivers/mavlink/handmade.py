@@ -84,6 +84,10 @@ class Handmade:
         self._inbox.append((bytes(message.pack(self._mav)), _PEER))
         self._mav.seq = (self._mav.seq + 1) % 256
 
+    def receive_also(self, packet: bytes, peer: tuple[str, int] | None) -> None:
+        """Let a packet come as well, from the vehicle's own address (None) or from elsewhere."""
+        self._inbox.append((packet, peer or _PEER))
+
     def advance(self, seconds: float = _STEP) -> None:
         """Let time pass at both ends."""
         for _ in range(round(seconds / _STEP)):

@@ -39,13 +39,15 @@ def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
 
 
 def robot_of(port: int, **settings: Any) -> RobotConfig:  # noqa: ANN401
-    """A robot that waits for its vehicle at `port`; `limits` go to the robot."""
+    """A robot that waits for its vehicle at `port`; `limits` and the like go to the robot."""
+    own = {name: settings.pop(name) for name in ("remote_id", "preflight") if name in settings}
     return RobotConfig.model_validate(
         {
             "id": "drone",
             "driver": "mavlink",
             "limits": {"max_speed": 4.0, "cruise_speed": 2.0, **settings.pop("limits", {})},
             "start": settings.pop("start", (0, 0, 0)),
+            **own,
             "settings": {"url": f"udpin:{LOOPBACK}:{port}", "ready_timeout": 15.0, **settings},
         }
     )

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.mission.safety import setpoint_filter
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
+from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import ConfigError

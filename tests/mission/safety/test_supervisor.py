@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Supervisor
+from aerodaas.mission.safety.supervisor import CALM, Supervisor
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Odometry
 from aerodaas.types.energy import EnergyMeter, EnergyModel

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightPhase
@@ -38,7 +39,14 @@ _GRAVE = 3
 class VehicleReport:
     """Reporter of one vehicle's state; seconds are monotonic."""
 
-    def __init__(self, telemetry: Telemetry, phase: FlightPhase, touchdown: Touchdown) -> None:
+    def __init__(
+        self,
+        telemetry: Telemetry,
+        phase: FlightPhase,
+        touchdown: Touchdown,
+        airspace: Airspace | None = None,
+    ) -> None:
+        """Report by what these know; without an `airspace`, nothing of Remote ID and traffic."""
         self.departure: Departure | None = None
         """Its take-offs; None before it is found."""
         self.alignment: Alignment | None = None
@@ -48,6 +56,7 @@ class VehicleReport:
         self._telemetry = telemetry
         self._phase = phase
         self._touchdown = touchdown
+        self._airspace = airspace
 
     def state(
         self, stamp: int, now: float, counts: LinkCounts, reports: Sequence[str] = ()
@@ -64,9 +73,11 @@ class VehicleReport:
         known = heard or (lost and math.isfinite(age))
         age = age if known else 0.0
         frame = self.alignment.frame if self.alignment is not None else None
+        odometry, airspace = self.odometry(frame, known=known), self._airspace
+        traffic = () if airspace is None else airspace.traffic(odometry.position, now - age)
         return VehicleState(
             max(0, stamp - int(age * NANOSECONDS)),
-            self.odometry(frame, known=known),
+            odometry,
             telemetry.battery,
             VehicleMode.LOST if lost else self.mode,
             telemetry.armed,
@@ -81,8 +92,10 @@ class VehicleReport:
                 "refused_packets": counts.refused,
                 "silence": telemetry.silence(now),
                 **self._mission(),
+                **({} if airspace is None else airspace.figures),
             },
             ended=self._touchdown.ended,
+            traffic=traffic,
         )
 
     def _mission(self) -> dict[str, float]:
@@ -125,6 +138,7 @@ class VehicleReport:
             silence=telemetry.silence(now),
             clock=telemetry.clock if telemetry.clock > _DATED else None,
             stranded=stranded,
+            remote_id=None if self._airspace is None else self._airspace.objection(now),
         )
 
     @property
@@ -159,5 +173,6 @@ class VehicleReport:
         if self.alignment is not None:
             faults.append(self.alignment.fault)
         faults += telemetry.health.faults(now)
+        faults += [] if self._airspace is None else self._airspace.faults(now)
         faults += telemetry.texts.recent(now, REASONS, _GRAVE)
         return list(dict.fromkeys(fault for fault in faults if fault))

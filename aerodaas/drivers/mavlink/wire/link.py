@@ -59,9 +59,18 @@ _WANTED = frozenset(
         mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
         mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
         mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO,
+        *(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS),
         EventMessage.id,
     }
 )
+
+_ABOARD = {
+    "ADSB_VEHICLE": frozenset({mavlink.MAV_COMP_ID_ADSB}),
+    "OPEN_DRONE_ID_ARM_STATUS": frozenset(
+        range(mavlink.MAV_COMP_ID_ODID_TXRX_1, mavlink.MAV_COMP_ID_ODID_TXRX_3 + 1)
+    ),
+}
+"""Components beside the autopilot from which a message of this name is heard, too."""
 
 
 @dataclass(slots=True)
@@ -273,7 +282,10 @@ class MavlinkLink:
             self._pins.meet(sender, peer)
         if target is not None:
             if sender != target:
-                self.counts.strangers += 1
+                if self._is_aboard(message, sender, target, peer):
+                    self._on_message(message, now, peer)
+                else:
+                    self.counts.strangers += 1
                 return
             beats = message.get_type() == "HEARTBEAT"
             if not self._pins.pin.admits(peer, now, may_lead=beats):
@@ -284,6 +296,11 @@ class MavlinkLink:
         for names, inbox in self._listeners:
             if message.get_type() in names:
                 inbox.put(message)
+
+    def _is_aboard(self, message: Message, sender: Sender, target: Sender, peer: Peer) -> bool:
+        """Whether it is a word of the vehicle's own equipment, by the vehicle's own address."""
+        aboard = sender[0] == target[0] and sender[1] in _ABOARD.get(message.get_type(), ())
+        return aboard and peer == self._pins.pin.address
 
     def _heartbeat(self) -> Message:
         station = self._settings.heard_as_station

@@ -1,0 +1,27 @@
+"""Which orders make sense in which mode."""
+
+from __future__ import annotations
+
+from aerodaas.types.vehicle import VehicleMode
+
+__all__ = ["flight_objection"]
+
+_STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
+_WHY = {
+    VehicleMode.MANUAL: ": a pilot flies it",
+    VehicleMode.FAILSAFE: ": its own protection flies it",
+    VehicleMode.GROUNDED: " on the ground; take off first",
+}
+
+
+def flight_objection(mode: VehicleMode, *, climbing: bool, landing: bool) -> str:
+    """Why a vehicle in `mode` is given no order of flight, to be read after "cannot …".
+
+    Empty if it is; `climbing` and `landing`: also while it takes off and lands.
+    """
+    if mode in _WHY:
+        return _WHY[mode]
+    allowed = mode in _STEERED
+    allowed |= climbing and mode is VehicleMode.TAKING_OFF
+    allowed |= landing and mode is VehicleMode.LANDING
+    return "" if allowed else f" while it is {mode.value.replace('_', ' ')}"

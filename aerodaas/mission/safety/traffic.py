@@ -1,0 +1,147 @@
+"""Other aircraft around a drone: which come too near, and what that demands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from aerodaas.config.robot import LimitsConfig
+from aerodaas.config.traffic import TrafficConfig
+from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
+from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.types.clock import seconds
+from aerodaas.types.geometry import Vector, is_finite
+from aerodaas.types.traffic import Traffic
+from aerodaas.types.vehicle import VehicleState
+
+__all__ = ["DEMANDS", "Encounter", "TrafficWatch", "encounters", "meets_in", "traffic_neighbours"]
+
+DEMANDS = {
+    "hold": FailsafeAction.HOLD,
+    "return": FailsafeAction.RETURN,
+    "land": FailsafeAction.LAND,
+}
+"""What an aircraft that is too near demands, by `TrafficConfig.action`."""
+_CLEAR = 5.0
+"""Seconds for which an aircraft counts as near after it was last, for reports come each second."""
+_RELEASE = 1.2
+"""Multiple of distance and height beyond which it is near no more, beside the drone's own way:
+nothing is to start and stop at the edge."""
+_STEP = 10.0
+"""Metres to which distances are told: a text that changes with each reading tells nobody more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encounter:
+    """An aircraft that is too near, or will be soon."""
+
+    aircraft: Traffic
+    away: float
+    """Metres along the ground."""
+    above: float
+    """Metres above the drone, NaN if that is not known."""
+    after: float
+    """Seconds until it is too near; 0: it is."""
+
+    @property
+    def text(self) -> str:
+        """One sentence for the operator."""
+        away = _STEP * round(self.away / _STEP)
+        if not math.isfinite(self.above):
+            height = "at an unknown height"
+        else:
+            metres = _STEP * round(abs(self.above) / _STEP)
+            height = f"{metres:.0f} m {'above' if self.above >= 0.0 else 'below'}"
+        soon = ", coming nearer" if self.after > 0.0 else ""
+        return f"traffic: {self.aircraft.callsign} is {away:.0f} m away, {height}{soon}"
+
+
+class TrafficWatch:
+    """What the traffic around one drone demands, turn by turn."""
+
+    def __init__(self, limits: LimitsConfig) -> None:
+        """Judge for a drone of these `limits`."""
+        self._config = config = limits.traffic
+        # It would be near again at once if the drone flew on.
+        further = {
+            "distance": _RELEASE * config.distance + limits.cruise_speed * config.lookahead,
+            "height": _RELEASE * config.height + limits.max_climb * config.lookahead,
+        }
+        self._further = config.model_copy(update=further)
+        self._near: dict[int, tuple[int, Fault]] = {}
+        """When each aircraft was last too near (mission clock, ns), and what was said of it."""
+
+    def assess(self, state: VehicleState, now: int) -> list[Fault]:
+        """A fault for each aircraft that is too near to `state`, or was until a moment ago."""
+        demand = DEMANDS.get(self._config.action, FailsafeAction.NOTHING)
+        known = [one for one in state.traffic if one.address in self._near]
+        for one in (
+            *encounters(state, state.traffic, self._config),
+            *encounters(state, known, self._further),
+        ):
+            address = one.aircraft.address
+            self._near[address] = now, Fault(demand, "traffic", one.text, f"{address:06X}")
+        self._near = {
+            address: (when, fault)
+            for address, (when, fault) in self._near.items()
+            if seconds(now - when) <= _CLEAR
+        }
+        return [fault for _, fault in self._near.values()]
+
+
+def encounters(
+    state: VehicleState, traffic: Sequence[Traffic], config: TrafficConfig
+) -> list[Encounter]:
+    """Those of `traffic` that are too near to the vehicle, or will be in the time looked ahead."""
+    odometry = state.odometry
+    known = is_finite(odometry.position) and is_finite(odometry.velocity)
+    if config.action == "ignore" or not known:
+        return []
+    found = []
+    for aircraft in traffic:
+        way = aircraft.position - odometry.position
+        after = meets_in(way, aircraft.velocity - odometry.velocity, config)
+        if after is not None:
+            found.append(Encounter(aircraft, math.hypot(way[0], way[1]), float(way[2]), after))
+    return found
+
+
+def meets_in(way: Vector, closing: Vector, config: TrafficConfig) -> float | None:
+    """Seconds until an aircraft is within distance and height; 0 if it is, None if it will not be.
+
+    It is `way` from the drone (ENU metres, `up` NaN where that is not known) and moves against it
+    by `closing` (ENU m/s), both straight on. Exactly at distance and height is within.
+    """
+    level = _within(way[:2], closing[:2], config.distance)
+    upright = (-math.inf, math.inf)
+    if math.isfinite(way[2]):
+        upright = _within(way[2:], closing[2:], config.height)
+    begin = max(0.0, level[0], upright[0])
+    end = min(config.lookahead, level[1], upright[1])
+    return begin if begin <= end else None
+
+
+def _within(way: Vector, closing: Vector, reach: float) -> tuple[float, float]:
+    """From when until when a point that moves straight is within `reach`; seconds, maybe past.
+
+    The end lies before the beginning if it never is.
+    """
+    never = (math.inf, -math.inf)
+    square, half = float(closing @ closing), float(way @ closing)
+    outside = float(way @ way) - reach * reach
+    if square == 0.0:
+        return never if outside > 0.0 else (-math.inf, math.inf)
+    discriminant = half * half - square * outside
+    if discriminant < 0.0:
+        return never
+    root = math.sqrt(discriminant)
+    return (-half - root) / square, (-half + root) / square
+
+
+def traffic_neighbours(state: VehicleState, config: TrafficConfig) -> list[Neighbour]:
+    """The aircraft to keep away from, where the drone does more than tell of them."""
+    if config.action not in DEMANDS:
+        return []
+    apart = config.distance, config.height
+    return [Neighbour(one.position, one.velocity, apart) for one in state.traffic]

@@ -1,0 +1,450 @@
+"""Remote ID over MAVLink: who operates is told, and a transmitter that is not ready is minded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from handmade import Handmade
+from hypothesis import given
+from hypothesis import strategies as st
+from stepped import Stepped
+
+from aerodaas.config.remote_id import RemoteIdConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import AddNavigation, ReturnHome, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.safety.checklist import Checklist
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.health import HealthItem, Verdict
+from aerodaas.types.status import MissionState as S
+from aerodaas.types.vehicle import VehicleMode
+from aerodaas.types.waypoints import Waypoint
+from tools.mavlink_vehicle import AutopilotOptions
+
+FAMILIES = ("px4", "ardupilot")
+NUMBER = "FIN87astrdge12k8"
+WHO = {
+    "operator_id": f"{NUMBER}-xyz",
+    "uas_id": "1581F5FKD229400DR3K0",
+    "description": "farm survey",
+    "category": "open",
+    "uas_class": 1,
+}
+REQUIRED = {"remote_id": "require"}
+GOOD, BAD = 0, 1
+
+
+def ends_of(
+    monkeypatch: pytest.MonkeyPatch,
+    family: str = "px4",
+    *,
+    carried: bool = True,
+    **settings: Any,  # noqa: ANN401
+) -> Stepped:
+    """Both ends, with a transmitter if it is `carried`."""
+    options = AutopilotOptions(family=family, remote_id=carried)  # type: ignore[arg-type]
+    return Stepped(monkeypatch, options, **{"remote_id": WHO, "preflight": REQUIRED, **settings})
+
+
+def listed(ends: Stepped) -> list[HealthItem]:
+    """The list before take-off."""
+    robot = ends.robot
+    return Checklist(ends.vehicle, robot.limits, robot.preflight).examine(ends.vehicle.read())
+
+
+def item(ends: Stepped) -> HealthItem | None:
+    """Remote ID in it."""
+    return next((one for one in listed(ends) if one.name == "remote_id"), None)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_transmitter_is_told_who_operates_what_from_where(
+    family: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it within four seconds, the place each second; the secret end never."""
+    with ends_of(monkeypatch, family) as ends:
+        ends.watch(20.0)
+        told = ends.autopilot.transmitter.newest
+        assert set(told) == {
+            f"OPEN_DRONE_ID_{kind}"
+            for kind in ("BASIC_ID", "OPERATOR_ID", "SELF_ID", "SYSTEM", "SYSTEM_UPDATE")
+        }
+        operator = told["OPEN_DRONE_ID_OPERATOR_ID"]
+        assert operator.operator_id == NUMBER
+        assert operator.operator_id_type == mavlink.MAV_ODID_OPERATOR_ID_TYPE_CAA
+        basic = told["OPEN_DRONE_ID_BASIC_ID"]
+        assert bytes(basic.uas_id).rstrip(b"\0").decode() == WHO["uas_id"]
+        assert basic.id_type == mavlink.MAV_ODID_ID_TYPE_SERIAL_NUMBER
+        assert basic.ua_type == mavlink.MAV_ODID_UA_TYPE_HELICOPTER_OR_MULTIROTOR
+        assert told["OPEN_DRONE_ID_SELF_ID"].description == "farm survey"
+        system = told["OPEN_DRONE_ID_SYSTEM"]
+        assert system.operator_location_type == mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF
+        assert system.operator_latitude == pytest.approx(473977420, abs=20)
+        assert system.operator_longitude == pytest.approx(85455940, abs=20)
+        # The GPS' height above the ellipsoid, 47 m above that above the sea.
+        assert system.operator_altitude_geo == pytest.approx(535.0, abs=1.0)
+        assert system.classification_type == mavlink.MAV_ODID_CLASSIFICATION_TYPE_EU
+        assert system.category_eu == mavlink.MAV_ODID_CATEGORY_EU_OPEN
+        assert system.class_eu == mavlink.MAV_ODID_CLASS_EU_CLASS_1
+        update = told["OPEN_DRONE_ID_SYSTEM_UPDATE"]
+        for field in ("operator_latitude", "operator_longitude", "operator_altitude_geo"):
+            assert getattr(update, field) == getattr(system, field)
+        heard = ends.autopilot.transmitter.heard
+        assert not any(b"xyz" in bytes(message.get_msgbuf()) for _, message in heard)
+        assert {(one.target_system, one.target_component) for _, one in heard} == {(1, 0)}
+        # What belongs to the place comes before the place alone.
+        assert heard[0][1].get_type() == "OPEN_DRONE_ID_SYSTEM"
+        placed = [now for now, one in heard if "SYSTEM" in one.get_type()]
+        gaps = [after - before for before, after in pairwise(placed)]
+        assert len(placed) == pytest.approx(20, abs=1)
+        assert max(gaps) < 1.1
+
+
+def test_a_time_is_counted_from_2019(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the standard has it; a clock that was never set tells none."""
+    for clock, stamp in ((1546300800.0 + 77.9, 77), (5.0, 0)):
+        monkeypatch.setattr(
+            "aerodaas.drivers.mavlink.microservices.remote_id.time.time", lambda at=clock: at
+        )
+        system, *_ = RemoteId(RemoteIdConfig(), observes=False).turn(0.0, lambda: None, 1)
+        assert system.timestamp == stamp
+
+
+def test_a_fixed_place_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever the drone is."""
+    place = {"latitude": -35.5, "longitude": 149.25, "altitude": 600.0}
+    with ends_of(monkeypatch, remote_id={**WHO, "operator": place}) as ends:
+        ends.watch(3.0)
+        system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
+        assert system.operator_location_type == mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_FIXED
+        assert (system.operator_latitude, system.operator_longitude) == (-355000000, 1492500000)
+        assert system.operator_altitude_geo == 600.0
+
+
+def test_what_is_not_known_is_told_as_unknown() -> None:
+    """No place, no class, no category: by the protocol's own words for it, and nothing else."""
+    told = RemoteId(RemoteIdConfig(), observes=False)
+    for second in range(5):
+        (system,) = told.turn(float(second), lambda: None, 3)
+        assert (system.operator_latitude, system.operator_longitude) == (0, 0)
+        assert system.operator_altitude_geo == -1000.0
+        assert (system.classification_type, system.category_eu, system.class_eu) == (0, 0, 0)
+        assert system.target_system == 3
+        assert told.turn(second + 0.999, lambda: None, 3) == []
+
+
+def test_the_place_of_the_take_off_stays_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the drone flies away from it."""
+    with ends_of(monkeypatch) as ends:
+        flying = mission_of(ends, Waypoint("far", 40, 0, 3))
+        fly(flying, ends, until=lambda: bool(flying.mission.status.visited))
+        system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
+        assert ends.autopilot.truth.position[0] > 39.0
+        assert system.operator_longitude == pytest.approx(85455940, abs=30)
+
+
+def test_who_only_looks_does_not_say_which_aircraft_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A transmitter may keep the first number for good; the rest lets it be judged."""
+    with ends_of(monkeypatch, observe=True) as ends:
+        ends.watch(8.0)
+        told = ends.autopilot.transmitter.newest
+        assert "OPEN_DRONE_ID_BASIC_ID" not in told
+        assert "OPEN_DRONE_ID_OPERATOR_ID" in told
+        found = item(ends)
+        assert found is not None
+        assert found.value == "missing basic_id message"
+
+
+def test_nothing_is_said_where_nothing_is_configured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a transmitter that is heard is judged all the same."""
+    with ends_of(monkeypatch, remote_id=None) as ends:
+        ends.watch(5.0)
+        assert ends.autopilot.transmitter.heard == []
+        found = item(ends)
+        assert found is not None
+        assert (found.value, found.verdict) == ("missing basic_id message", Verdict.REFUSED)
+
+
+@pytest.mark.parametrize(
+    ("level", "configured", "carried", "error", "value", "verdict"),
+    [
+        ("require", True, True, "", "ready", Verdict.GOOD),
+        ("require", True, True, "no GPS fix", "no GPS fix", Verdict.REFUSED),
+        ("require", True, False, "", "no transmitter is heard", Verdict.REFUSED),
+        ("require", False, False, "", "not known", Verdict.REFUSED),
+        ("refuse", True, False, "", "no transmitter is heard", Verdict.REFUSED),
+        ("refuse", False, False, "", "not known", Verdict.UNKNOWN),
+        ("warn", True, True, "no GPS fix", "no GPS fix", Verdict.WARNING),
+        ("warn", True, False, "", "no transmitter is heard", Verdict.WARNING),
+        ("ignore", True, True, "no GPS fix", None, None),
+    ],
+)
+def test_the_list_before_take_off_has_the_transmitters_own_words(
+    monkeypatch: pytest.MonkeyPatch,
+    level: str,
+    configured: bool,  # noqa: FBT001
+    carried: bool,  # noqa: FBT001
+    error: str,
+    value: str | None,
+    verdict: Verdict | None,
+) -> None:
+    """By the level of the robot's preflight."""
+    with ends_of(
+        monkeypatch,
+        carried=carried,
+        remote_id=WHO if configured else None,
+        preflight={"remote_id": level},
+    ) as ends:
+        ends.autopilot.transmitter.error = error
+        ends.watch(6.0)
+        found = item(ends)
+        # It is in the list once.
+        assert not any("Remote ID" in one.value for one in listed(ends))
+        if value is None:
+            assert found is None
+            return
+        assert found is not None
+        assert (found.value, found.verdict) == (value, verdict)
+        assert bool(found.remedy) is (verdict in {Verdict.WARNING, Verdict.REFUSED})
+
+
+class _Clock:
+    """The mission's clock: that of both ends."""
+
+    def __init__(self, ends: Stepped) -> None:
+        self._ends = ends
+
+    def now(self) -> int:
+        """Nanoseconds."""
+        return round(self._ends.now * 1e9)
+
+
+def mission_of(ends: Stepped, *stops: Waypoint) -> SetpointLoop:
+    """A mission that has been started."""
+    clock = _Clock(ends)
+    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
+    mission = Mission(
+        ends.robot,
+        InlinePlanner(OrderedScheduler()),
+        takeoff=ends.vehicle.read().odometry.position,
+    )
+    mission.handle(AddNavigation(AeroNavigation(data=list(stops))), clock.now())
+    mission.handle(Start(), clock.now())
+    return SetpointLoop(ends.vehicle, mission)
+
+
+def fly(
+    loop: SetpointLoop,
+    ends: Stepped,
+    timeout: float = 150.0,
+    until: Callable[[], bool] = lambda: False,
+) -> Mission:
+    """Fly until the mission is over, `until` holds, or the time is."""
+    end = ends.now + timeout
+    while not loop.mission.finished and ends.now < end and not until():
+        ends.advance(0.05)
+        loop.turn(round(ends.now * 1e9))
+    return loop.mission
+
+
+STOP = Waypoint("there", 12, 0, 3)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_take_off_is_refused_with_the_transmitters_own_words(
+    family: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the robot requires it; nothing moves."""
+    with ends_of(monkeypatch, family) as ends:
+        ends.autopilot.transmitter.error = "bad LOC accuracy"
+        mission = fly(mission_of(ends, STOP), ends)
+        assert mission.state is S.ABORTED
+        assert "take-off refused: remote_id: bad LOC accuracy" in mission.status.reason
+        assert ends.autopilot.firmware.motions == []
+        assert not ends.autopilot.armed
+
+
+def test_a_transmitter_that_becomes_ready_in_time_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its GPS takes a while."""
+    with ends_of(monkeypatch) as ends:
+        transmitter = ends.autopilot.transmitter
+        transmitter.error = "no GPS fix"
+        loop = mission_of(ends, STOP)
+        fly(loop, ends, 2.0)
+        assert loop.mission.state is S.PREFLIGHT
+        transmitter.error = ""
+        assert fly(loop, ends).state is S.LANDED
+        assert [alert.text for alert in loop.mission.alerts] == []
+
+
+@pytest.mark.parametrize("trouble", ["silent", "unhealthy"])
+@pytest.mark.parametrize("leaving", [False, True])
+def test_a_transmitter_lost_in_flight_is_told_once(
+    trouble: str,
+    leaving: bool,  # noqa: FBT001
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On the way out as on the way home; the flight goes on as it would have."""
+    with ends_of(monkeypatch) as ends:
+        loop = mission_of(ends, STOP)
+        mission = loop.mission
+        fly(loop, ends, until=lambda: mission.state is S.ENROUTE)
+        if leaving:
+            fly(loop, ends, 3.0)
+            mission.handle(ReturnHome("the test says so"), round(ends.now * 1e9))
+        if trouble == "silent":
+            ends.autopilot.transmitter.present = False
+        else:
+            ends.autopilot.transmitter.error = "TX: power lost"
+        fly(loop, ends)
+        assert mission.state is S.LANDED
+        assert list(mission.status.visited) == ([] if leaving else ["there"])
+        (told,) = [alert.text for alert in mission.alerts]
+        if trouble == "silent":
+            assert told.startswith("Remote ID: the transmitter has said nothing for ")
+        else:
+            assert told == "Remote ID: TX: power lost"
+
+
+def test_a_flight_without_the_transmitter_that_is_configured_is_told_of(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By a warning before take-off, where that is all that is asked for, and in flight."""
+    with ends_of(monkeypatch, carried=False, preflight={"remote_id": "warn"}) as ends:
+        mission = fly(mission_of(ends, STOP), ends)
+        assert mission.state is S.LANDED
+        texts = {alert.text for alert in mission.alerts}
+        assert "Remote ID: no transmitter is heard" in texts
+        assert any(text.startswith("remote_id: no transmitter is heard") for text in texts)
+
+
+def arm_status(status: int, error: bytes = b"", component: int = 236) -> Any:  # noqa: ANN401
+    """One word of a transmitter, decoded."""
+    codec = mavlink.MAVLink(None, 1, component)
+    message = mavlink.MAVLink_open_drone_id_arm_status_message(status, error)
+    return codec.decode(bytearray(message.pack(codec)))
+
+
+def listener() -> RemoteId:
+    """One that is configured."""
+    return RemoteId(RemoteIdConfig(), observes=False)
+
+
+def test_three_seconds_are_fresh_and_no_more() -> None:
+    """To the dot."""
+    told = listener()
+    told.take(arm_status(GOOD), 10.0)
+    assert told.objection(13.0) == ""
+    assert told.objection(13.001) == "the transmitter has said nothing for 3 s"
+    told.take(arm_status(GOOD), 14.0)
+    assert told.objection(14.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("status", "error", "said"),
+    [
+        (GOOD, b"", ""),
+        (BAD, b"no GPS", "no GPS"),
+        (BAD, b"", "the transmitter is not ready, and does not say why"),
+        (7, b"", "the transmitter is not ready, and does not say why"),
+        (255, b"x" * 50, "x" * 50),
+        (BAD, b"bad \x1b[31m\xff  red\n", "bad [31m red"),
+    ],
+)
+def test_only_zero_is_ready(status: int, error: bytes, said: str) -> None:
+    """Whatever else it says; what cannot be printed is not shown."""
+    told = listener()
+    told.take(arm_status(status, error), 0.0)
+    objection = told.objection(0.0)
+    assert objection is not None
+    assert objection.replace("\ufffd", "").replace("  ", " ") == said
+
+
+def test_of_two_transmitters_both_must_be_ready() -> None:
+    """The one that is not is told of."""
+    told = listener()
+    told.take(arm_status(GOOD, component=236), 0.0)
+    told.take(arm_status(BAD, b"second", component=237), 0.0)
+    assert told.objection(1.0) == "second"
+    told.take(arm_status(GOOD, component=237), 1.0)
+    assert told.objection(1.0) == ""
+
+
+@given(st.integers(0, 255), st.binary(max_size=50))
+def test_no_status_but_zero_is_good(status: int, error: bytes) -> None:
+    """And every text can be printed on one line."""
+    told = listener()
+    told.take(arm_status(status, error), 0.0)
+    said = told.objection(0.0)
+    assert said is not None
+    assert (said == "") is (status == GOOD)
+    assert said.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "peer", "heard"),
+    [
+        (1, 236, None, True),
+        (1, 237, None, True),
+        (1, 238, None, True),
+        (1, 1, None, True),
+        (1, 235, None, False),
+        (1, 239, None, False),
+        (2, 236, None, False),
+        (1, 236, ("203.0.113.9", 14550), False),
+    ],
+)
+def test_only_the_vehicles_own_transmitter_is_heard(
+    monkeypatch: pytest.MonkeyPatch,
+    system: int,
+    component: int,
+    peer: tuple[str, int] | None,
+    heard: bool,  # noqa: FBT001
+) -> None:
+    """Its autopilot's, or a transmitter's of its system, from its own address."""
+    vehicle = Handmade(monkeypatch, remote_id=WHO)
+    vehicle.connect()
+    codec = mavlink.MAVLink(None, system, component)
+    packet = bytes(mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b"").pack(codec))
+    vehicle.receive_also(packet, peer)
+    vehicle.advance(0.1)
+    told = vehicle.vehicle.health().remote_id
+    assert told == ("" if heard else "no transmitter is heard")
+    vehicle.vehicle.close()
+
+
+@pytest.mark.parametrize("flies", [True, False])
+def test_a_transmitter_does_not_speak_for_the_vehicle(
+    flies: bool,  # noqa: FBT001
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its words hide no silent autopilot, in the air and on the ground."""
+    vehicle = Handmade(monkeypatch, remote_id=WHO)
+    vehicle.connect()
+    if flies:
+        vehicle.fly()
+    vehicle.speaks, vehicle.result = False, None
+    codec = mavlink.MAVLink(None, 1, 236)
+    autopilot = mavlink.MAVLink(None, 1, 1)
+    for _ in range(60):
+        for message, own in (
+            (mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b""), codec),
+            (mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b""), autopilot),
+        ):
+            vehicle.receive_also(bytes(message.pack(own)), None)
+        vehicle.turn()
+    assert vehicle.turn() is VehicleMode.LOST
+    assert "no word from the vehicle for 3 s" in vehicle.vehicle.preflight()
+    assert vehicle.vehicle.health().remote_id == ""
+    assert math.isclose(vehicle.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
+    vehicle.vehicle.close()
