@@ -184,6 +184,7 @@ class EnvironmentConfig(Strict):
             "robot": [robot.id for robot in self.robots],
             "environment sensor": [sensor.id for sensor in self.sensors],
             **{f"sensor of {one.id}": [s.id for s in one.sensors] for one in self.robots},
+            **{f"actuator of {one.id}": [a.id for a in one.actuators] for one in self.robots},
             "compute resource": [] if self.compute == "auto" else [c.id for c in self.compute],
         }
         for kind, ids in groups.items():

@@ -128,6 +128,8 @@ class VehicleState:
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
     gimbal: GimbalAttitude | None = None
     """Where its gimbal looks; None without one, and where it does not say."""
+    actuators: dict[str, str] = field(default_factory=dict)
+    """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
 
 
 @runtime_checkable

@@ -44,6 +44,8 @@ class AutopilotOptions:
     """Whether it carries a gimbal, and is its manager."""
     camera: bool = False
     """Whether it carries a camera."""
+    actuators: bool = False
+    """Whether it carries a gripper, servos, relays and a parachute."""
     uplink: Impairment = field(default_factory=Impairment)
     """On the way to the vehicle."""
     downlink: Impairment = field(default_factory=Impairment)

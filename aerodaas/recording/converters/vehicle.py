@@ -111,6 +111,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         state["gps"] = item.gps
     if item.gimbal is not None:
         state["gimbal"] = item.gimbal
+    if item.actuators:
+        state["actuators"] = item.actuators
     if item.truth is not None:
         state["truth"] = odometry_json(item.truth)
     yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)
