@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
@@ -20,6 +20,7 @@ __all__ = [
     "ServoConfig",
     "actuator_objection",
     "parachute_objection",
+    "permitted",
 ]
 
 _Pulse = Annotated[int, Field(ge=500, le=2500)]
@@ -86,6 +87,21 @@ ActuatorConfig: TypeAlias = Annotated[
 
 ACTUATOR_TYPES = frozenset({"gripper", "relay", "servo", "parachute"})
 """All types, for drivers that can move each."""
+
+
+def permitted(
+    robot: str, actuators: Sequence[ActuatorConfig], names: Collection[str]
+) -> list[ActuatorConfig]:
+    """The actuators of `robot` that somebody else may move: by `robot/actuator`, and no parachute.
+
+    >>> permitted("drone", [RelayConfig(id="pump", type="relay")], ["drone/pump"])[0].id
+    'pump'
+    """
+    return [
+        one
+        for one in actuators
+        if f"{robot}/{one.id}" in names and not isinstance(one, ParachuteConfig)
+    ]
 
 
 def actuator_objection(
