@@ -13,6 +13,12 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, SecretStr, field_serializer, model_validator
 from typing_extensions import Self
 
+from aerodaas.config.actuators import (
+    GripperConfig,
+    ParachuteConfig,
+    RelayConfig,
+    ServoConfig,
+)
 from aerodaas.config.checked import checked
 from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
 from aerodaas.config.home import HomeConfig
@@ -38,16 +44,20 @@ __all__ = [
     "EnvironmentConfig",
     "GeofenceConfig",
     "GimbalConfig",
+    "GripperConfig",
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",
+    "ParachuteConfig",
     "PreflightConfig",
     "RecordingConfig",
+    "RelayConfig",
     "RemoteConfig",
     "RobotConfig",
     "RuntimeEnvConfig",
     "SchedulersConfig",
     "SensorConfig",
+    "ServoConfig",
     "SimulationConfig",
     "TaskConfig",
     "TenantConfig",
