@@ -41,6 +41,7 @@ _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
 _MOST_MOVES = 16
+_Name = Annotated[str, Field(min_length=1, max_length=64)]
 _MOST_HERTZ = 1000.0
 HERE_CONDITION = "$here"
 """Key of a condition that is code at the user's side; its value is the trigger's number."""
@@ -102,7 +103,7 @@ class WaypointEntry(BaseModel):
     gimbal_yaw: _HalfTurn | None = None
     """From the nose, counter-clockwise."""
     photo: bool = False
-    actuate: Annotated[dict[Word, Word], Field(max_length=_MOST_MOVES)] = Field(
+    actuate: Annotated[dict[_Name, _Name], Field(max_length=_MOST_MOVES)] = Field(
         default_factory=dict
     )
     """Positions by actuator, in order."""

@@ -12,7 +12,7 @@ from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.types.errors import ConfigError, GraphError, InvalidWaypointError
 
-CARRIED = [
+CARRIED: list[dict[str, Any]] = [
     {"id": "hook", "type": "gripper"},
     {"id": "hatch", "type": "servo", "channel": 9, "positions": {"open": 1900, "closed": 1100}},
     {"id": "chute", "type": "parachute"},

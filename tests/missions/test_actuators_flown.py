@@ -10,7 +10,7 @@ from flying import FLAT, Flyer, robot
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.recording.reader import Recording
 
-CARRIED = [
+CARRIED: list[dict[str, Any]] = [
     {"id": "hook", "type": "gripper"},
     {"id": "hatch", "type": "servo", "channel": 9, "positions": {"open": 1900, "closed": 1100}},
     {"id": "chute", "type": "parachute", "may_release": True},

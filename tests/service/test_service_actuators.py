@@ -18,7 +18,7 @@ from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.types.errors import ConfigError
 
-CARRIED = {
+CARRIED: dict[str, Any] = {
     "actuators": [
         {"id": "hook", "type": "gripper"},
         {"id": "pump", "type": "relay"},
