@@ -44,7 +44,7 @@ def test_a_wrong_name_is_refused_with_the_applications_line(
     with pytest.raises(GraphError) as refused:
         env.get_robot_by_id("drone").navigate(navigation)
     assert f"drone: waypoint 'drop': {said}" in str(refused.value)
-    assert "test_actuators.py:" in str(refused.value)
+    assert "test_actuators_checked.py:" in str(refused.value)
     env.get_robot_by_id("drone").navigate(AeroNavigation(data=[Waypoint("a", 0, 5, 2)]))
     env.trajectory_scheduler().add_navigation(navigation)
     with pytest.raises(GraphError, match="drone: waypoint 'drop': "):
@@ -56,7 +56,7 @@ def test_a_wrong_command_is_refused_with_the_applications_line(tmp_path: Path) -
     drone = environment(tmp_path).get_robot_by_id("drone")
     with pytest.raises(GraphError, match="did you mean hook"):
         drone.actuate("hok", "grab")
-    with pytest.raises(GraphError, match=r"may not be fired[\s\S]*test_actuators.py"):
+    with pytest.raises(GraphError, match=r"may not be fired[\s\S]*test_actuators_checked.py"):
         drone.release_parachute("chute")
 
 
