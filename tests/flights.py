@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import LimitsConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream, Start
@@ -257,11 +258,15 @@ def flight(
     start: bool = True,
     clearance: GroundClearance | None = None,
     sea_level: float | None = None,
+    actuators: Sequence[ActuatorConfig] = (),
 ) -> Flight:
     """Prepare a flight that has been told `commands` and then to start."""
     vehicle = vehicle or KinematicVehicle()
     robot = RobotConfig(
-        id="drone", limits=limits or LimitsConfig(), mission=options or MissionConfig()
+        id="drone",
+        limits=limits or LimitsConfig(),
+        mission=options or MissionConfig(),
+        actuators=list(actuators),
     )
     planner = planner or InlinePlanner(scheduler or OrderedScheduler())
     takeoff = vehicle.position.copy()

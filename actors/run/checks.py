@@ -64,6 +64,7 @@ def check_environment(config: EnvironmentConfig, place: str) -> None:
         require_plugin("drivers", robot.driver)
         if is_built_in("drivers", robot.driver):
             _check_settings("drivers", robot.driver, robot.settings, f"{place}: robot {robot.id}")
+            _check_actuators(robot, f"{place}: robot {robot.id}")
     for sensor in (one for one in config.all_sensors() if one.type == "camera"):
         driver = config.camera_driver(sensor)
         require_plugin("cameras", driver)
@@ -87,6 +88,7 @@ def check_plugins(
     for robot in robots:
         _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
         _check_settings("drivers", robot.driver, robot.settings, f"robot {robot.id}")
+        _check_actuators(robot, f"robot {robot.id}")
         if is_built_in("drivers", robot.driver):
             load_vehicle(robot, config)
     for sensor in cameras:
@@ -175,6 +177,20 @@ def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place
     model = settings_model(kind, name)
     if model is not None:
         checked(model, settings, f"{place}: settings")
+
+
+def _check_actuators(robot: RobotConfig, place: str) -> None:
+    """Raise ConfigError for actuators that the robot's driver cannot move."""
+    if not robot.actuators:
+        return
+    known: Collection[str] = getattr(load_plugin("drivers", robot.driver), "actuator_types", ())
+    for number, one in enumerate(robot.actuators):
+        if one.type not in known:
+            movable = f"it moves {', '.join(sorted(known))}" if known else "it moves none"
+            raise ConfigError(
+                f"{place}: actuators.{number} ({one.id}): the driver {robot.driver!r} cannot move "
+                f"a {one.type}: {movable}"
+            )
 
 
 def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli import cluster, lab, lease, models, plan, provider, remote
+from aerodaas.cli import cluster, lab, lease, models, plan, provider, remote, sim
 from aerodaas.cli.application import build_application, run_application, speed_option
 from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
@@ -57,6 +57,7 @@ app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
 app.add_typer(models.app, name="models")
 app.add_typer(plan.app, name="plan")
+app.add_typer(sim.app, name="sim")
 app.add_typer(cluster.app, name="cluster")
 app.add_typer(lease.app, name="lease", rich_help_panel=_PROVIDER)
 

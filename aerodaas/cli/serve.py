@@ -12,6 +12,7 @@ from aerodaas.cli.application import speed_option
 from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
+    from aerodaas.config.model import EnvironmentConfig
     from aerodaas.service.access import OidcSettings
 
 __all__ = ["serve"]
@@ -62,6 +63,13 @@ def serve(
         list[str] | None,
         typer.Option(metavar="TENANT=W", help="A tenant's weight on the edge. Default: 1."),
     ] = None,
+    actuator: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TENANT=ROBOT/NAME",
+            help="An actuator that a tenant's missions may move. Default: none; never a parachute.",
+        ),
+    ] = None,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
     oidc_issuer: Annotated[
         str | None,
@@ -104,9 +112,10 @@ def serve(
     from aerodaas.service.settings import ServiceSettings  # noqa: PLC0415
 
     factor, lockstep = speed_option(speed)
+    config = located(EnvironmentConfig.load(fleet), fleet.absolute().parent)
     settings = ServiceSettings(
         fleet=fleet.absolute(),
-        config=located(EnvironmentConfig.load(fleet), fleet.absolute().parent),
+        config=config,
         state=state.absolute(),
         rehearse=rehearse,
         monitor=monitor,
@@ -115,6 +124,7 @@ def serve(
         most_attached=most_attached,
         edge_slots=edge_slots,
         weights=dict(map(_weight, weight or ())),
+        actuators=_actuators(actuator or (), config),
         address=address,
         oidc=_oidc(
             oidc_issuer,
@@ -145,6 +155,28 @@ def _weight(text: str) -> tuple[str, float]:
     if not tenant or not 0.0 < found < float("inf"):
         raise ConfigError(f"--weight is TENANT=W with a positive number, not {text!r}")
     return tenant, found
+
+
+def _actuators(texts: Iterable[str], config: EnvironmentConfig) -> dict[str, frozenset[str]]:
+    """Actuators by tenant, of `TENANT=ROBOT/NAME`; raises ConfigError."""
+    from aerodaas.config.checked import near  # noqa: PLC0415 - slow to load
+
+    movable = {
+        f"{robot.id}/{one.id}"
+        for robot in config.robots
+        for one in robot.actuators
+        if one.type != "parachute"
+    }
+    found: dict[str, frozenset[str]] = {}
+    for text in texts:
+        tenant, _, name = text.partition("=")
+        if not tenant or name not in movable:
+            raise ConfigError(
+                f"--actuator is TENANT=ROBOT/NAME, an actuator of the fleet and no parachute, "
+                f"not {text!r}{near(name, movable)}"
+            )
+        found[tenant] = found.get(tenant, frozenset()) | {name}
+    return found
 
 
 def _oidc(

@@ -13,6 +13,12 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, SecretStr, field_serializer, model_validator
 from typing_extensions import Self
 
+from aerodaas.config.actuators import (
+    GripperConfig,
+    ParachuteConfig,
+    RelayConfig,
+    ServoConfig,
+)
 from aerodaas.config.checked import checked
 from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
 from aerodaas.config.home import HomeConfig
@@ -40,18 +46,22 @@ __all__ = [
     "EnvironmentConfig",
     "GeofenceConfig",
     "GimbalConfig",
+    "GripperConfig",
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",
     "OperatorPlaceConfig",
+    "ParachuteConfig",
     "PreflightConfig",
     "RecordingConfig",
+    "RelayConfig",
     "RemoteConfig",
     "RemoteIdConfig",
     "RobotConfig",
     "RuntimeEnvConfig",
     "SchedulersConfig",
     "SensorConfig",
+    "ServoConfig",
     "SimulationConfig",
     "TaskConfig",
     "TenantConfig",
@@ -196,6 +206,7 @@ class EnvironmentConfig(Strict):
             "robot": [robot.id for robot in self.robots],
             "environment sensor": [sensor.id for sensor in self.sensors],
             **{f"sensor of {one.id}": [s.id for s in one.sensors] for one in self.robots},
+            **{f"actuator of {one.id}": [a.id for a in one.actuators] for one in self.robots},
             "compute resource": [] if self.compute == "auto" else [c.id for c in self.compute],
         }
         for kind, ids in groups.items():

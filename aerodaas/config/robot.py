@@ -7,6 +7,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
 from typing_extensions import Self
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.secrets import SecretUrl
@@ -128,6 +129,11 @@ class MissionConfig(Strict):
     """A waypoint that comes no nearer for so long is given up."""
     photo_timeout: Positive = 10.0
     """Seconds that gimbal and camera get at a waypoint; then the drone flies on without them."""
+    actuator_timeout: Positive = 15.0
+    """Seconds that each actuator gets at a waypoint; then it has failed."""
+    on_actuator_failure: Literal["continue", "pause", "return"] = "continue"
+    """What follows where an actuator fails at a waypoint: the next waypoint, without the other
+    actuators of this one; a pause, until somebody resumes the mission; or the way home."""
 
 
 class SensorConfig(Strict):
@@ -205,6 +211,8 @@ class RobotConfig(Strict):
     settings: Settings = Field(default_factory=dict)
     """Settings of the driver, such as `url` for MAVLink."""
     sensors: list[SensorConfig] = Field(default_factory=list)
+    actuators: list[ActuatorConfig] = Field(default_factory=list)
+    """What it carries to act with."""
     limits: LimitsConfig = LimitsConfig()
     preflight: PreflightConfig = PreflightConfig()
     mission: MissionConfig = MissionConfig()

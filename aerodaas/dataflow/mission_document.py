@@ -40,6 +40,8 @@ _HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
+_MOST_MOVES = 16
+_Name = Annotated[str, Field(min_length=1, max_length=64)]
 _MOST_HERTZ = 1000.0
 HERE_CONDITION = "$here"
 """Key of a condition that is code at the user's side; its value is the trigger's number."""
@@ -101,6 +103,10 @@ class WaypointEntry(BaseModel):
     gimbal_yaw: _HalfTurn | None = None
     """From the nose, counter-clockwise."""
     photo: bool = False
+    actuate: Annotated[dict[_Name, _Name], Field(max_length=_MOST_MOVES)] = Field(
+        default_factory=dict
+    )
+    """Positions by actuator, in order."""
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:
@@ -109,11 +115,12 @@ class WaypointEntry(BaseModel):
             {
                 one.name: getattr(waypoint, one.name)
                 for one in dataclasses.fields(waypoint)
-                if one.name not in {"waypoint_type", "above"}
+                if one.name not in {"waypoint_type", "above", "actuate"}
             }
             | {
                 "waypoint_type": WaypointType(waypoint.waypoint_type).value,
                 "above": HeightReference(waypoint.above).value if waypoint.above else None,
+                "actuate": waypoint.moves,
             }
         )
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.dataflow.containers import AeroListData
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.types.errors import ConfigError, InvalidWaypointError
@@ -65,6 +66,7 @@ class AeroNavigation(AeroListData[NavigationItem]):
         *,
         home_altitude: float | None = None,
         ground: Callable[[float, float], float] | None = None,
+        actuators: Sequence[ActuatorConfig] = (),
     ) -> AeroNavigation:
         """Read the waypoints of a ground station's plan, in order.
 
@@ -79,18 +81,25 @@ class AeroNavigation(AeroListData[NavigationItem]):
             ground: Height of the ground above the sea at a latitude and longitude, for items
                 whose altitude is above ground; None makes waypoints `above="ground"`, by the
                 environment's terrain.
+            actuators: Those of the robot, `drone.config.actuators`: items that set a servo, relay
+                or gripper of theirs become `actuate` of the waypoint before.
 
         Raises:
             ConfigError: If the file is no plan, or an item cannot be flown.
         """
         from aerodaas.dataflow.plans.reading import flown_plan, warn_of  # noqa: PLC0415 - slow to load
 
-        waypoints, notices = flown_plan(path, home_altitude, ground)
+        waypoints, notices = flown_plan(path, home_altitude, ground, actuators)
         warn_of(path, notices, stacklevel=2)
         return cls(NavigationType.DISTANCE_DRIVEN, waypoints)
 
     def to_plan(
-        self, path: str | Path, home: GeodeticOrigin, *, home_altitude: float | None = None
+        self,
+        path: str | Path,
+        home: GeodeticOrigin,
+        *,
+        home_altitude: float | None = None,
+        actuators: Sequence[ActuatorConfig] = (),
     ) -> None:
         """Write the waypoints as a new `.plan` or `.waypoints` file, for a ground station.
 
@@ -101,18 +110,19 @@ class AeroNavigation(AeroListData[NavigationItem]):
             path: The file, with the format as its suffix.
             home: The environment's home.
             home_altitude: Its metres above the sea, where they are known; no item needs them.
+            actuators: Those of the robot, by whose instances and channels `actuate` is written.
 
         Raises:
-            ConfigError: If there is a waypoint relative to a take-off that is not known yet, a
-                velocity command or a stream; the suffix is another; or the file exists or cannot
-                be written.
+            ConfigError: If there is a waypoint relative to a take-off that is not known yet, or
+                one that moves another actuator; a velocity command or a stream; the suffix is
+                another; or the file exists or cannot be written.
         """
         from aerodaas.dataflow.plans.reading import warn_of  # noqa: PLC0415 - slow to load
         from aerodaas.dataflow.plans.writing import planned, write_plan  # noqa: PLC0415
 
         if self.stream is not None or self.commands:
             raise ConfigError("a plan holds waypoints alone, no streams and velocity commands")
-        plan, notices = planned(self.waypoints, home, home_altitude)
+        plan, notices = planned(self.waypoints, home, home_altitude, actuators)
         warn_of(path, [*notices, *write_plan(path, plan)], stacklevel=2)
 
     @property

@@ -6,13 +6,16 @@ Its settings in the environment file are those of `aerodaas.simulation.airframe.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
 from aerodaas.cameras.settings import camera_settings
+from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite
+from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
@@ -38,7 +41,7 @@ _EXACT = SensorNoise(0.0, "")
 
 
 class SimulatedVehicle:
-    """A quadrotor in the embedded simulator: a `SteppedVehicle` and a `PayloadVehicle`.
+    """A quadrotor in the embedded simulator: `SteppedVehicle`, `PayloadVehicle`, `ActuatedVehicle`.
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.
@@ -46,6 +49,8 @@ class SimulatedVehicle:
     """
 
     settings_model = Airframe
+    actuator_types: ClassVar[frozenset[str]] = ACTUATOR_TYPES
+    """What it can carry."""
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Make the drone of `robot`, standing at its start."""
@@ -76,6 +81,7 @@ class SimulatedVehicle:
         self._now = 0
         self._steps = 0
         self._connected = False
+        self._actuators = SimulatedActuators(robot.actuators, self._open_parachute)
         self._camera: SimulatedPhotoCamera | None = None
         self._gimbal: SimulatedGimbal | None = None
         for sensor in robot.sensors:
@@ -95,6 +101,16 @@ class SimulatedVehicle:
     def photo_camera(self) -> SimulatedPhotoCamera | None:
         """Its first camera; None without one."""
         return self._camera
+
+    @property
+    def actuators(self) -> SimulatedActuators:
+        """What the environment file names."""
+        return self._actuators
+
+    def _open_parachute(self) -> None:
+        """Come down where it is, whatever anybody asks."""
+        if self._autopilot.flying:
+            self._autopilot.land(VehicleMode.FAILSAFE)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -129,6 +145,7 @@ class SimulatedVehicle:
         for _ in range(stamp // STEP_NS - self._steps):
             step()
         self._steps = stamp // STEP_NS
+        self._actuators.advance_to(stamp)
         if self._gimbal is not None:
             self._gimbal.advance_to(stamp)
         if self._camera is not None:
@@ -152,6 +169,7 @@ class SimulatedVehicle:
             tuple(self._faults()),
             ended=self._autopilot.ended,
             gimbal=None if self._gimbal is None else self._gimbal.attitude,
+            actuators=dict(self._actuators.positions),
         )
 
     def _faults(self) -> list[str]:

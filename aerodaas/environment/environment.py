@@ -15,6 +15,7 @@ from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
 from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
+from aerodaas.environment.actuators import require_actuators
 from aerodaas.environment.mission_run import MissionRun
 from aerodaas.environment.offering import Unflown, offer
 from aerodaas.environment.robot import Robot
@@ -369,6 +370,7 @@ class Environment(PaperNames, IEnvironment):
         """
         graph = self.graph
         self._require_granted(edge.robot)
+        require_actuators(self.config, edge)
         self._require_flying(edge.robot)
         graph.navigation.append(edge)
         if graph.on_growth is None:
@@ -494,6 +496,7 @@ class Environment(PaperNames, IEnvironment):
         if robots:
             for one in entries:
                 self._require_granted(_addressee(one, robots), one.line)
+                require_actuators(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
 

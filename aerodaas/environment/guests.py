@@ -22,6 +22,7 @@ from aerodaas.analytics.guests.document import (
     GuestNode,
     read_document,
 )
+from aerodaas.analytics.guests.payload import require_no_moves
 from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.analytics.item_json import decoded
 from aerodaas.config.checked import near
@@ -215,7 +216,7 @@ class _Admission:
                 raise GraphError(f"{one.robot} would fly by {stream}, which is not its own")
         if one.stream is not None and not self._own[one.stream].navigation:
             raise GraphError(f"{one.robot} cannot navigate by {one.stream}")
-        _waypoints(one)
+        require_no_moves(_waypoints(one), self._guest)
         return one
 
     def _add(self, node: GuestNode) -> None:

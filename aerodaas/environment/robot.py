@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from aerodaas.config.actuators import actuator_objection, parachute_objection
 from aerodaas.config.model import RobotConfig
 from aerodaas.config.options import Speed
 from aerodaas.dataflow.graph import NavigationEdge, refusal
@@ -13,7 +14,7 @@ from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.loading import load_vehicle
-from aerodaas.mission.commands import End, Pause, Resume
+from aerodaas.mission.commands import Actuate, End, Pause, ReleaseParachute, Resume
 from aerodaas.types.errors import GraphError, UnknownIdError
 
 if TYPE_CHECKING:
@@ -105,6 +106,28 @@ class Robot(PaperNames, IRobot):
     def resume_mission(self) -> None:
         """Resume the ongoing mission."""
         self._environment.command(self.robot_id, Resume())
+
+    def actuate(self, actuator: str, position: str) -> None:
+        """Have an actuator of the environment file take a position now, wherever the drone is.
+
+        It returns once the mission has taken the command; a failure is an alert of the kind
+        `actuator`. Raises GraphError for an unknown actuator or position, and MissionError if the
+        robot does not fly or refuses.
+        """
+        wanted = {actuator: position}
+        if text := actuator_objection(self.config.actuators, wanted, by_waypoint=False):
+            raise refusal(f"{self.robot_id}: {text}")
+        self._environment.command(self.robot_id, Actuate(actuator, position))
+
+    def release_parachute(self, parachute: str) -> None:
+        """Fire a parachute: the mission is over, and the drone comes down where it is.
+
+        The environment file has to permit it by the parachute's `may_release`. Raises GraphError
+        if it does not, and MissionError if the robot is not in the air or flies at a provider.
+        """
+        if text := parachute_objection(self.config.actuators, parachute):
+            raise refusal(f"{self.robot_id}: {text}")
+        self._environment.command(self.robot_id, ReleaseParachute(parachute))
 
     def wait(self) -> None:
         """Return when the mission has ended; raises the error that it ended with."""

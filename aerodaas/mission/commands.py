@@ -13,6 +13,7 @@ from aerodaas.types.waypoints import SchedulingType, VelocityCommand
 
 __all__ = [
     "TRIGGERED",
+    "Actuate",
     "AddNavigation",
     "Answer",
     "ClearNavigation",
@@ -23,6 +24,7 @@ __all__ = [
     "Pause",
     "RearrangeNavigation",
     "ReleaseControls",
+    "ReleaseParachute",
     "Reply",
     "Request",
     "Resume",
@@ -149,6 +151,25 @@ class ReleaseControls:
 
 
 @dataclass(frozen=True, slots=True)
+class Actuate:
+    """Have an actuator take a position now, wherever the drone is."""
+
+    actuator: str
+    position: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseParachute:
+    """Fire a parachute: the flight is over, and the drone comes down where it is.
+
+    It lands until the vehicle has answered. No trigger, document, wire or recording has this
+    command: it is the application's own, where the environment file permits it.
+    """
+
+    parachute: str
+
+
+@dataclass(frozen=True, slots=True)
 class ReturnHome:
     """Fly back to the place of take-off and land."""
 
@@ -175,6 +196,8 @@ Command: TypeAlias = (
     | TakeControls
     | Steer
     | ReleaseControls
+    | Actuate
+    | ReleaseParachute
     | ReturnHome
     | End
 )

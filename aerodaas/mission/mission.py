@@ -14,8 +14,10 @@ import numpy as np
 
 from aerodaas.config.model import RobotConfig
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.mission.actuation import Actuation
 from aerodaas.mission.command_handler import DONE, CommandHandler
 from aerodaas.mission.commands import (
+    Actuate,
     AddNavigation,
     Answer,
     ClearNavigation,
@@ -26,6 +28,7 @@ from aerodaas.mission.commands import (
     Pause,
     RearrangeNavigation,
     ReleaseControls,
+    ReleaseParachute,
     Resume,
     ReturnHome,
     Start,
@@ -40,6 +43,7 @@ from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.photographer import Photographer
 from aerodaas.mission.planner import Planner
+from aerodaas.mission.planning import Planning
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
 from aerodaas.mission.safety.failsafe import FailsafeAction
@@ -48,7 +52,6 @@ from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import Motors, MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
-from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.braking import stopping_point
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert
@@ -99,7 +102,8 @@ class Mission:
         `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. `obeyed` is False
         for a recorded vehicle, which lands when it landed in the recording. `clearance` is kept
         above the ground; the local frame's zero lies `sea_level` metres above the sea; `payload` is
-        the `PayloadVehicle` that takes pictures. Raises ConfigError for an invalid geofence.
+        the vehicle that takes pictures and moves actuators. Raises ConfigError for an invalid
+        geofence.
         """
         self.limits = limits = robot.limits
         self.preflight = robot.preflight
@@ -111,6 +115,7 @@ class Mission:
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
         self.photographer = Photographer(payload, self._log, robot.mission.photo_timeout)
+        self.actuation = Actuation(payload, robot, self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -125,7 +130,9 @@ class Mission:
             clearance=clearance,
             command_timeout=limits.command_timeout,
             resume_after=robot.mission.resume_after,
+            objection=self.actuation.objection,
         )
+        self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
@@ -195,6 +202,8 @@ class Mission:
                     return self._command_handler.navigate(command, self._now)
                 case TakeControls() | Steer() | ReleaseControls():
                     return self._control_by_hand(command)
+                case Actuate() | ReleaseParachute():
+                    return self._act(command)
                 case _:
                     return self._control(command)
         except Exception as error:  # noqa: BLE001 - a sender's objects may raise anything
@@ -254,6 +263,17 @@ class Mission:
         objection = self._manual.handle(command, self._now)
         self._paused = self._paused or (takes and not objection)
         return Answer(not objection, objection)
+
+    def _act(self, command: Actuate | ReleaseParachute) -> Answer:
+        if isinstance(command, Actuate):
+            return self.actuation.move(command)
+        if self.state in _ON_GROUND:
+            text = f"a parachute is fired in the air only, and the drone is {self.state.value}"
+            return Answer(accepted=False, text=text)
+        answer = self.actuation.release(command)
+        if answer.accepted and self.state is not MissionState.LANDING:
+            self._to(MissionState.LANDING, f"the parachute {command.parachute} is to open")
+        return answer
 
     def _resume(self) -> Answer:
         if not self._paused:
@@ -320,6 +340,10 @@ class Mission:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
         self.photographer.look(now)
+        self.actuation.look(now)
+        if self.actuation.released and not self.finished:
+            self._to(MissionState.ABORTED, f"the parachute {self.actuation.released} was released")
+            self._log.alert(now, "parachute", self._machine.reason)
         last, self._last = self._last, state
         on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
         if last is None or on_ground or not has_position(last):
@@ -346,13 +370,7 @@ class Mission:
             if leaving:
                 self._to(MissionState.LANDED, reason)
             return True
-        east, north, up = self._motors.place
-        where = f"at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
-        if motors is Motors.LANDED:
-            why = f": {'; '.join(state.faults)}" if state.faults else ""
-            kind, text = "landed", f"landed of its own accord {where}{why}"
-        else:
-            kind, text = "motors_stopped", f"motors stopped in flight {where}"
+        kind, text = self._motors.story(motors, state.faults)
         self._to(MissionState.ABORTED, text)
         self._log.alert(self._now, kind, text)
         return True
@@ -368,7 +386,7 @@ class Mission:
         return lost
 
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
-        self._plan(state)
+        self._planning.plan(state, self._now)
         self._forecast_battery(state)
         reasons = self._supervisor.objections(state)
         waits = self._command_handler.is_fed or self._options.on_complete == "hold"
@@ -406,7 +424,7 @@ class Mission:
             self._to(MissionState.RETURNING, reason)
 
     def _take_off(self, state: VehicleState) -> Action:
-        self._plan(state)
+        self._planning.plan(state, self._now)
         tolerance = max(self.limits.arrival_radius, 0.1 * self.limits.takeoff_height)
         height = state.odometry.height - float(self.home[2])
         if state.mode in _SETTLED and height >= self.limits.takeoff_height - tolerance:
@@ -425,7 +443,7 @@ class Mission:
         if self._assessment.demand is FailsafeAction.HOLD:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
-        self._plan(state)
+        self._planning.plan(state, self._now)
         self._forecast_battery(state)
         served = self._navigator.served(self._now)
         if isinstance(served, QueuedWaypoint):
@@ -446,7 +464,8 @@ class Mission:
         return Fly(velocity_setpoint(velocity, state))
 
     def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
-        if self._awaits_plan(stop):
+        holds = self.state is MissionState.HOLDING
+        if self._planning.awaited(stop, self._machine.since if holds else None, self._now):
             self._to(MissionState.HOLDING, "waiting for a plan")
             return self._hover(state)
         diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
@@ -458,7 +477,11 @@ class Mission:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        if self.photographer.attend(stop, self._now) and phase is LegPhase.DONE:
+        busy = self.photographer.attend(stop, self._now)
+        busy = busy or self.actuation.attend(stop, position, self._now)
+        if failure := self.actuation.take_failure():
+            return self._after_failure(failure, state)
+        if busy and phase is LegPhase.DONE:
             phase = LegPhase.HOVERING
         place = self._route.towards(stop.waypoint.position, position, stop.above_ground)
         if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
@@ -471,20 +494,13 @@ class Mission:
         self._anchor = None
         return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
 
-    def _awaits_plan(self, stop: QueuedWaypoint) -> bool:
-        """Whether to hold for the plan under way rather than set out for `stop`."""
-        if not self._navigator.waits_for_plan or stop.under_way:
-            return False
-        timeout = self._options.plan_timeout
-        if self.state is not MissionState.HOLDING:
-            return True
-        if seconds(self._now - self._machine.since) < timeout:
-            return True
-        text = f"no plan within {timeout:g} s: flying the order given"
-        if self._navigator.fault != text:
-            self._navigator.fault = text
-            self._log.alert(self._now, "scheduler", text)
-        return False
+    def _after_failure(self, failure: str, state: VehicleState) -> Action:
+        """What follows where an actuator has failed, and the flight is not to go on."""
+        if self._options.on_actuator_failure == "pause":
+            self._paused = True
+            return self._stay(state)
+        self._to(MissionState.RETURNING, failure)
+        return self._return(state)
 
     def _finish(self, stop: QueuedWaypoint, phase: LegPhase) -> None:
         if phase is LegPhase.DONE:
@@ -563,29 +579,9 @@ class Mission:
         self._leg = None
         return Land()
 
-    def _plan(self, state: VehicleState) -> None:
-        if not has_position(state):
-            return
-        limits = self.limits
-        situation = PlanningContext(
-            seconds(self._now),
-            state.odometry.position,
-            self.home,
-            state.battery.fraction,
-            limits.cruise_speed,
-            energy=self._meter.model,
-            reserve=limits.battery_land,
-        )
-        fault = self._navigator.fault
-        plan = self._navigator.plan(situation)
-        if plan is None:
-            return
-        for waypoint_id in plan:
-            self._log.give_up(
-                self._now, waypoint_id, f"the scheduler left {waypoint_id} out of its plan"
-            )
-        if self._navigator.fault and self._navigator.fault != fault:
-            self._log.alert(self._now, "scheduler", self._navigator.fault)
+    @staticmethod
+    def _release(_: VehicleState) -> Action:
+        return Wait()
 
     def _forecast_battery(self, state: VehicleState) -> None:
         grounded = self.state is MissionState.PREFLIGHT

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from aerodaas.mission.planner import Plan, Planner, PlanRequest
@@ -47,8 +47,12 @@ class Navigator:
         clearance: GroundClearance | None,
         command_timeout: float,
         resume_after: float,
+        objection: Callable[[Waypoint], str] = lambda _: "",
     ) -> None:
-        """Plan with `planner` inside `fence`; `home` is the place of take-off, ENU metres."""
+        """Plan with `planner` inside `fence`; `home` is the place of take-off, ENU metres.
+
+        `objection` says why the payload cannot do what a waypoint asks; empty if it can.
+        """
         self.queue = WaypointQueue()
         self.command: LiveCommand | None = None
         self.fault = ""
@@ -61,6 +65,7 @@ class Navigator:
         self._datum = datum
         self._clearance = clearance
         self._command_timeout = command_timeout
+        self._payload_objection = objection
         self._resume_after = round(resume_after * NANOSECONDS)
         self._unplanned: set[int] = set()
         self._unanswered: PlanRequest | None = None
@@ -98,6 +103,8 @@ class Navigator:
         known = self.queue.find(waypoint.id)
         if known is not None and (not source or known.source != source):
             return "a waypoint of this id is already queued; use another id"
+        if objection := self._payload_objection(waypoint):
+            return objection
         if objection := self._fence.objection(waypoint.position):
             return objection
         return self._clearance.objection(waypoint.position) if self._clearance else ""

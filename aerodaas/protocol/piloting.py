@@ -11,13 +11,27 @@ from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from aerodaas.dataflow.mission_document import WaypointEntry
-from aerodaas.mission.commands import RearrangeNavigation, ReleaseControls, Steer, TakeControls
+from aerodaas.mission.commands import (
+    Actuate,
+    RearrangeNavigation,
+    ReleaseControls,
+    Steer,
+    TakeControls,
+)
 from aerodaas.mission.survey import MOST_CORNERS
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.schemas import Number, Word
 from aerodaas.types.waypoints import VelocityCommand
 
-__all__ = ["ControlsIn", "ControlsOut", "RearrangeIn", "SteerIn", "SurveyIn", "SurveyOut"]
+__all__ = [
+    "ActuateIn",
+    "ControlsIn",
+    "ControlsOut",
+    "RearrangeIn",
+    "SteerIn",
+    "SurveyIn",
+    "SurveyOut",
+]
 
 _MOST_WAYPOINTS = 1000
 _Id = Annotated[str, Field(min_length=1, max_length=64)]
@@ -91,6 +105,18 @@ class RearrangeIn(RequestModel):
     def command(self) -> RearrangeNavigation:
         """The command."""
         return RearrangeNavigation(tuple(self.order), tuple(self.remove))
+
+
+class ActuateIn(RequestModel):
+    """An actuator of one robot, and the position that it is to take now."""
+
+    robot: Word
+    actuator: Word
+    position: Word
+
+    def command(self) -> Actuate:
+        """The command."""
+        return Actuate(self.actuator, self.position)
 
 
 class SteerIn(RequestModel):

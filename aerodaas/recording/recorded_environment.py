@@ -58,6 +58,12 @@ _SENSOR: dict[str, Rule] = {
         "width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range", "loop"
     ),
 }
+_ACTUATOR: dict[str, Rule] = {
+    "id": _word,
+    # Whether a parachute may be fired is the policy of who flies.
+    **_fields("type", "instance", "channel"),
+    "positions": {_ANY_KEY: _number},
+}
 _LIMITS: dict[str, Rule] = {
     **_fields(
         "cruise_speed",
@@ -90,9 +96,16 @@ _ROBOT: dict[str, Rule] = {
     # The drivers' capabilities, which shape setpoints; no address and no key.
     "settings": dict.fromkeys(("max_speed", "max_climb", "full_speed", "full_climb"), _number),
     "sensors": [_SENSOR],
+    "actuators": [_ACTUATOR],
     "limits": _LIMITS,
     "mission": _fields(
-        "on_complete", "resume_after", "plan_timeout", "stall_timeout", "photo_timeout"
+        "on_complete",
+        "resume_after",
+        "plan_timeout",
+        "stall_timeout",
+        "photo_timeout",
+        "actuator_timeout",
+        "on_actuator_failure",
     ),
 }
 _TASK = _fields(

@@ -65,7 +65,7 @@ def build_service(
     hub = StreamHub(desk.items)
     admission = Admission(access, audit, RateLimiter(_RATE, _BURST))
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
-    fleet = FleetView(settings.config, shown, garage, bookings, desk)
+    fleet = FleetView(settings.config, shown, settings.actuators, garage, bookings, desk)
 
     edge = None
     if settings.edge_slots is not None:

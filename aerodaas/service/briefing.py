@@ -61,11 +61,28 @@ class Briefing:
         if not (robots or attached):
             text = "its navigation is empty: it flies no drone, and is attached to no mission"
             raise RefusedError(_UNPROCESSABLE, text)
+        self._require_actuators(principal.tenant, document)
         if cameras & set(document.sensors):
             require(principal, Role.PILOT, Scope.SENSE)
         if document.analyses:
             require(principal, Role.PILOT, Scope.COMPUTE)
         return robots
+
+    def _require_actuators(self, tenant: str, document: MissionDocument) -> None:
+        """Raise RefusedError for a document that moves what the tenant may not."""
+        may = self._settings.actuators.get(tenant, frozenset())
+        asked = {
+            f"{one.robot}/{name}"
+            for one in document.navigation
+            for waypoint in one.waypoints
+            for name in waypoint.actuate
+        }
+        if refused := sorted(asked - may):
+            raise RefusedError(
+                403,
+                f"{tenant} may not move {', '.join(refused)}: its provider says who moves "
+                "actuators (`aerodaas serve --actuator`)",
+            )
 
     def rehearsal(self, mission: Mission) -> FlightOrder:
         """The order of a mission's rehearsal, which begins with the drones' present charge."""
@@ -113,6 +130,7 @@ class Briefing:
             minutes=minutes if granted is None else granted.minutes,
             limits=TenantLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),
             area=None if granted is None or granted.area is None else list(granted.area),
+            actuators=sorted(self._settings.actuators.get(mission.tenant, ())),
             silence=mission.request["silence"],
             silence_seconds=mission.request["silence_seconds"],
             speed=self._settings.speed,

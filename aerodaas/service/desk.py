@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
-from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
@@ -198,10 +198,15 @@ class MissionDesk:
         self,
         principal: Principal,
         mission: str,
-        what: NavigationIn | RearrangeIn | ControlsIn,
+        what: NavigationIn | RearrangeIn | ActuateIn | ControlsIn,
     ) -> AnswerOut:
         """Change what a flying mission does; raises MissionError if it is lost."""
-        words = {NavigationIn: "fly", RearrangeIn: "rearrange", ControlsIn: "controls"}
+        words = {
+            NavigationIn: "fly",
+            RearrangeIn: "rearrange",
+            ActuateIn: "actuate",
+            ControlsIn: "controls",
+        }
         content = what.model_dump(mode="json")
         return self._ask(principal, mission, do=words[type(what)], content=content)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from aerodaas.config.actuators import permitted
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.protocol.schemas import FleetOut, RobotOut
 from aerodaas.service.access import Principal, sees
@@ -22,11 +24,13 @@ class FleetView:
         self,
         config: EnvironmentConfig,
         catalogue: dict[str, Any],
+        actuators: Mapping[str, frozenset[str]],
         garage: Garage,
         bookings: Bookings,
         desk: MissionDesk,
     ) -> None:
-        """Show `catalogue`, and the drones of `config`."""
+        """Show `catalogue`, and the drones of `config`; to a tenant its `actuators`."""
+        self._actuators = actuators
         self._config = config
         self._catalogue = catalogue
         self._garage = garage
@@ -37,7 +41,21 @@ class FleetView:
         """The fleet as this account may see it."""
         states = self._garage.states
         robots = [self._robot(robot, states[robot.id], principal) for robot in self._config.robots]
-        return FleetOut(name=self._config.name, robots=robots, environment=self._catalogue)
+        return FleetOut(
+            name=self._config.name, robots=robots, environment=self._environment(principal)
+        )
+
+    def _environment(self, principal: Principal) -> dict[str, Any]:
+        """The catalogue, with the actuators that this account's tenant may move."""
+        names = self._actuators.get(principal.tenant, frozenset())
+        moved = {
+            robot.id: [
+                one.model_dump(mode="json") for one in permitted(robot.id, robot.actuators, names)
+            ]
+            for robot in self._config.robots
+        }
+        robots = [{**one, "actuators": moved[one["id"]]} for one in self._catalogue["robots"]]
+        return {**self._catalogue, "robots": robots}
 
     def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
         lease = self._bookings.holder(robot.id)

@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 import shapely
 
+from aerodaas.config.actuators import permitted
 from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, RobotConfig, validated
 from aerodaas.mission.safety.geofence import Geofence
@@ -45,6 +46,7 @@ def limited(
     *,
     tenant: TenantLimits,
     area: Outline | None,
+    actuators: Collection[str] = (),
 ) -> EnvironmentConfig:
     """The environment of one flight.
 
@@ -53,6 +55,8 @@ def limited(
         robots: Robots of the lease, by id; all others are left out.
         tenant: Limits of the tenant.
         area: Area of the lease; None for the provider's fence alone.
+        actuators: Those that the tenant may move, as `robot/actuator`; all others are left out, and
+            so is every parachute.
 
     Raises:
         ConfigError: For an unknown robot, an area that crosses itself, a fence that is left
@@ -66,7 +70,11 @@ def limited(
     wanted = None if area is None else _polygon(area)
     kept = [_limited(robot, tenant, wanted) for robot in config.robots if robot.id in robots]
     content = config.model_dump(by_alias=True)
-    content["robots"] = [robot.model_dump() for robot in kept]
+    content["robots"] = [
+        robot.model_dump()
+        | {"actuators": [a.model_dump() for a in permitted(robot.id, robot.actuators, actuators)]}
+        for robot in kept
+    ]
     return validated(content, "the limits of this flight")
 
 

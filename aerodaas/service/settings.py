@@ -44,6 +44,8 @@ class ServiceSettings:
     together, by their tenants' weights; None: each flight runs its own as it likes."""
     weights: Mapping[str, float] = field(default_factory=dict)
     """Weight of a tenant on the edge; 1 for all others."""
+    actuators: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Actuators that a tenant may move, as `robot/actuator`; none for all others."""
     most_flights: int = 16
     """Most flights at once."""
 

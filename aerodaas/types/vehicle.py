@@ -131,6 +131,8 @@ class VehicleState:
     """Where its gimbal looks; None without one, and where it does not say."""
     traffic: tuple[Traffic, ...] = ()
     """Other aircraft that it hears of, the nearest first."""
+    actuators: dict[str, str] = field(default_factory=dict)
+    """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
 
 
 @runtime_checkable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
@@ -108,6 +108,23 @@ def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
         raise InvalidWaypointError(f"{owner}: priority must be a whole number, not {priority!r}")
 
 
+def _moves(owner: str, asked: object) -> tuple[tuple[str, str], ...]:
+    """Pairs of actuator and position."""
+    pairs = tuple(asked.items()) if isinstance(asked, Mapping) else asked
+    if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
+        message = f'{owner}: actuate is positions by actuator, {{"hook": "release"}}, not {asked!r}'
+        raise InvalidWaypointError(message)
+    moves = tuple((str(name), str(position)) for name, position in pairs)
+    if len(dict(moves)) < len(moves):
+        raise InvalidWaypointError(f"{owner}: actuate names an actuator twice: give two waypoints")
+    return moves
+
+
+def _is_pair(value: object) -> bool:
+    texts = value if isinstance(value, tuple | list) else ()
+    return [type(one) for one in texts] == [str, str]
+
+
 @shared_pickle
 @dataclass(frozen=True, slots=True)
 class Waypoint:
@@ -145,6 +162,9 @@ class Waypoint:
     `gimbal_pitch` is given."""
     photo: bool = False
     """Whether a picture is taken there, once the gimbal looks where it is to."""
+    actuate: dict[str, str] | tuple[tuple[str, str], ...] = ()
+    """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
+    other, after the picture; kept as a tuple of pairs."""
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -162,6 +182,8 @@ class Waypoint:
             message = f"{owner}: speed must be positive, not {self.speed}"
             raise InvalidWaypointError(message)
         self._check_camera(owner)
+        if self.actuate != ():
+            object.__setattr__(self, "actuate", _moves(owner, self.actuate))
         north_pole, date_line = 90.0, 180.0
         if self.waypoint_type in _ON_THE_GLOBE and (
             abs(self.x) > north_pole or abs(self.y) > date_line
@@ -255,6 +277,11 @@ class Waypoint:
         if self.gimbal_pitch is None and self.gimbal_yaw is None:
             return None
         return GimbalTarget(self.gimbal_pitch or 0.0, self.gimbal_yaw or 0.0)
+
+    @property
+    def moves(self) -> dict[str, str]:
+        """Positions by actuator that are taken there, in order; empty for none."""
+        return dict(self.actuate)
 
     @property
     def position(self) -> Vector:

@@ -231,6 +231,9 @@ export interface NavigationIn {
  */
 export interface WaypointEntry {
   above?: ("home" | "sea" | "ground") | null;
+  actuate?: {
+    [k: string]: string;
+  };
   deadline?: number | null;
   gimbal_pitch?: number | null;
   gimbal_yaw?: number | null;

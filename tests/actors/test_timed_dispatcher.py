@@ -284,9 +284,9 @@ def test_what_cannot_be_simulated_is_refused_before_the_flight(
 )
 def test_a_cloud_that_takes_too_long_or_cannot_do_it_gives_no_result(
     cloud_ms: int,
-    offloadable: bool,
+    offloadable: bool,  # noqa: FBT001
     ends_ms: int,
-    failure: TaskOutcome | None,  # noqa: FBT001
+    failure: TaskOutcome | None,
 ) -> None:
     """What takes exactly the time-out is answered, longer is lost; what nothing runs fails."""
     profile = Profile("model", 10.0, 9000 * MILLISECOND, MILLISECOND, cloud_ms * MILLISECOND)

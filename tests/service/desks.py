@@ -119,7 +119,9 @@ class Provider:
             models=ModelShelf(self.settings.models),
             monitor=cast("FleetMonitor", self.monitor),
         )
-        self.fleet = FleetView(config, {}, self.garage, self.bookings, self.desk)
+        self.fleet = FleetView(
+            config, {"robots": []}, self.settings.actuators, self.garage, self.bookings, self.desk
+        )
 
     def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401
         senses_only = FlightOrder.read(folder.order).attached is not None

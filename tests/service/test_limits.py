@@ -297,3 +297,21 @@ def test_an_unknown_robot_is_refused() -> None:
     """With those that there are."""
     with pytest.raises(ConfigError, match=r"no robot tow; did you mean two\?"):
         limited(fleet(), ["tow"], tenant=NOTHING, area=None)
+
+
+def test_actuators_are_the_tenants_that_may_move_them_and_no_parachute_is() -> None:
+    """Without a word none is there, whatever the fleet carries."""
+    carried = [
+        {"id": "hook", "type": "gripper"},
+        {"id": "pump", "type": "relay"},
+        {"id": "chute", "type": "parachute", "may_release": True},
+    ]
+    robots = [{"id": name, "actuators": carried} for name in ("one", "two")]
+    config = validated({"robots": robots}, "fleet")
+
+    def left(*names: str) -> list[list[str]]:
+        found = limited(config, ["one", "two"], tenant=NOTHING, area=None, actuators=names)
+        return [[one.id for one in robot.actuators] for robot in found.robots]
+
+    assert left() == [[], []]
+    assert left("one/hook", "two/chute", "one/chute", "pump") == [["hook"], []]

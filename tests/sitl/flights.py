@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from typing_extensions import Self
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
@@ -84,12 +85,14 @@ class SitlFlight:
         settings: Mapping[str, Any] | None = None,
         own: Mapping[str, Any] | None = None,
         link: Impairment = PERFECT,
+        actuators: Sequence[ActuatorConfig] = (),
         **limits: Any,  # noqa: ANN401
     ) -> None:
         """Connect through a relay with `link`'s faults, and start the mission of `commands`."""
         self.relay = Relay(url)
         self.relay.spoil(link)
         robot = robot_at(self.relay.url, settings, own, **limits)
+        robot = robot.model_copy(update={"actuators": list(actuators)})
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
         try:
             self._connect(robot, commands)

@@ -15,6 +15,7 @@ from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
 from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
 from aerodaas.types.geometry import Vector
+from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
@@ -199,7 +200,9 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         self.transmitter.hear(message, self._now)
         if kind == "COMMAND_LONG":
             values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
-            self._acknowledge(message, firmware.obey(message.command, values, None))
+            result = firmware.obey(message.command, values, None)
+            if result != SILENT:
+                self._acknowledge(message, result)
         elif kind == "COMMAND_INT":
             values = tuple(getattr(message, f"param{index}") for index in range(1, 5))
             values += (message.x, message.y, message.z)

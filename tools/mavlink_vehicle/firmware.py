@@ -13,6 +13,7 @@ import shapely
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.geometry import enu_to_ned, ned_to_enu, yaw_enu_to_ned, yaw_ned_to_enu
 from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle.actuators import EmulatedActuators
 from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
@@ -96,6 +97,7 @@ class Firmware(ABC):
         self._extras = Extras(self)
         self.payload = EmulatedPayload(self, say)
         self.traffic = EmulatedTraffic(self)
+        self.actuators = EmulatedActuators(self)
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False
@@ -198,6 +200,7 @@ class Firmware(ABC):
             self.refuse_arming()
             return _OK
         carried = self.payload.obey(number, values)
+        carried = self.actuators.obey(number, values) if carried is None else carried
         return self.command(number, values, frame) if carried is None else carried
 
     def _request(self, message: int) -> Result:
@@ -385,7 +388,11 @@ class Firmware(ABC):
             return None
         if number in makers:
             return makers[number]()
-        return self._extras.message(number) or self.payload.message(number)
+        return (
+            self._extras.message(number)
+            or self.payload.message(number)
+            or self.actuators.message(number)
+        )
 
     @property
     def _boot(self) -> int:

@@ -46,6 +46,8 @@ class AutopilotOptions:
     """Whether it carries a camera."""
     remote_id: bool = False
     """Whether it carries a Remote ID transmitter."""
+    actuators: bool = False
+    """Whether it carries a gripper, servos, relays and a parachute."""
     uplink: Impairment = field(default_factory=Impairment)
     """On the way to the vehicle."""
     downlink: Impairment = field(default_factory=Impairment)

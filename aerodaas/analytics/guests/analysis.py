@@ -13,6 +13,7 @@ from typing import Any
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.guests.answers import AnswerReader
 from aerodaas.analytics.guests.channel import GuestError
+from aerodaas.analytics.guests.payload import require_no_moves
 from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import GuestQuota
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -89,7 +90,7 @@ class GuestAnalysis(Analytics[Any]):
             blob = pickle.dumps((item, vehicle), protocol=5)
             request = {"do": "process", "key": self.key, "now": context.now(), "on": context.kind}
             answer, _ = process.ask(request, blob, _ITEM)
-            return self._answers.read(answer, context)
+            return require_no_moves(self._answers.read(answer, context), self.guest)
         except GuestError as error:
             if process.told:
                 return None

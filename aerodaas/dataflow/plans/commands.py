@@ -8,9 +8,12 @@ from typing import Any
 
 __all__ = [
     "DO_CHANGE_SPEED",
+    "DO_GRIPPER",
     "DO_SET_CAM_TRIGG_DIST",
+    "DO_SET_RELAY",
     "DO_SET_ROI_NONE",
     "DO_SET_ROI_WPNEXT_OFFSET",
+    "DO_SET_SERVO",
     "FRAMES_ABOVE_GROUND",
     "FRAMES_ABOVE_SEA",
     "FRAMES_RELATIVE",
@@ -44,9 +47,12 @@ NAV_DELAY = 93
 NAV_LAST = 95
 """Commands up to here say where to fly; later ones what to do on the way."""
 DO_CHANGE_SPEED = 178
+DO_SET_RELAY = 181
+DO_SET_SERVO = 183
 DO_SET_ROI_WPNEXT_OFFSET = 196
 DO_SET_ROI_NONE = 197
 DO_SET_CAM_TRIGG_DIST = 206
+DO_GRIPPER = 211
 
 FRAME_MISSION = 2
 """Of a command without a place."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.json_text import parse_json, read_text
 from aerodaas.config.printable import printable
 from aerodaas.dataflow.plans.plan import Notice, Plan
@@ -45,12 +47,15 @@ def _parsed(text: str) -> Plan:
 
 
 def flown_plan(
-    path: str | Path, home_altitude: float | None = None, ground: Ground | None = None
+    path: str | Path,
+    home_altitude: float | None = None,
+    ground: Ground | None = None,
+    actuators: Sequence[ActuatorConfig] = (),
 ) -> tuple[list[Waypoint], list[Notice]]:
     """Read a plan's waypoints, and what they leave out; as `AeroNavigation.from_plan`."""
     plan = read_plan(path)
     try:
-        return waypoints_of(plan, home_altitude, ground)
+        return waypoints_of(plan, home_altitude, ground, actuators)
     except (ConfigError, InvalidWaypointError) as error:
         raise ConfigError(f"{path} cannot be flown: {error}") from None
 

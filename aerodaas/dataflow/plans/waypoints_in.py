@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.dataflow.plans.actuators import MOVES, move_of
 from aerodaas.dataflow.plans.commands import (
     DO_CHANGE_SPEED,
     FRAMES_ABOVE_GROUND,
@@ -46,7 +48,10 @@ _SAME_SPEED = -1.0
 
 
 def waypoints_of(
-    plan: Plan, home_altitude: float | None = None, ground: Ground | None = None
+    plan: Plan,
+    home_altitude: float | None = None,
+    ground: Ground | None = None,
+    actuators: Sequence[ActuatorConfig] = (),
 ) -> tuple[list[Waypoint], list[Notice]]:
     """Turn a plan's items into waypoints.
 
@@ -54,6 +59,7 @@ def waypoints_of(
         plan: The plan.
         home_altitude: Metres above the sea of the environment's home; None for the plan's own.
         ground: Height of the ground, for items whose height is above it.
+        actuators: Those of the robot, which items may move by their instance or channel.
 
     Returns:
         Waypoints of type `global_relative`, and what they leave out. Heights above sea and ground
@@ -65,7 +71,7 @@ def waypoints_of(
     """
     if home_altitude is None and plan.home is not None:
         home_altitude = plan.home.altitude
-    flown = _Flown(plan, home_altitude, ground)
+    flown = _Flown(plan, home_altitude, ground, actuators)
     for item in plan.items:
         flown.add(item)
     return flown.waypoints, [*plan.notices, *_parts(plan), *flown.notices()]
@@ -84,7 +90,20 @@ def _parts(plan: Plan) -> list[Notice]:
 class _Flown:
     """Waypoints up to an item, and notices by command and reason."""
 
-    def __init__(self, plan: Plan, home_altitude: float | None, ground: Ground | None) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        home_altitude: float | None,
+        ground: Ground | None,
+        actuators: Sequence[ActuatorConfig],
+    ) -> None:
+        self._actuators = actuators
+        self._carried_out: dict[int, Callable[[PlanItem], None]] = {
+            **dict.fromkeys(_FLIES_TO, self._fly),
+            **(dict.fromkeys(MOVES, self._move) if actuators else {}),
+            NAV_DELAY: self._delay,
+            DO_CHANGE_SPEED: self._change_speed,
+        }
         self.waypoints: list[Waypoint] = []
         self._ardupilot = plan.ardupilot
         self._sea = home_altitude
@@ -105,12 +124,8 @@ class _Flown:
             return
         if not item.continues:
             self._say(item, "the drone goes on, though autoContinue is false")
-        if command in _FLIES_TO:
-            self._fly(item)
-        elif command == NAV_DELAY:
-            self._delay(item)
-        elif command == DO_CHANGE_SPEED:
-            self._change_speed(item)
+        if command in self._carried_out:
+            self._carried_out[command](item)
         elif command in _TAKES_OFF:
             self._say(item, f"climbs to limits.takeoff_height, not to {_metres(item.z)}")
         elif command == NAV_RETURN_TO_LAUNCH:
@@ -203,6 +218,34 @@ class _Flown:
         last = self.waypoints[-1]
         longer = last.hover_duration + _seconds(seconds, f"item {item.number}")
         self.waypoints[-1] = replace(last, hover_duration=longer)
+
+    def _move(self, item: PlanItem) -> None:
+        """Move an actuator at the waypoint before."""
+        move = move_of(item, self._actuators)
+        if isinstance(move, str):
+            self._say(item, move)
+            return
+        if not self.waypoints:
+            self._say(item, "nothing is moved before the first waypoint")
+            return
+        last = self.waypoints[-1]
+        name, position = move
+        if name in last.moves:
+            # Both are done, one at a waypoint of its own in the same place.
+            again = f"item{item.number}"
+            self.waypoints.append(
+                replace(
+                    last,
+                    id=again,
+                    hover_duration=0.0,
+                    gimbal_pitch=None,
+                    gimbal_yaw=None,
+                    photo=False,
+                    actuate={name: position},
+                )
+            )
+        else:
+            self.waypoints[-1] = replace(last, actuate={**last.moves, name: position})
 
     def _change_speed(self, item: PlanItem) -> None:
         kind, speed = item.values[0] or 0.0, item.values[1]

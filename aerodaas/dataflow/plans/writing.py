@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.dataflow.plans.actuators import move_item
 from aerodaas.dataflow.plans.commands import (
     DO_CHANGE_SPEED,
     FRAME_ABOVE_GROUND,
@@ -46,15 +48,19 @@ _ALTITUDE_MODES = {FRAME_RELATIVE: 1, FRAME_ABOVE_SEA: 2, FRAME_ABOVE_GROUND: 4}
 
 
 def planned(
-    waypoints: Sequence[Waypoint], home: GeodeticOrigin, home_altitude: float | None = None
+    waypoints: Sequence[Waypoint],
+    home: GeodeticOrigin,
+    home_altitude: float | None = None,
+    actuators: Sequence[ActuatorConfig] = (),
 ) -> tuple[Plan, list[Notice]]:
     """Turn waypoints into a plan that starts at `home`; with what it leaves out.
 
     Raises:
-        ConfigError: If a waypoint is relative to a take-off, whose place is not known yet.
+        ConfigError: If a waypoint is relative to a take-off, whose place is not known yet, or
+            moves what is none of `actuators`.
     """
     places = [_place(waypoint, home) for waypoint in waypoints]
-    items = list(_items(waypoints, places, home))
+    items = list(_items(waypoints, places, home, actuators))
     return (
         Plan(tuple(items), home=PlanHome(home.latitude, home.longitude, home_altitude)),
         list(_left_out(waypoints)),
@@ -102,6 +108,7 @@ def _items(
     waypoints: Sequence[Waypoint],
     places: Sequence[tuple[float, float, float]],
     home: GeodeticOrigin,
+    actuators: Sequence[ActuatorConfig],
 ) -> Iterator[PlanItem]:
     # How high a place above the sea lies above home, the plan need not know.
     above_home = places and waypoints[0].above is not HeightReference.SEA
@@ -121,6 +128,9 @@ def _items(
         frame = _FRAMES.get(above, FRAME_RELATIVE)
         yield PlanItem(number, NAV_WAYPOINT, frame, held, *at)
         number += 1
+        for name, position in waypoint.moves.items():
+            yield move_item(number, name, position, actuators)
+            number += 1
     still = (0.0, 0.0, 0.0, 0.0)
     yield PlanItem(number, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
 

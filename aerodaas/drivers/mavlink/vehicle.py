@@ -9,17 +9,21 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
+from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
+from aerodaas.drivers.mavlink.control.completion import ClimbCompletion
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.permission import flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
+from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
 from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
 from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
@@ -39,12 +43,10 @@ from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.geometry import Vector
 from aerodaas.types.health import HealthReadings
 from aerodaas.types.payload import Gimbal, PhotoCamera
 from aerodaas.types.vehicle import (
     Capabilities,
-    PositionSetpoint,
     Setpoint,
     VehicleMode,
     VehicleState,
@@ -58,17 +60,17 @@ _log = logging.getLogger(__name__)
 _PARTING = 4.0
 """Seconds that `close` waits for a vehicle in the air to begin its landing, and for starting motors
 to stop."""
-_SHORT = 1.5
-"""Metres below the commanded height within which an autopilot may report a take-off as done."""
 
 
 class MavlinkVehicle:
-    """One multicopter with PX4 or ArduPilot; a `ClockedVehicle` and a `PayloadVehicle`.
+    """One multicopter with PX4 or ArduPilot; `ClockedVehicle`, `PayloadVehicle`, `ActuatedVehicle`.
 
     One thread at a time may use it, except the link's own. Raises ConfigError for unknown settings.
     """
 
     settings_model = MavlinkSettings
+    actuator_types: ClassVar[frozenset[str]] = ACTUATOR_TYPES
+    """What it can carry."""
     observing: ClassVar[Mapping[str, bool]] = {"observe": True}
     """Settings with which a connection changes nothing at the vehicle, for who only watches it."""
 
@@ -101,7 +103,8 @@ class MavlinkVehicle:
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
         self._payload = Payload(self._clock, self._lock)
-        self._climb_place: Vector | None = None
+        self._actuators = MavlinkActuators(self._robot.actuators, self._settings, self._lock)
+        self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
@@ -176,6 +179,7 @@ class MavlinkVehicle:
             self._connection.alignment.require_same_boot()
             self._payload.search(commander)
             self._airspace.begin(link, commander, self._connection.alignment)
+            self._actuators.use(commander)
         except BaseException:
             self.close()
             raise
@@ -237,6 +241,7 @@ class MavlinkVehicle:
         with self._lock:
             link, now = self._connected().link, time.monotonic()
             state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
+            state.actuators.update(self._actuators.positions)
             return self._payload.complete(state)
 
     @property
@@ -248,6 +253,11 @@ class MavlinkVehicle:
     def photo_camera(self) -> PhotoCamera | None:
         """The camera that it carries, once it is found."""
         return self._payload.camera
+
+    @property
+    def actuators(self) -> MavlinkActuators:
+        """What the environment file names."""
+        return self._actuators
 
     @property
     def sea_level(self) -> float | None:
@@ -305,7 +315,7 @@ class MavlinkVehicle:
             reasons = [refusal] if refusal else self.preflight()
             if reasons:
                 raise VehicleError(f"{self._name} refuses to take off: {'; '.join(reasons)}")
-            self._climb_place = None
+            self._completion.begin()
             orders = connection.autopilot.take_off(height, self._telemetry)
             departure.begin(orders, height, time.monotonic())
 
@@ -475,6 +485,8 @@ class MavlinkVehicle:
                 self._observe(now)
             elif kind in Payload.messages:
                 self._payload.take(message, now)
+            elif kind in MavlinkActuators.messages:
+                self._actuators.take(message)
             else:
                 self._moved(kind, now)
 
@@ -527,6 +539,7 @@ class MavlinkVehicle:
             self._touchdown.turn(now)
             self._payload.turn(now)
             self._airspace.turn(now)
+            self._actuators.turn(now)
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
@@ -539,24 +552,15 @@ class MavlinkVehicle:
             _log.warning("%s: %s", self._name, self._words.popleft())
 
     def _climb_on(self, connection: Connection, now: float) -> None:
-        """Complete a take-off by setpoints: PX4 ends its own up to 0.8 m below the height.
-
-        PX4 reports hold before it takes off, too. Once commanded to follow setpoints, it gets them,
-        whatever it shows: without, it would leave that mode by its own protection.
-        """
-        goal, frame, phase = connection.departure.goal, connection.alignment.frame, self._phase
+        """Complete a take-off by setpoints, where the autopilot stops short."""
+        goal, frame = connection.departure.goal, connection.alignment.frame
         able = connection.autopilot.stops_short and self._watchdog.healthy(now)
         if goal is None or frame is None or not able:
             return
-        done = phase.seen and phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
-        near = self._touchdown.flew and goal - self._telemetry.up < _SHORT
-        if not ((done and near) or phase.wish is FlightMode.GUIDED):
-            return
-        if self._climb_place is None:
-            self._climb_place = self._report.odometry(frame, known=True).position
-        top = frame.position(np.array([0.0, 0.0, -goal]))[2]
-        place = np.array([*self._climb_place[:2], top])
-        self._steer(PositionSetpoint(place, None, self._steering.climb_rate), connection, now)
+        odometry = partial(self._report.odometry, frame, known=True)
+        climb, flew = self._steering.climb_rate, self._touchdown.flew
+        if setpoint := self._completion.setpoint(goal, frame, odometry, climb, flew=flew):
+            self._steer(setpoint, connection, now)
 
     def _mind_the_loop(self, now: float) -> None:
         """Hold if the control loop hangs; return home if it does not recover.

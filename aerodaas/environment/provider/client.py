@@ -19,7 +19,7 @@ from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
-from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -193,6 +193,10 @@ class ProviderClient:
     def rearrange(self, mission: str, change: RearrangeIn) -> AnswerOut:
         """Change the order of a robot's coming waypoints, or remove some, as a whole."""
         return self._ask(AnswerOut, "POST", f"/v1/missions/{_part(mission)}/plan", change)
+
+    def actuate(self, mission: str, wanted: ActuateIn) -> AnswerOut:
+        """Move an actuator of a robot; the answer is its own."""
+        return self._ask(AnswerOut, "POST", f"/v1/missions/{_part(mission)}/actuators", wanted)
 
     def plan_survey(self, mission: str, wanted: SurveyIn) -> SurveyOut:
         """Plan the survey of an area; `add_navigation` with its waypoints flies it."""

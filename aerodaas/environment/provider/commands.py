@@ -8,14 +8,16 @@ from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.mission.commands import (
+    Actuate,
     AddNavigation,
     Answer,
     ClearNavigation,
     Command,
     RearrangeNavigation,
+    ReleaseParachute,
 )
 from aerodaas.protocol.commands import word_for
-from aerodaas.protocol.piloting import RearrangeIn
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.schemas import CommandIn, NavigationIn
 from aerodaas.types.errors import GraphError, InvalidWaypointError
 from aerodaas.types.waypoints import SchedulingType
@@ -37,6 +39,11 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
         command = ClearNavigation()
     if isinstance(command, RearrangeNavigation):
         return _answer(client.rearrange(mission, _change(robot, command)))
+    if isinstance(command, Actuate):
+        wanted = ActuateIn(robot=robot, actuator=command.actuator, position=command.position)
+        return _answer(client.actuate(mission, wanted))
+    if isinstance(command, ReleaseParachute):
+        raise GraphError(f"{robot} flies at a provider, and no parachute is fired from afar")
     word = word_for(command)
     if word is None:
         raise GraphError(

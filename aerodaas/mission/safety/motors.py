@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
+from collections.abc import Sequence
 
 from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.types.clock import NANOSECONDS
@@ -83,6 +84,15 @@ class MotorWatch:
         elif self._state is not Motors.IDLE:
             self._state = self._stop(state, now)
         return self._state
+
+    def story(self, motors: Motors, faults: Sequence[str]) -> tuple[str, str]:
+        """Kind and text of the alert about `motors` that stopped without being asked to."""
+        east, north, up = self.place
+        where = f"at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        if motors is Motors.LANDED:
+            why = f": {'; '.join(faults)}" if faults else ""
+            return "landed", f"landed of its own accord {where}{why}"
+        return "motors_stopped", f"motors stopped in flight {where}"
 
     def _run(self, state: VehicleState, now: int) -> None:
         self._state, self._mode, self._unheard = Motors.RUNNING, state.mode, False

@@ -114,6 +114,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         state["gimbal"] = item.gimbal
     if item.traffic:
         state["traffic"] = [_traffic_json(one) for one in item.traffic]
+    if item.actuators:
+        state["actuators"] = item.actuators
     if item.truth is not None:
         state["truth"] = odometry_json(item.truth)
     yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import ClassVar
 
+from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
+from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.types.errors import ConfigError, VehicleError
 from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 
@@ -24,8 +27,11 @@ class ReplayedVehicle:
 
     Settings: `path` of the recording, and `driver` and `settings` of the recorded robot, whose
     capabilities it reports. Commands have no effect; setpoints are accepted in the modes in
-    which the recorded vehicle accepted them.
+    which the recorded vehicle accepted them. Actuators do as they are told, and move nothing.
     """
+
+    actuator_types: ClassVar[frozenset[str]] = ACTUATOR_TYPES
+    """What a recorded vehicle may have carried."""
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Check the settings of `robot`; raises ConfigError."""
@@ -34,6 +40,7 @@ class ReplayedVehicle:
             raise ConfigError(f'robot {robot.id}: a replayed vehicle has the settings "path", '
                               '"driver" and "settings"')  # fmt: skip
         self._id = robot.id
+        self.actuators = SimulatedActuators(robot.actuators, lambda: None)
         self._path = str(robot.settings["path"])
         self._capabilities = _capabilities(robot, environment)
         self._states: Iterator[tuple[int, VehicleState]] = iter(())
@@ -67,6 +74,7 @@ class ReplayedVehicle:
     def advance_to(self, stamp: int) -> None:
         """Advance to the newest state recorded up to mission time `stamp`, in nanoseconds."""
         self._now = stamp
+        self.actuators.advance_to(stamp)
         while self._next is not None and self._next[0] <= stamp:
             self._last, self._current = self._next
             self._next = next(self._states, None)

@@ -22,7 +22,7 @@ from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
-from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
@@ -42,9 +42,10 @@ _RATE = 10.0
 """Status messages a second."""
 
 
-_BODIES: Mapping[str, type[NavigationIn | RearrangeIn | ControlsIn]] = {
+_BODIES: Mapping[str, type[NavigationIn | RearrangeIn | ActuateIn | ControlsIn]] = {
     "fly": NavigationIn,
     "rearrange": RearrangeIn,
+    "actuate": ActuateIn,
     "controls": ControlsIn,
 }
 """Commands with a content, by what is to be done."""

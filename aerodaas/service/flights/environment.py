@@ -22,5 +22,6 @@ def environment_of(order: FlightOrder) -> EnvironmentConfig:
         order.robots,
         tenant=order.limits,
         area=order.area,
+        actuators=order.actuators,
     )
     return rehearsal_config(config, order.battery, order.seed) if order.rehearsal else config

@@ -62,6 +62,8 @@ class FlightOrder(_Record):
     """Length of the lease."""
     limits: TenantLimits = TenantLimits()
     area: Area | None = None
+    actuators: list[str] = Field(default_factory=list)
+    """Actuators that the tenant may move, as `robot/actuator`."""
     silence: SilencePolicy = SilencePolicy.CONTINUE
     silence_seconds: float = 30.0
     speed: Literal["max"] | float = 1.0

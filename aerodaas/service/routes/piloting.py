@@ -11,7 +11,7 @@ from fastapi.security import HTTPBearer
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.console.controls import ControlCommand, ControlSession, told_of_controls
 from aerodaas.console.surveys import SurveyPlanner
-from aerodaas.protocol.piloting import ControlsIn, RearrangeIn, SurveyIn, SurveyOut
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import Role, Scope, Word
 from aerodaas.service.access import Audit
 from aerodaas.service.desk import MissionDesk
@@ -24,7 +24,7 @@ __all__ = ["PilotingRoutes"]
 
 
 class PilotingRoutes:
-    """Routes `/v1/missions/{id}/survey`, `plan` and `controls`."""
+    """Routes `/v1/missions/{id}/survey`, `plan`, `actuators` and `controls`."""
 
     def __init__(self, desk: MissionDesk, admission: Admission, audit: Audit) -> None:
         """Command the desk's missions."""
@@ -40,6 +40,7 @@ class PilotingRoutes:
         posted: dict[str, Any] = {"methods": ["POST"], "dependencies": secured}
         router.add_api_route("/{mission}/survey", self.survey, **posted)
         router.add_api_route("/{mission}/plan", self.rearrange, **posted)
+        router.add_api_route("/{mission}/actuators", self.actuate, **posted)
         router.add_api_websocket_route("/{mission}/controls", self.controls)
         return router
 
@@ -59,6 +60,19 @@ class PilotingRoutes:
             answer = self._desk.fly(principal, mission, body)
         later.add_task(
             self._audit.note_answer, principal, "plan", f"{mission}/{body.robot}", answer
+        )
+        return answer
+
+    def actuate(
+        self, mission: str, body: ActuateIn, request: Request, later: BackgroundTasks
+    ) -> AnswerOut:
+        """Move an actuator that the provider lets this tenant move."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        with self._admission.auditing(principal, request):
+            answer = self._desk.fly(principal, mission, body)
+        later.add_task(
+            self._audit.note_answer,
+            *(principal, "actuate", f"{mission}/{body.robot}/{body.actuator}", answer),
         )
         return answer
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace, TracebackType
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from mavlink_flights import LOOPBACK, free_port, robot_of
 from typing_extensions import Self
 
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
@@ -35,12 +37,14 @@ class Stepped:
         self,
         monkeypatch: pytest.MonkeyPatch,
         options: AutopilotOptions | None = None,
+        actuators: Sequence[ActuatorConfig] = (),
         **settings: Any,  # noqa: ANN401
     ) -> None:
         """Connect; `options` of the autopilot, `settings` of the driver."""
         self.now = 1000.0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.advance)
-        for module in ("vehicle", "connecting", "control.watchdog", "microservices.payload"):
+        services = ("microservices.actuators", "microservices.payload")
+        for module in ("vehicle", "connecting", "control.watchdog", *services):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 
@@ -51,7 +55,8 @@ class Stepped:
         port = free_port()
         options = replace(options or AutopilotOptions(), peer=(LOOPBACK, port))
         self.autopilot = EmulatedAutopilot(options)
-        self.robot = robot = robot_of(port, failsafes="ignore", fallback="ignore", **settings)
+        robot = robot_of(port, failsafes="ignore", fallback="ignore", **settings)
+        self.robot = robot = robot.model_copy(update={"actuators": list(actuators)})
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
 
     def __enter__(self) -> Self:

@@ -1,0 +1,1 @@
+"""Autopilots in simulation that the user has installed: found, started, and ended again."""

@@ -1,0 +1,311 @@
+"""Grippers, servos, relays and parachutes by MAVLink: done, refused, silent, and lied about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from stepped import Stepped
+
+from aerodaas.config.actuators import (
+    ActuatorConfig,
+    GripperConfig,
+    ParachuteConfig,
+    RelayConfig,
+    ServoConfig,
+)
+from aerodaas.config.model import MissionConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import AddNavigation, ReleaseParachute, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.actuators import MoveResult
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.status import MissionState
+from aerodaas.types.waypoints import Waypoint
+from tools.mavlink_vehicle import AutopilotOptions
+from tools.mavlink_vehicle.actuators import EmulatedActuators
+
+CARRIED: list[ActuatorConfig] = [
+    GripperConfig(id="hook", type="gripper", instance=2),
+    RelayConfig(id="pump", type="relay", instance=3),
+    ServoConfig(id="hatch", type="servo", channel=9, positions={"open": 1900, "closed": 1100}),
+    ParachuteConfig(id="chute", type="parachute", may_release=True),
+    ParachuteConfig(id="locked", type="parachute"),
+]
+COMMANDS = [
+    ("hook", "release", (mavlink.MAV_CMD_DO_GRIPPER, 2.0, 0.0)),
+    ("hook", "grab", (mavlink.MAV_CMD_DO_GRIPPER, 2.0, 1.0)),
+    ("pump", "on", (mavlink.MAV_CMD_DO_SET_RELAY, 3.0, 1.0)),
+    ("pump", "off", (mavlink.MAV_CMD_DO_SET_RELAY, 3.0, 0.0)),
+    ("hatch", "open", (mavlink.MAV_CMD_DO_SET_SERVO, 9.0, 1900.0)),
+    ("chute", "disable", (mavlink.MAV_CMD_DO_PARACHUTE, 0.0, 0.0)),
+    ("chute", "enable", (mavlink.MAV_CMD_DO_PARACHUTE, 1.0, 0.0)),
+]
+
+
+@pytest.fixture(params=["px4", "ardupilot"])
+def ends(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Stepped:
+    """Both families, which carry all of it."""
+    options = AutopilotOptions(family=request.param, actuators=True)
+    return Stepped(monkeypatch, options, CARRIED)
+
+
+def carried(ends: Stepped) -> EmulatedActuators:
+    """What goes wrong with them."""
+    return ends.autopilot.firmware.actuators
+
+
+def result(ends: Stepped, timeout: float = 15.0) -> MoveResult:
+    """The next word of a command."""
+    said: list[MoveResult] = []
+    end = ends.now + timeout
+    while not said:
+        assert ends.now < end, "waited in vain"
+        ends.turn()
+        said += ends.vehicle.actuators.results()
+    (one,) = said
+    return one
+
+
+def test_each_position_is_its_command(ends: Stepped) -> None:
+    """With instance or channel, and the state that is to be reached; sent once where answered."""
+    with ends:
+        for name, position, command in COMMANDS:
+            number = ends.vehicle.actuators.move(name, position)
+            assert result(ends) == MoveResult(number, accepted=True)
+            assert carried(ends).asked[-1] == command
+        assert len(carried(ends).asked) == len(COMMANDS)
+        assert carried(ends).servos[8] == 1900
+        assert ends.turn().actuators == {
+            "hook": "grab",
+            "pump": "off",
+            "hatch": "open",
+            "chute": "enable",
+        }
+
+
+@pytest.mark.parametrize("name", ["hook", "pump", "hatch"])
+def test_a_refusal_is_told_at_once(ends: Stepped, name: str) -> None:
+    """And the position is not taken for reached."""
+    with ends:
+        carried(ends).conduct = "refuse"
+        position = next(one for one in CARRIED if one.id == name).positions
+        number = ends.vehicle.actuators.move(name, next(iter(position)))
+        assert result(ends, 2.0) == MoveResult(number, accepted=False, reason="failed")
+        assert ends.turn().actuators == {}
+
+
+def test_an_unknown_command_is_refused_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As PX4 does with a servo."""
+    with Stepped(monkeypatch, AutopilotOptions(), CARRIED) as ends:
+        ends.vehicle.actuators.move("hatch", "open")
+        assert result(ends).reason == "not supported"
+
+
+def test_silence_is_repeated_and_told(ends: Stepped) -> None:
+    """Each time for the same state, never for the other one."""
+    with ends:
+        carried(ends).conduct = "silent"
+        ends.vehicle.actuators.move("hook", "release")
+        assert result(ends) == MoveResult(1, accepted=False, reason="no answer")
+        assert set(carried(ends).asked) == {(mavlink.MAV_CMD_DO_GRIPPER, 2.0, 0.0)}
+        assert len(carried(ends).asked) == 6
+
+
+def test_what_takes_its_time_is_awaited(ends: Stepped) -> None:
+    """An acknowledgement IN_PROGRESS is none yet."""
+    with ends:
+        carried(ends).conduct = "busy"
+        ends.vehicle.actuators.move("hook", "release")
+        ends.watch(3.0)
+        assert ends.vehicle.actuators.results() == []
+        assert result(ends).accepted
+
+
+@pytest.mark.parametrize(
+    ("name", "position", "said"),
+    [
+        ("hatch", "open", "acknowledged, and not done: servo 9 is at 1500, not 1900 µs"),
+        ("pump", "on", "acknowledged, and not done: relay 3 is the other way"),
+    ],
+)
+def test_a_lie_is_found_out(ends: Stepped, name: str, position: str, said: str) -> None:
+    """By what the autopilot itself says that it puts out."""
+    with ends:
+        carried(ends).conduct = "lie"
+        ends.vehicle.actuators.move(name, position)
+        assert result(ends) == MoveResult(1, accepted=False, reason=said)
+        assert ends.turn().actuators == {}
+
+
+def test_where_nothing_is_told_the_acknowledgement_counts(ends: Stepped) -> None:
+    """After some requests; a gripper's always does."""
+    with ends:
+        carried(ends).tells = False
+        ends.vehicle.actuators.move("hatch", "open")
+        assert result(ends).accepted
+        carried(ends).conduct = "lie"
+        ends.vehicle.actuators.move("hook", "release")
+        assert result(ends).accepted
+
+
+def test_commands_of_one_kind_do_not_replace_each_other(ends: Stepped) -> None:
+    """One after the other, in order."""
+    with ends:
+        numbers = [ends.vehicle.actuators.move("hook", one) for one in ("grab", "release", "grab")]
+        assert [result(ends).number for _ in numbers] == numbers
+        assert [one[2] for one in carried(ends).asked] == [1.0, 0.0, 1.0]
+
+
+def test_a_doubled_acknowledgement_is_not_the_next_commands(ends: Stepped) -> None:
+    """PX4 sends two: the second must not hide that the next command was not answered."""
+    with ends:
+        ends.vehicle.actuators.move("hook", "grab")
+        ends.vehicle.actuators.move("hook", "release")
+        assert result(ends).accepted
+        carried(ends).conduct = "silent"
+        assert result(ends).reason == "no answer"
+
+
+def test_what_is_withdrawn_is_repeated_no_more(ends: Stepped) -> None:
+    """And what waits behind it has its turn."""
+    with ends:
+        carried(ends).conduct = "silent"
+        first = ends.vehicle.actuators.move("hook", "release")
+        second = ends.vehicle.actuators.move("pump", "on")
+        ends.watch(0.2)
+        ends.vehicle.actuators.withdraw(first)
+        carried(ends).conduct = "obey"
+        assert result(ends) == MoveResult(second, accepted=True)
+        ends.watch(5.0)
+        assert [one[0] for one in carried(ends).asked].count(mavlink.MAV_CMD_DO_GRIPPER) == 1
+        assert ends.vehicle.actuators.results() == []
+
+
+def test_a_queue_that_is_full_refuses(ends: Stepped) -> None:
+    """Rather than forget."""
+    with ends:
+        carried(ends).conduct = "silent"
+        for _ in range(17):
+            ends.vehicle.actuators.move("hook", "release")
+        with pytest.raises(VehicleError, match="16 commands"):
+            ends.vehicle.actuators.move("hook", "release")
+
+
+@pytest.mark.parametrize("position", ["release", "released", "2", ""])
+def test_no_position_fires_a_parachute(ends: Stepped, position: str) -> None:
+    """Nor is one fired that may not be."""
+    with ends:
+        with pytest.raises(VehicleError):
+            ends.vehicle.actuators.move("chute", position)
+        for name in ("locked", "hook"):
+            with pytest.raises(VehicleError, match="may be fired"):
+                ends.vehicle.actuators.release_parachute(name)
+        ends.watch(1.0)
+        assert carried(ends).asked == []
+
+
+def test_who_only_observes_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As between missions, and by `aerodaas preflight`."""
+    options = AutopilotOptions(actuators=True)
+    with Stepped(monkeypatch, options, CARRIED, observe=True) as ends:
+        with pytest.raises(VehicleError, match="observe"):
+            ends.vehicle.actuators.move("hook", "release")
+        with pytest.raises(VehicleError, match="observe"):
+            ends.vehicle.actuators.release_parachute("chute")
+        ends.watch(1.0)
+        assert carried(ends).asked == []
+
+
+class _Clock:
+    """The mission's clock: that of both ends."""
+
+    def __init__(self, ends: Stepped) -> None:
+        self._ends = ends
+
+    def now(self) -> int:
+        """Nanoseconds."""
+        return round(self._ends.now * 1e9)
+
+
+def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
+    """A mission that drops its load; `each` is called at each turn."""
+    clock = _Clock(ends)
+    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
+    mission = Mission(
+        ends.robot.model_copy(update={"mission": MissionConfig(actuator_timeout=4.0)}),
+        InlinePlanner(OrderedScheduler()),
+        takeoff=ends.vehicle.read().odometry.position,
+        payload=ends.vehicle,
+    )
+    loop = SetpointLoop(ends.vehicle, mission)
+    stops = [
+        Waypoint("a", 3, 0, 2, actuate={"hatch": "open", "hook": "release"}),
+        Waypoint("b", 3, 3, 2, hover_duration=2.5, actuate={"hatch": "closed"}),
+    ]
+    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
+    mission.handle(Start(), clock.now())
+    end = ends.now + 120.0
+    while not mission.finished and ends.now < end:
+        ends.advance(0.05)
+        loop.turn(clock.now())
+        each(mission)
+    return mission
+
+
+def test_a_mission_drops_its_load(ends: Stepped) -> None:
+    """At its place, and closes the hatch at the next one."""
+    with ends:
+        mission = fly(ends)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert [alert.text for alert in mission.alerts if alert.kind == "actuator"] == []
+        assert carried(ends).gripped is False
+        assert [one[1:] for one in carried(ends).asked] == [
+            (9.0, 1900.0),
+            (2.0, 0.0),
+            (9.0, 1100.0),
+        ]
+
+
+def test_a_load_that_does_not_come_off_costs_no_flight(ends: Stepped) -> None:
+    """It is told, and nothing is sent once the drone flies on."""
+    with ends:
+        late: list[int] = []
+
+        def each(mission: Mission) -> None:
+            carried(ends).conduct = "silent" if mission.status.visits == 0 else "obey"
+            if mission.status.visits == 1:
+                late.append(len([one for one in carried(ends).asked if one[1] == 9.0]))
+
+        mission = fly(ends, each)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        (text,) = [alert.text for alert in mission.alerts if alert.kind == "actuator"]
+        assert text == "a: hatch: open: not done: not told within 4 s that it is done; nor hook"
+        assert (mavlink.MAV_CMD_DO_SET_SERVO, 9.0, 1900.0) not in carried(ends).asked[late[0] :]
+
+
+def test_a_parachute_ends_the_flight_hands_off(ends: Stepped) -> None:
+    """After its acknowledgement nothing is commanded any more."""
+    with ends:
+        heard: list[int] = []
+
+        def each(mission: Mission) -> None:
+            if mission.state is MissionState.ENROUTE and not heard:
+                assert mission.handle(ReleaseParachute("chute"), 0).accepted
+                heard.append(0)
+
+        mission = fly(ends, each)
+        assert mission.state is MissionState.ABORTED
+        assert mission.status.reason == "the parachute chute was released"
+        assert carried(ends).asked == [(mavlink.MAV_CMD_DO_PARACHUTE, 2.0, 0.0)]
+        before = len(ends.autopilot.heard)
+        ends.watch(2.0)
+        kinds = {message.get_type() for _, message in ends.autopilot.heard[before:]}
+        assert "SET_POSITION_TARGET_LOCAL_NED" not in kinds
+        assert mavlink.MAV_CMD_DO_SET_MODE not in {
+            getattr(message, "command", None) for _, message in ends.autopilot.heard[before:]
+        }

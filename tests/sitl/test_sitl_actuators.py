@@ -1,0 +1,73 @@
+"""A gripper, a servo and a relay of a real autopilot in simulation, moved at waypoints.
+
+It needs one that has them: for ArduCopter the parameters of `actuators.parm`. Where the autopilot
+refuses the gripper on the ground, the test is skipped.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from aerodaas.config.actuators import ActuatorConfig, GripperConfig, RelayConfig, ServoConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import Actuate, AddNavigation
+from aerodaas.types.status import MissionState as S
+from aerodaas.types.waypoints import Waypoint
+from sitl.autopilot import Autopilot
+from sitl.flights import SitlFlight
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
+
+CARRIED: list[ActuatorConfig] = [
+    GripperConfig(id="hook", type="gripper"),
+    RelayConfig(id="pump", type="relay"),
+    ServoConfig(id="hatch", type="servo", channel=14, positions={"open": 1900, "closed": 1100}),
+    ServoConfig(id="motor", type="servo", channel=1, positions={"full": 2000}),
+]
+STOPS = AddNavigation(
+    AeroNavigation(
+        data=[
+            Waypoint("drop", 0, 5, 3, actuate={"hatch": "open", "hook": "release", "pump": "on"}),
+            Waypoint("away", 5, 5, 3, actuate={"hatch": "closed", "pump": "off"}),
+            Waypoint("wrong", 5, 0, 3, actuate={"motor": "full", "hatch": "open"}),
+        ]
+    )
+)
+
+
+@pytest.fixture(autouse=True)
+def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep what a flight changes on a vehicle in a folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+
+def test_a_delivery(autopilot: Autopilot) -> None:
+    """Each position is taken where it is to be; an output that turns a motor is refused."""
+    with SitlFlight(autopilot.url, STOPS, actuators=CARRIED) as flight:
+        assert flight.tell(Actuate("hook", "grab")).accepted
+        flight.run(60.0, lambda: flight.mission.state is S.ENROUTE)
+        if flight.vehicle.read().actuators.get("hook") != "grab":
+            pytest.skip("this autopilot has no gripper")
+        moved: list[dict[str, str]] = []
+
+        def look() -> bool:
+            state = flight.vehicle.read().actuators
+            if not moved or moved[-1] != state:
+                moved.append(dict(state))
+            return False
+
+        flight.run(180.0, look)
+        assert flight.mission.state is S.LANDED, flight.story
+        alerts = [one.text for one in flight.mission.alerts if one.kind == "actuator"]
+        assert alerts == ["wrong: motor: full: not done: failed; nor hatch"]
+        assert moved == [
+            {"hook": "grab"},
+            {"hook": "grab", "hatch": "open"},
+            {"hook": "release", "hatch": "open"},
+            {"hook": "release", "hatch": "open", "pump": "on"},
+            {"hook": "release", "hatch": "closed", "pump": "on"},
+            {"hook": "release", "hatch": "closed", "pump": "off"},
+        ]
+        flight.tell_outcome("a delivery")
