@@ -51,7 +51,7 @@ def test_calls_that_take_long_are_no_fault_of_a_clock(monkeypatch: pytest.Monkey
 
     for module in (member, flight):
         monkeypatch.setattr(module, "host_time_ns", lambda: round(now[0] * NANOSECONDS))
-    monkeypatch.setattr(flight.ray, "wait", lambda waiting, timeout: (waiting[:1], timeout))
+    monkeypatch.setattr("ray.wait", lambda waiting, timeout: (waiting[:1], timeout))
     monkeypatch.setattr(flight, "ask", infos.get)
     monkeypatch.setattr(Flight, "_connect_all", lambda _: None)
     ready: list[str] = []
