@@ -449,16 +449,15 @@ class Mission:
         if self._awaits_plan(stop):
             self._to(MissionState.HOLDING, "waiting for a plan")
             return self._hover(state)
+        limits = self.limits
         diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
         if self._leg is None or self._leg.stop is not stop:
             self._navigator.queue.leave_place()
-            self._leg = Leg(
-                stop, self._now, self.limits.arrival_radius, self._options.stall_timeout
-            )
+            self._leg = Leg(stop, self._now, limits.arrival_radius, self._options.stall_timeout)
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        if self.photographer.attend(stop, self._now) and phase is LegPhase.DONE:
+        if self.photographer.attend(stop, state.odometry, self._now) and phase is LegPhase.DONE:
             phase = LegPhase.HOVERING
         place = self._route.towards(stop.waypoint.position, position, stop.above_ground)
         if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
@@ -469,7 +468,8 @@ class Mission:
         else:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         self._anchor = None
-        return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
+        place, heading = self.photographer.steer(place, state.odometry, self._now)
+        return Fly(self._leg.setpoint(place, position, limits.cruise_speed, heading), stop.cause)
 
     def _awaits_plan(self, stop: QueuedWaypoint) -> bool:
         """Whether to hold for the plan under way rather than set out for `stop`."""
