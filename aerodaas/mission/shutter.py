@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.mission.log import MissionLog
+from aerodaas.mission.log import MissionLog, words
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import VehicleError, failure_line
 from aerodaas.types.payload import Photo, PhotoCamera, PhotoOutcome
@@ -47,8 +47,8 @@ class Shutter:
         """By number."""
         self._triggered: set[int] = set()
         """Numbers of pictures that no waypoint waits for."""
-        self._told: set[tuple[str, str]] = set()
-        """Waypoint and reason of what was told of pictures on the way."""
+        self._told: set[str] = set()
+        """Reasons that were told of pictures on the way."""
 
     @property
     def camera(self) -> PhotoCamera | None:
@@ -123,9 +123,9 @@ class Shutter:
             self._miss(request.label, 1, reason, now)
 
     def _miss(self, label: str, count: int, reason: str, now: int) -> None:
-        """Count pictures on the way that are not taken; each reason is told once a waypoint."""
+        """Count pictures on the way that are not taken; each reason is told once."""
         self.lost += count
-        if (label, reason) not in self._told:
-            self._told.add((label, reason))
+        if (subject := words(reason)) not in self._told:
+            self._told.add(subject)
             text = f"on the way to {label}: a picture is missed, and more are counted: {reason}"
             self._log.alert(now, "photo", text)

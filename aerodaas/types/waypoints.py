@@ -17,6 +17,7 @@ from aerodaas.types.records import fast_pickle, shared_pickle
 
 __all__ = [
     "DEFAULT_PRIORITY",
+    "LEAST_TRIGGER",
     "HeightDatum",
     "HeightReference",
     "NavigationItem",
@@ -87,7 +88,7 @@ class SchedulingType(str, enum.Enum):
 
 _HALF_TURN = 3.1416
 """Radians: pi, and the rounding of who writes it by hand."""
-_LEAST_TRIGGER = 0.1
+LEAST_TRIGGER = 0.1
 """Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
@@ -187,8 +188,8 @@ class Waypoint:
             raise InvalidWaypointError(message)
         for name in ("trigger_distance", "trigger_interval"):
             value = getattr(self, name)
-            if value is not None and value < _LEAST_TRIGGER:
-                message = f"{owner}: {name} must be at least {_LEAST_TRIGGER}, not {value}"
+            if value is not None and value < LEAST_TRIGGER:
+                message = f"{owner}: {name} must be at least {LEAST_TRIGGER}, not {value}"
                 raise InvalidWaypointError(message)
         if self.trigger_distance is not None and self.trigger_interval is not None:
             message = f"{owner}: give it trigger_distance or trigger_interval, not both"

@@ -1,8 +1,9 @@
-"""Pictures on the way: where and when they are due, and what becomes of those that are not taken."""
+"""Pictures on the way: where and when they are due, and what becomes of those that are lost."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -174,10 +175,8 @@ def test_a_busy_camera_misses_pictures_and_says_so_once() -> None:
     assert taken + missed == 5
     assert missed >= 2
     busy = [text for text in lost(made) if "line" in text]
-    assert busy == [
-        "on the way to line: a picture is missed, and more are counted: the camera was still busy "
-        "with the one before"
-    ]
+    assert len(busy) == 1
+    assert busy[0].endswith("more are counted: the camera was still busy with the one before")
     assert made.status.visited[-1] == "line"
 
 
@@ -223,7 +222,7 @@ def test_pictures_by_time_go_on_during_the_stay() -> None:
     assert missed == 0
     assert 8 <= taken <= 12
     stamps = [photo.stamp for photo in made.mission.photographer.photos]
-    assert all(b - a == NANOSECONDS for a, b in zip(stamps, stamps[1:], strict=False))
+    assert all(b - a == NANOSECONDS for a, b in pairwise(stamps))
 
 
 def test_an_interrupted_line_is_gone_on_with() -> None:
@@ -239,9 +238,7 @@ def test_an_interrupted_line_is_gone_on_with() -> None:
     assert taken >= 4
 
 
-def simulated(
-    *waypoints: Waypoint, noise: float, wind: float
-) -> tuple[Mission, SimulatedVehicle]:
+def simulated(*waypoints: Waypoint, noise: float, wind: float) -> tuple[Mission, SimulatedVehicle]:
     """A flight of the simulated drone, in its own time."""
     sensor = {"id": "cam", "type": "camera", "rate": 2, "settings": {"gimbal": {}}}
     limits = LimitsConfig(max_speed=8, cruise_speed=5)
