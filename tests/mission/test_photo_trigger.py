@@ -10,17 +10,10 @@ import pytest
 from flights import Flight, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
-from test_photographer import Surveyor, lost
+from surveyors import Surveyor, lost, simulated
 
-from aerodaas.config.model import EnvironmentConfig, LimitsConfig, MissionConfig, RobotConfig
-from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.mission.commands import AddNavigation, Start
-from aerodaas.mission.loop import SetpointLoop
-from aerodaas.mission.mission import Mission
+from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.mission.photo_trigger import PhotoTrigger
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector
@@ -238,36 +231,13 @@ def test_an_interrupted_line_is_gone_on_with() -> None:
     assert taken >= 4
 
 
-def simulated(*waypoints: Waypoint, noise: float, wind: float) -> tuple[Mission, SimulatedVehicle]:
-    """A flight of the simulated drone, in its own time."""
-    sensor = {"id": "cam", "type": "camera", "rate": 2, "settings": {"gimbal": {}}}
-    limits = LimitsConfig(max_speed=8, cruise_speed=5)
-    robot = RobotConfig.model_validate({"id": "drone", "sensors": [sensor], "limits": limits})
-    world = {"sensor_noise": noise, "wind": (wind, wind, 0.0), "gust": wind / 3}
-    environment = EnvironmentConfig.model_validate({"robots": [robot], "simulation": world})
-    vehicle = SimulatedVehicle(robot, environment)
-    vehicle.connect()
-    planner = InlinePlanner(OrderedScheduler())
-    place = vehicle.read().odometry.position
-    mission = Mission(robot, planner, takeoff=place, payload=vehicle)
-    loop = SetpointLoop(vehicle, mission)
-    mission.handle(AddNavigation(AeroNavigation(data=waypoints)), 0)
-    mission.handle(Start(), 0)
-    now = 0
-    while not mission.finished and now < 300 * NANOSECONDS:
-        loop.turn(now)
-        now += TURN
-        vehicle.advance_to(now)
-    return mission, vehicle
-
-
 @pytest.mark.parametrize("speed", [2.0, 5.0])
 @pytest.mark.parametrize(("noise", "wind"), [(0.0, 0.0), (1.0, 3.0)])
 def test_pictures_of_a_survey_lie_within_half_a_metre(
     speed: float, noise: float, wind: float
 ) -> None:
     """By the simulator's truth, at both ends of the lines, too, in wind and with noisy sensors."""
-    mission, _ = simulated(
+    mission = simulated(
         Waypoint("a", 0, 0, 10, speed=speed),
         Waypoint("b", 40, 0, 10, speed=speed, trigger_distance=5.0),
         Waypoint("c", 40, 10, 10, speed=speed),

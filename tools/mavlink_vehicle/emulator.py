@@ -196,6 +196,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             self._acknowledge(message, firmware.obey(message.command, values, message.frame))
         elif kind == "SET_POSITION_TARGET_LOCAL_NED":
             firmware.setpoint(message)
+        elif kind == "GIMBAL_MANAGER_SET_PITCHYAW":
+            firmware.payload.track(message)
         elif kind in _STORED:
             for answer in _STORED[kind](firmware).handle(message):
                 self._say(answer)

@@ -18,6 +18,10 @@ _RATE = math.radians(60.0)
 """rad/s at which it turns."""
 _DEVICE = 1
 _LOWEST, _HIGHEST, _WIDEST = math.radians(-90.0), math.radians(20.0), math.radians(170.0)
+_AXES = (
+    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
+)
+_YAW_AXIS = mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
 _SHUTTER = 0.3
 """Seconds from a request to the word of its picture."""
 
@@ -32,6 +36,10 @@ class EmulatedPayload:
         self.gimbal_refuses = self.camera_refuses = False
         self.stuck = False
         """It acknowledges and does not turn."""
+        self.turns = True
+        """It has a yaw axis."""
+        self.tracked = 0
+        """Targets that came without a command."""
         self.nonsense = False
         """Its attitude is not a number."""
         self.blind = False
@@ -55,11 +63,7 @@ class EmulatedPayload:
         if number == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW and self.has_gimbal:
             if self.gimbal_refuses or self.controller is None:
                 return mavlink.MAV_RESULT_DENIED
-            pitch, right = (math.radians(value) for value in values[:2])
-            self._wanted = (
-                min(max(pitch, _LOWEST), _HIGHEST),
-                min(max(right, -_WIDEST), _WIDEST),
-            )
+            self._turn_to(*(math.radians(value) for value in values[:2]))
             return _OK
         if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE and self.has_camera:
             if self.camera_refuses:
@@ -68,6 +72,16 @@ class EmulatedPayload:
                 self._due.append(self._firmware.now + _SHUTTER)
             return _OK
         return None
+
+    def track(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Turn as a GIMBAL_MANAGER_SET_PITCHYAW says, which nothing answers."""
+        if self.has_gimbal and not self.gimbal_refuses and self.controller is not None:
+            self.tracked += 1
+            self._turn_to(message.pitch, message.yaw)
+
+    def _turn_to(self, pitch: float, right: float) -> None:
+        widest = _WIDEST if self.turns else 0.0
+        self._wanted = min(max(pitch, _LOWEST), _HIGHEST), min(max(right, -widest), widest)
 
     def advance(self) -> None:
         """Let time pass until the firmware's."""
@@ -107,8 +121,9 @@ class EmulatedPayload:
         """Its message of that number; None if it has none."""
         stamp = round(self._firmware.now * 1e3)
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION and self.has_gimbal:
-            ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -_WIDEST, _WIDEST)
-            return mavlink.MAVLink_gimbal_manager_information_message(stamp, 0, _DEVICE, *ranges)
+            widest, able = (_WIDEST, _AXES | _YAW_AXIS) if self.turns else (0.0, _AXES)
+            ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -widest, widest)
+            return mavlink.MAVLink_gimbal_manager_information_message(stamp, able, _DEVICE, *ranges)
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS and self.has_gimbal:
             flags = mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
             unknown = (math.nan, math.nan, math.nan)

@@ -342,3 +342,36 @@ def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, faul
         assert list(mission.status.visited) == ["a", "b"]
         assert mission.status.photos == (1, 1)
         assert any(text.startswith("b: no picture: ") for text in told(mission))
+
+
+def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:
+    """Targets that follow one another go as messages, with a command now and then."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        for step in range(60):
+            gimbal.aim(GimbalTarget(-0.5 - step / 200, step / 100))
+            ends.advance(0.1)
+        ends.watch(0.5)
+        theirs = carried(ends)
+        commands = [
+            message
+            for _, message in ends.autopilot.heard
+            if message.get_type() == "COMMAND_LONG"
+            and message.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+        ]
+        assert theirs.tracked > 50
+        assert 2 <= len(commands) <= 6
+        assert theirs.pitch == pytest.approx(-0.795, abs=0.01)
+        assert theirs.right == pytest.approx(-0.59, abs=0.01)
+
+
+def test_a_gimbal_without_a_yaw_axis_says_so(ends: Stepped) -> None:
+    """By its manager's capabilities; a target comes back with the yaw that it keeps."""
+    with ends:
+        carried(ends).turns = False
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        assert gimbal.aim(GimbalTarget(-0.5, 0.7)) == GimbalTarget(-0.5, 0.0)

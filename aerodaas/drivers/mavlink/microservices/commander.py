@@ -114,6 +114,10 @@ class Commander:
                 CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
             )
 
+    def send(self, make: Callable[[int, int], Any]) -> None:
+        """Send what `make` makes for the target's system and component; nothing answers it."""
+        self._send(make(*self._target))
+
     def withdraw(self, number: int) -> None:
         """Withdraw the command of this `number`; its `done` is not called."""
         with self._lock:
