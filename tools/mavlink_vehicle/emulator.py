@@ -16,6 +16,7 @@ from aerodaas.testing.channel import Channel, Impairment
 from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
 from aerodaas.types.geometry import Vector
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
+from tools.mavlink_vehicle.components import EmulatedComponent
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
@@ -72,6 +73,11 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         self._mav.robust_parsing = True
         if self.options.key is not None:
             sign_with(self._mav, self.options.key)
+        self.components = {
+            number: EmulatedComponent(self.firmware, number, self._say_as)
+            for number in self.options.components
+        }
+        """Cameras and gimbals with ids of their own."""
         seed = self.options.seed
         self._up = Channel(self.options.uplink, f"{seed}/up", self._hear)
         self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
@@ -160,6 +166,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             steps = int((now - self._flown_to) / STEP + _ROUNDING)
             self._flown_to += steps * STEP
             self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
+            for component in self.components.values():
+                component.turn(now)
             self._report(now)
             self._down.turn(now)
 
@@ -187,7 +195,10 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         firmware = self.firmware
         if getattr(message, "target_system", 0) not in {0, self.options.system}:
             return
-        if kind == "COMMAND_LONG":
+        component = self.components.get(getattr(message, "target_component", 0))
+        if component is not None:
+            component.hear(message)
+        elif kind == "COMMAND_LONG":
             values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
             self._acknowledge(message, firmware.obey(message.command, values, None))
         elif kind == "COMMAND_INT":
@@ -222,6 +233,10 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
                 self._say(message)
 
     def _say(self, message: Any) -> None:  # noqa: ANN401
+        self._say_as(message, 1)
+
+    def _say_as(self, message: Any, component: int) -> None:  # noqa: ANN401
+        self._mav.srcComponent = component
         packet = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         for peer in self._peers:

@@ -93,7 +93,7 @@ class Firmware(ABC):
         self._drifted = np.zeros(3)
         self._say = say
         self._extras = Extras(self)
-        self.payload = EmulatedPayload(self, say)
+        self.payload = EmulatedPayload(self, say, gimbal=options.gimbal, camera=options.camera)
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False

@@ -44,6 +44,8 @@ class AutopilotOptions:
     """Whether it carries a gimbal, and is its manager."""
     camera: bool = False
     """Whether it carries a camera."""
+    components: tuple[int, ...] = ()
+    """Ids of cameras (100 to 105) and gimbals (154, 171 to 175) that speak MAVLink themselves."""
     uplink: Impairment = field(default_factory=Impairment)
     """On the way to the vehicle."""
     downlink: Impairment = field(default_factory=Impairment)

@@ -29,10 +29,17 @@ _SHUTTER = 0.3
 class EmulatedPayload:
     """Gimbal and camera of one vehicle; its attributes are what goes wrong with them."""
 
-    def __init__(self, firmware: Firmware, say: Callable[[Any], None]) -> None:
-        """Carry what the firmware's options say; `say` sends a message."""
-        options = firmware.options
-        self.has_gimbal, self.has_camera = options.gimbal, options.camera
+    def __init__(
+        self, firmware: Firmware, say: Callable[[Any], None], *, gimbal: bool, camera: bool
+    ) -> None:
+        """Carry a gimbal, a camera, or both; `say` sends a message."""
+        self.has_gimbal, self.has_camera = gimbal, camera
+        self.device = _DEVICE
+        """Id of the gimbal's device."""
+        self.flags = 0
+        """CAMERA_CAP_FLAGS that the camera tells."""
+        self.by_itself = False
+        """The camera tells of its pictures by CAMERA_IMAGE_CAPTURED, whatever the autopilot is."""
         self.gimbal_refuses = self.camera_refuses = False
         self.stuck = False
         """It acknowledges and does not turn."""
@@ -101,7 +108,7 @@ class EmulatedPayload:
         lat, lon, _ = flight.origin.to_geodetic(flight.believed.position)
         stamp, place = round(self._firmware.now * 1e3), (round(lat * 1e7), round(lon * 1e7))
         index = len(self.taken)
-        if self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
+        if self.by_itself or self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
             name = f"DCIM/{index:04d}.JPG".encode()
             height = (round(flight.altitude * 1e3), 0)
             self._say(
@@ -123,7 +130,9 @@ class EmulatedPayload:
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION and self.has_gimbal:
             widest, able = (_WIDEST, _AXES | _YAW_AXIS) if self.turns else (0.0, _AXES)
             ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -widest, widest)
-            return mavlink.MAVLink_gimbal_manager_information_message(stamp, able, _DEVICE, *ranges)
+            return mavlink.MAVLink_gimbal_manager_information_message(
+                stamp, able, self.device, *ranges
+            )
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS and self.has_gimbal:
             flags = mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
             unknown = (math.nan, math.nan, math.nan)
@@ -133,7 +142,7 @@ class EmulatedPayload:
         if number == mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION and self.has_camera:
             name = list(b"emulated".ljust(32, b"\0"))
             return mavlink.MAVLink_camera_information_message(
-                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, 0, 0, b""
+                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, self.flags, 0, b""
             )
         return None
 

@@ -133,6 +133,7 @@ class MavlinkVehicle:
             self._settings,
             on_message=self._take,
             on_turn=self._turned,
+            on_component=self._payload.take_component,
             healthy=self._watchdog.healthy,
             stands=self._stands,
         )
