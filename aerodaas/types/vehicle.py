@@ -128,6 +128,9 @@ class VehicleState:
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
     gimbal: GimbalAttitude | None = None
     """Where its gimbal looks; None without one, and where it does not say."""
+    video: str = field(default="", repr=False)
+    """Address of its camera's video, as it says; it may hold a password, and is recorded nowhere.
+    Empty where it tells none that may be read."""
 
 
 @runtime_checkable

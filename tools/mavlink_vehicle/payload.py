@@ -38,6 +38,8 @@ class EmulatedPayload:
         """Id of the gimbal's device."""
         self.flags = 0
         """CAMERA_CAP_FLAGS that the camera tells."""
+        self.video = ""
+        """Address that the camera tells of its video."""
         self.by_itself = False
         """The camera tells of its pictures by CAMERA_IMAGE_CAPTURED, whatever the autopilot is."""
         self.gimbal_refuses = self.camera_refuses = False
@@ -139,12 +141,22 @@ class EmulatedPayload:
             return mavlink.MAVLink_gimbal_device_attitude_status_message(
                 0, 0, stamp, flags, self._quaternion(), *unknown, 0
             )
+        if number == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION and self.video:
+            return mavlink.MAVLink_video_stream_information_message(
+                1, 1, 0, 1, 30.0, 1920, 1080, 4_000_000, 0, 80, b"main", self.video.encode()
+            )
         if number == mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION and self.has_camera:
             name = list(b"emulated".ljust(32, b"\0"))
             return mavlink.MAVLink_camera_information_message(
-                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, self.flags, 0, b""
+                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, self._told_flags, 0, b""
             )
         return None
+
+    @property
+    def _told_flags(self) -> int:
+        films: int = mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if self.video else 0
+        takes: int = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE if films else 0
+        return self.flags | films | takes
 
     def _quaternion(self) -> list[float]:
         if self.nonsense:

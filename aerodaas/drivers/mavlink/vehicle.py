@@ -98,7 +98,8 @@ class MavlinkVehicle:
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
-        self._payload = Payload(self._clock, self._lock)
+        self.payload = Payload(self._clock, self._lock)
+        """Gimbals and cameras that it carries."""
         self._climb_place: Vector | None = None
         self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
@@ -117,7 +118,7 @@ class MavlinkVehicle:
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
-        self._clock = self._payload.clock = clock
+        self._clock = self.payload.clock = clock
         self._watchdog.belong()
 
     def connect(self, timeout: float = 10.0) -> None:
@@ -133,7 +134,7 @@ class MavlinkVehicle:
             self._settings,
             on_message=self._take,
             on_turn=self._turned,
-            on_component=self._payload.take_component,
+            on_component=self.payload.take_component,
             healthy=self._watchdog.healthy,
             stands=self._stands,
         )
@@ -173,7 +174,7 @@ class MavlinkVehicle:
             )
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
-            self._payload.search(commander)
+            self.payload.search(commander)
         except BaseException:
             self.close()
             raise
@@ -235,17 +236,17 @@ class MavlinkVehicle:
         with self._lock:
             link, now = self._connected().link, time.monotonic()
             state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
-            return self._payload.complete(state)
+            return self.payload.complete(state)
 
     @property
     def gimbal(self) -> Gimbal | None:
         """The gimbal that it carries, once it is found."""
-        return self._payload.gimbal
+        return self.payload.gimbal
 
     @property
     def photo_camera(self) -> PhotoCamera | None:
         """The camera that it carries, once it is found."""
-        return self._payload.camera
+        return self.payload.camera
 
     @property
     def sea_level(self) -> float | None:
@@ -469,7 +470,7 @@ class MavlinkVehicle:
             elif kind == "HEARTBEAT":
                 self._observe(now)
             elif kind in Payload.messages:
-                self._payload.take(message, now)
+                self.payload.take(message, now)
             else:
                 self._moved(kind, now)
 
@@ -520,7 +521,7 @@ class MavlinkVehicle:
             self._commander.turn(now)
             self._rates.turn(self._telemetry, now)
             self._touchdown.turn(now)
-            self._payload.turn(now)
+            self.payload.turn(now)
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)

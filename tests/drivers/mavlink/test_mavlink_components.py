@@ -219,3 +219,40 @@ def test_strangers_are_no_components(
             message.get_type() == "COMMAND_LONG" and message.target_component == CAMERA
             for _, message in ends.autopilot.heard
         )
+
+
+@pytest.mark.parametrize("component", [1, CAMERA])
+def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, component: int) -> None:
+    """The autopilot's camera or one with an id of its own; people do not see its password."""
+    own = () if component == 1 else (component,)
+    options = AutopilotOptions(components=own, camera=component == 1)
+    with Stepped(monkeypatch, options) as ends:
+        autopilot = ends.autopilot
+        payload = (
+            autopilot.firmware.payload if component == 1 else autopilot.components[CAMERA].payload
+        )
+        payload.video = "rtsp://me:secret@10.0.0.9:8554/main"
+        ends.watch(8.0)
+        state = ends.vehicle.read()
+        assert state.video == "rtsp://me:secret@10.0.0.9:8554/main"
+        assert "secret" not in repr(state)
+        ((name, stream),) = ends.vehicle.payload.streams()
+        assert str(stream) == "rtsp://10.0.0.9:8554/main (main), 1920x1080, 30/s"
+        assert name == ("the autopilot's" if component == 1 else "camera (component 100)")
+        take(ends)
+        assert isinstance(outcome(ends), Photo)
+        payload.video = "rtsp://10.6.6.6/other"
+        ends.watch(8.0)
+        assert ends.vehicle.read().video == state.video
+
+
+def test_an_address_that_leads_elsewhere_is_shown_and_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A file of this machine is none of the vehicle's."""
+    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
+        ends.autopilot.components[CAMERA].payload.video = "file:///etc/passwd"
+        ends.watch(6.0)
+        assert ends.vehicle.read().video == ""
+        ((_, stream),) = ends.vehicle.payload.streams()
+        assert "only rtsp, rtsps, tcp, udp are, not 'file'" in str(stream)

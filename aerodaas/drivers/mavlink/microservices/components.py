@@ -17,12 +17,17 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 )
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
+from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.mavlink.wire.senders import CAMERAS
 
 __all__ = ["PayloadComponent"]
 
+_CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
+_VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+_MOST_STREAMS = 8
+"""Streams of one camera that are remembered."""
 _PAUSE = 2.0
 """Seconds between two requests for the same message."""
 _REQUESTS = 5
@@ -67,12 +72,15 @@ class PayloadComponent:
         self.number = number
         self.gimbal: MavlinkGimbal | None = None
         self.camera: MavlinkCamera | None = None
+        self.streams: dict[int, VideoStream] = {}
+        """Of its video, by number; the first word of each counts."""
         self.commander = commander
         self._moment = moment
         self._count = count
         self._own = own
         self._heard_at: float | None = None
         self._asked_at = -math.inf
+        self._informed = False
         self._begin()
 
     def _begin(self) -> None:
@@ -118,14 +126,34 @@ class PayloadComponent:
         if kind == "COMMAND_ACK":
             if self._own:
                 self.commander.take(message, now)
-        elif kind == "GIMBAL_MANAGER_INFORMATION":
-            if self.gimbal is None:
-                self.gimbal = MavlinkGimbal(message, self.commander)
+        elif kind in {"CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"}:
+            if self.camera is not None:
+                self.camera.take(message)
+        else:
+            self._learn(message, kind)
+
+    def _learn(self, message: Message, kind: str) -> None:
+        """Take in what was searched for."""
+        if kind == "GIMBAL_MANAGER_INFORMATION":
+            self.gimbal = self.gimbal or MavlinkGimbal(message, self.commander)
         elif kind == "CAMERA_INFORMATION":
-            if self.camera is None and _takes_pictures(message):
-                self.camera = MavlinkCamera(self.commander, self._moment, self._count)
-        elif kind in {"CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"} and self.camera is not None:
-            self.camera.take(message)
+            self._inform(message)
+        elif kind == "VIDEO_STREAM_INFORMATION" and len(self.streams) < _MOST_STREAMS:
+            self.streams.setdefault(int(message.stream_id), video_stream(message))
+
+    def _inform(self, information: Message) -> None:
+        self._informed = True
+        if self.camera is None and _takes_pictures(information):
+            self.camera = MavlinkCamera(self.commander, self._moment, self._count)
+        films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        if films and all(search.message != _VIDEO for search in self._searches):
+            self._searches.append(_Search(_VIDEO))
+
+    def _knows(self, message: int) -> bool:
+        """Whether what a search is for has been found."""
+        if message == _VIDEO:
+            return bool(self.streams)
+        return self._informed if message == _CAMERA else self.gimbal is not None
 
     def turn(self, now: float) -> None:
         """Repeat commands, search on, and give up what does not come."""
@@ -139,8 +167,7 @@ class PayloadComponent:
             self.camera.turn(now)
         busy = self.commander.under_way(mavlink.MAV_CMD_REQUEST_MESSAGE) is not None
         for search in self._searches:
-            found = self.camera if search.message == _CAMERA else self.gimbal
-            if found is None and search.left and now >= search.due and not busy:
+            if not self._knows(search.message) and search.left and now >= search.due and not busy:
                 self._request(search, now)
                 return
 
@@ -186,9 +213,6 @@ class PayloadComponent:
             ),
             now=now,
         )
-
-
-_CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 
 
 def _takes_pictures(information: Message) -> bool:

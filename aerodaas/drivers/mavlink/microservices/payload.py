@@ -18,6 +18,7 @@ from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
+from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.clock import Clock
 from aerodaas.types.data import Odometry
@@ -46,6 +47,7 @@ class Payload:
         {
             *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
             *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
+            "VIDEO_STREAM_INFORMATION",
         }
     )
     """What `take` processes."""
@@ -114,10 +116,22 @@ class Payload:
         gone = tuple(
             f"{one.name}: no word from it any more" for one in self._own.values() if one.gone(now)
         )
-        attitude = self._attitude()
-        if attitude is None and not gone:
+        attitude, video = self._attitude(), self._video()
+        if attitude is None and not gone and not video:
             return state
-        return replace(state, gimbal=attitude, faults=(*state.faults, *gone))
+        return replace(state, gimbal=attitude, faults=(*state.faults, *gone), video=video)
+
+    def streams(self) -> list[tuple[str, VideoStream]]:
+        """Video that its cameras tell of, with the camera's name, the preferred one first."""
+        with self._lock:
+            return [
+                (one.name, one.streams[number])
+                for one in self._ranked()
+                for number in sorted(one.streams)
+            ]
+
+    def _video(self) -> str:
+        return next((stream.uri for _, stream in self.streams() if not stream.objection), "")
 
     def _attitude(self) -> GimbalAttitude | None:
         """The newest word of the gimbal that is used, or was last."""
