@@ -53,7 +53,7 @@ class SensorActor(StreamActor):
         if most is not None:
             limit_memory(most)
         self._camera.open()
-        self._told = self._camera if isinstance(self._camera, ToldCamera) else None
+        self._told_camera = self._camera if isinstance(self._camera, ToldCamera) else None
         self._gimballed = self._camera if isinstance(self._camera, GimballedCamera) else None
         self._frames = self.publisher(self._stream)
         self._commands = self.publisher(end_stream(self._stream))
@@ -77,8 +77,8 @@ class SensorActor(StreamActor):
         self.follow(message.stamp)
         if isinstance(message.item, VehicleState):
             self._vehicle = message.item
-            if self._told is not None:
-                self._told.follow_video(message.item.video)
+            if self._told_camera is not None:
+                self._told_camera.follow_video(message.item.video)
 
     def _capture(self, stamp: int) -> None:
         vehicle = self._vehicle

@@ -88,13 +88,11 @@ class PhotoTrigger:
 
         At first that is the line itself: a drone that comes round a corner has slid beside it.
         """
-        if self.distance is None or self._length < _ROUNDING:
+        if self.distance is None or self._length < _ROUNDING or not _is_finite(odometry):
             return None
         along = self._way / self._length
         offset = odometry.position - self._start
         progress = float(np.dot(offset, along))
-        if not math.isfinite(progress):
-            return None
         if not self._aligned:
             across = odometry.velocity - along * float(np.dot(odometry.velocity, along))
             slid = length(offset - along * max(progress, 0.0))
@@ -121,11 +119,11 @@ class PhotoTrigger:
             return 0
         if not self._aligned and arrived_at is None:
             return 0
-        progress = self._progress(odometry)
-        if arrived_at is not None:
-            late = now - arrived_at >= _SETTLING
-            progress = self._length if late else progress + _THERE
-        if not math.isfinite(progress):
+        if arrived_at is not None and now - arrived_at >= _SETTLING:
+            progress = self._length
+        elif _is_finite(odometry):
+            progress = self._progress(odometry) + (0.0 if arrived_at is None else _THERE)
+        else:
             return 0
         reached = min(progress, self._length) + _ROUNDING
         if reached < self._next:
@@ -149,3 +147,7 @@ class PhotoTrigger:
         count = max(0, (now - self._due_at) // period + 1)
         self._due_at += count * period
         return count
+
+
+def _is_finite(odometry: Odometry) -> bool:
+    return bool(np.isfinite(odometry.position).all() and np.isfinite(odometry.velocity).all())

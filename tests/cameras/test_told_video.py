@@ -24,7 +24,7 @@ from aerodaas.config.secrets import SecretUrl
 def film(tmp_path: Path) -> Path:
     """A short film on this machine."""
     path = tmp_path / "secret.ts"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 10, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 10, (64, 48))
     if not writer.isOpened():
         pytest.skip("OpenCV cannot write a film here")
     for shade in range(20):

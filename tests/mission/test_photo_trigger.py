@@ -55,7 +55,7 @@ def test_pictures_lie_where_they_were_asked_for(
 ) -> None:
     """Every `spacing` metres from the beginning of the leg, to half a turn's flight."""
     here, there = np.array(start), np.array(end)
-    trigger = PhotoTrigger(Waypoint("b", *end, trigger_distance=spacing), here, 0)
+    trigger = PhotoTrigger(Waypoint("b", end[0], end[1], end[2], trigger_distance=spacing), here, 0)
     found = flown_straight(trigger, here, there, speed)
     count = math.floor((float(np.linalg.norm(there - here)) + 1e-3) / spacing) + 1
     assert len(found) == count
@@ -72,7 +72,7 @@ def test_legs_of_one_distance_count_on(legs: list[float], spacing: float) -> Non
     before, total, reached = None, 0, 0.0
     for index, long in enumerate(legs):
         here, there = np.array([reached, 0.0, 9.0]), np.array([reached + long, 0.0, 9.0])
-        waypoint = Waypoint(f"w{index}", *there, trigger_distance=spacing)
+        waypoint = Waypoint(f"w{index}", reached + long, 0.0, 9.0, trigger_distance=spacing)
         before = PhotoTrigger(waypoint, here, 0, before)
         total += len(flown_straight(before, here, there, 2.0))
         reached += long
@@ -93,7 +93,11 @@ def test_another_distance_begins_anew() -> None:
     assert trigger.passed(still, 0, None) == same.passed(still, 0, None) == 1
 
 
-@given(st.lists(st.floats(), min_size=6, max_size=6), st.floats(0.1, 10), st.integers(0, 10**12))
+@given(
+    st.lists(st.floats(width=32), min_size=6, max_size=6),
+    st.floats(0.1, 10),
+    st.integers(0, 10**12),
+)
 def test_no_position_is_too_odd(numbers: list[float], spacing: float, now: int) -> None:
     """Whatever an estimator says, the count is one, and the place to fly to finite."""
     trigger = PhotoTrigger(Waypoint("b", 50, 0, 9, trigger_distance=spacing), np.zeros(3), 0)
@@ -195,8 +199,8 @@ def test_a_camera_at_fault_costs_its_pictures_and_not_the_flight(fault: str, tol
         camera.silent = True
     else:
 
-        def broken(_: str) -> int:
-            raise RuntimeError("a bug")
+        def broken(label: str) -> int:
+            raise RuntimeError(f"a bug at {label}")
 
         camera.take_photo = broken  # type: ignore[method-assign]
     made = surveyed(vehicle)

@@ -45,10 +45,10 @@ def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Ste
         gimbal.aim(GimbalTarget(-0.8, 0.5))
         ends.watch(3.0)
         theirs = ends.autopilot.components[GIMBAL].payload
-        assert (theirs.pitch, theirs.right) == (pytest.approx(-0.8), pytest.approx(-0.5))
+        assert (theirs.pitch, theirs.right) == pytest.approx((-0.8, -0.5))
         seen = ends.vehicle.read().gimbal
         assert seen is not None
-        assert (seen.pitch, seen.yaw) == (pytest.approx(-0.8), pytest.approx(0.5))
+        assert (seen.pitch, seen.yaw) == pytest.approx((-0.8, 0.5))
         take(ends)
         photo = outcome(ends)
         assert isinstance(photo, Photo)
