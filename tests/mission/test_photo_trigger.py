@@ -109,6 +109,15 @@ def test_no_position_is_too_odd(numbers: list[float], spacing: float, now: int) 
     assert 0 <= trigger.passed(seen, now, None) <= 50 / spacing + 2
 
 
+def test_legs_of_one_interval_count_on() -> None:
+    """No picture is taken twice where one leg ends and the next begins."""
+    still = Odometry(np.zeros(3), np.zeros(3), 0.0)
+    first = PhotoTrigger(Waypoint("a", 9, 0, 0, trigger_interval=2.0), np.zeros(3), 0)
+    assert first.passed(still, 0, None) == 1
+    second = PhotoTrigger(Waypoint("b", 18, 0, 0, trigger_interval=2.0), np.zeros(3), TURN, first)
+    assert second.passed(still, TURN, None) == 0
+
+
 def test_time_counts_from_the_first_and_not_while_elsewhere() -> None:
     """A drone that was called away owes no pictures for the time of its absence."""
     still = Odometry(np.zeros(3), np.zeros(3), 0.0)

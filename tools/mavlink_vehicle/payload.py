@@ -38,6 +38,8 @@ class EmulatedPayload:
         """Id of the gimbal's device."""
         self.flags = 0
         """CAMERA_CAP_FLAGS that the camera tells."""
+        self.free: float | None = None
+        """MiB left on the camera's card; None: it tells nothing of it."""
         self.video = ""
         """Address that the camera tells of its video."""
         self.by_itself = False
@@ -140,6 +142,11 @@ class EmulatedPayload:
             unknown = (math.nan, math.nan, math.nan)
             return mavlink.MAVLink_gimbal_device_attitude_status_message(
                 0, 0, stamp, flags, self._quaternion(), *unknown, 0
+            )
+        if number == mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION and self.free is not None:
+            ready = mavlink.STORAGE_STATUS_READY
+            return mavlink.MAVLink_storage_information_message(
+                stamp, 1, 1, ready, 32_000.0, 32_000.0 - self.free, self.free, 90.0, 60.0
             )
         if number == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION and self.video:
             return mavlink.MAVLink_video_stream_information_message(

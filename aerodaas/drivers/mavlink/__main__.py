@@ -71,6 +71,8 @@ def _tell(vehicle: MavlinkVehicle) -> None:
         typer.echo(f"at {place}, {gps.satellites} satellites")
     for camera, stream in vehicle.payload.streams():
         typer.echo(f"video of {camera}: {stream}")
+    for camera, card in vehicle.payload.cards():
+        typer.echo(f"card of {camera}: {card}")
     for reason in vehicle.preflight():
         typer.echo(f"would not take off: {reason}")
 

@@ -10,6 +10,7 @@ import pytest
 from payload_flights import fly, found, outcome, take, told
 from stepped import Stepped
 
+from aerodaas.drivers.mavlink.microservices.storage import card_state
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.mission import Mission
 from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
@@ -238,12 +239,47 @@ def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, comp
         assert "secret" not in repr(state)
         ((name, stream),) = ends.vehicle.payload.streams()
         assert str(stream) == "rtsp://10.0.0.9:8554/main (main), 1920x1080, 30/s"
-        assert name == ("the autopilot's" if component == 1 else "camera (component 100)")
+        assert name == ("the autopilot's camera" if component == 1 else "camera (component 100)")
         take(ends)
         assert isinstance(outcome(ends), Photo)
         payload.video = "rtsp://10.6.6.6/other"
         ends.watch(8.0)
         assert ends.vehicle.read().video == state.video
+
+
+def test_a_card_that_fills_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked again and again; its room is shown, and its end is a fault of the vehicle."""
+    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
+        payload = ends.autopilot.components[CAMERA].payload
+        payload.free = 12_000.0
+        ends.watch(6.0)
+        ((name, card),) = ends.vehicle.payload.cards()
+        assert (name, str(card)) == ("camera (component 100)", "12000 MiB free")
+        assert ends.vehicle.read().faults == ()
+        payload.free = 20.0
+        ends.watch(25.0)
+        assert ends.vehicle.read().faults == (
+            "camera (component 100): its card is full: 20 MiB are left",
+        )
+
+
+@pytest.mark.parametrize(
+    ("status", "free", "said"),
+    [
+        (2, 5000.0, "5000 MiB free"),
+        (2, math.nan, "room not told"),
+        (2, -1.0, "room not told"),
+        (2, 0.0, "0 MiB free; its card is full: 0 MiB are left"),
+        (0, 0.0, "room not told; it has no card"),
+        (1, 0.0, "room not told; its card is not formatted"),
+        (3, 0.0, "room not told"),
+        (99, 0.0, "room not told"),
+    ],
+)
+def test_what_a_camera_says_of_its_card(status: int, free: float, said: str) -> None:
+    """A status that is not known says nothing."""
+    told = mavlink.MAVLink_storage_information_message(0, 1, 1, status, 1e4, 0.0, free, 0, 0)
+    assert str(card_state(told)) == said
 
 
 def test_an_address_that_leads_elsewhere_is_shown_and_not_read(

@@ -17,6 +17,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 )
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
+from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
@@ -26,6 +27,9 @@ __all__ = ["PayloadComponent"]
 
 _CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+_STORAGE = mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION
+_CARD_AGAIN = 20.0
+"""Seconds after which a camera that tells of its card is asked again."""
 _MOST_STREAMS = 8
 """Streams of one camera that are remembered."""
 _PAUSE = 2.0
@@ -74,6 +78,9 @@ class PayloadComponent:
         self.camera: MavlinkCamera | None = None
         self.streams: dict[int, VideoStream] = {}
         """Of its video, by number; the first word of each counts."""
+        self.card: CardState | None = None
+        """What its camera said of its card; None before."""
+        self._card_at = -math.inf
         self.commander = commander
         self._moment = moment
         self._count = count
@@ -95,7 +102,7 @@ class PayloadComponent:
     def name(self) -> str:
         """What people are told of it."""
         if not self._own:
-            return "the autopilot's"
+            return "the autopilot's camera"
         return f"{'camera' if self.number in CAMERAS else 'gimbal'} (component {self.number})"
 
     def silent(self, now: float) -> float:
@@ -130,9 +137,9 @@ class PayloadComponent:
             if self.camera is not None:
                 self.camera.take(message)
         else:
-            self._learn(message, kind)
+            self._learn(message, kind, now)
 
-    def _learn(self, message: Message, kind: str) -> None:
+    def _learn(self, message: Message, kind: str, now: float) -> None:
         """Take in what was searched for."""
         if kind == "GIMBAL_MANAGER_INFORMATION":
             self.gimbal = self.gimbal or MavlinkGimbal(message, self.commander)
@@ -140,17 +147,25 @@ class PayloadComponent:
             self._inform(message)
         elif kind == "VIDEO_STREAM_INFORMATION" and len(self.streams) < _MOST_STREAMS:
             self.streams.setdefault(int(message.stream_id), video_stream(message))
+        elif kind == "STORAGE_INFORMATION":
+            self.card, self._card_at = card_state(message), now
+            for search in self._searches:
+                search.left = _REQUESTS if search.message == _STORAGE else search.left
 
     def _inform(self, information: Message) -> None:
         self._informed = True
         if self.camera is None and _takes_pictures(information):
             self.camera = MavlinkCamera(self.commander, self._moment, self._count)
+        if self.camera is not None and all(one.message != _STORAGE for one in self._searches):
+            self._searches.append(_Search(_STORAGE))
         films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
         if films and all(search.message != _VIDEO for search in self._searches):
             self._searches.append(_Search(_VIDEO))
 
-    def _knows(self, message: int) -> bool:
+    def _knows(self, message: int, now: float) -> bool:
         """Whether what a search is for has been found."""
+        if message == _STORAGE:
+            return now - self._card_at < _CARD_AGAIN
         if message == _VIDEO:
             return bool(self.streams)
         return self._informed if message == _CAMERA else self.gimbal is not None
@@ -167,7 +182,12 @@ class PayloadComponent:
             self.camera.turn(now)
         busy = self.commander.under_way(mavlink.MAV_CMD_REQUEST_MESSAGE) is not None
         for search in self._searches:
-            if not self._knows(search.message) and search.left and now >= search.due and not busy:
+            if (
+                not self._knows(search.message, now)
+                and search.left
+                and now >= search.due
+                and not busy
+            ):
                 self._request(search, now)
                 return
 

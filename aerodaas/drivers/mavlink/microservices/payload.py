@@ -18,6 +18,7 @@ from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
+from aerodaas.drivers.mavlink.microservices.storage import CardState
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.clock import Clock
@@ -47,7 +48,7 @@ class Payload:
         {
             *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
             *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
-            "VIDEO_STREAM_INFORMATION",
+            *("VIDEO_STREAM_INFORMATION", "STORAGE_INFORMATION"),
         }
     )
     """What `take` processes."""
@@ -110,16 +111,21 @@ class Payload:
         return [outcome for camera in cameras for outcome in camera.outcomes()]
 
     def complete(self, state: VehicleState) -> VehicleState:
-        """`state` with the gimbal's attitude and components that are gone; it is the newest now."""
+        """`state` with the gimbal's attitude and what is wrong; it is the newest from now on."""
         self._odometry = state.odometry
         now = time.monotonic()
-        gone = tuple(
+        faults = [
             f"{one.name}: no word from it any more" for one in self._own.values() if one.gone(now)
-        )
+        ]
+        faults += [
+            f"{one.name}: {one.card.trouble}"
+            for one in self._ranked()
+            if one.card is not None and one.card.trouble and not one.gone(now)
+        ]
         attitude, video = self._attitude(), self._video()
-        if attitude is None and not gone and not video:
+        if attitude is None and not faults and not video:
             return state
-        return replace(state, gimbal=attitude, faults=(*state.faults, *gone), video=video)
+        return replace(state, gimbal=attitude, faults=(*state.faults, *faults), video=video)
 
     def streams(self) -> list[tuple[str, VideoStream]]:
         """Video that its cameras tell of, with the camera's name, the preferred one first."""
@@ -129,6 +135,11 @@ class Payload:
                 for one in self._ranked()
                 for number in sorted(one.streams)
             ]
+
+    def cards(self) -> list[tuple[str, CardState]]:
+        """What its cameras say of their cards, with the camera's name, the preferred one first."""
+        with self._lock:
+            return [(one.name, one.card) for one in self._ranked() if one.card is not None]
 
     def _video(self) -> str:
         return next((stream.uri for _, stream in self.streams() if not stream.objection), "")
