@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from surveyors import Surveyor, lost, simulated
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
+from aerodaas.mission.shutter import Shutter
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector
@@ -107,6 +109,32 @@ def test_no_position_is_too_odd(numbers: list[float], spacing: float, now: int) 
     ahead = trigger.place_ahead(seen, now)
     assert ahead is None or np.isfinite(ahead).all()
     assert 0 <= trigger.passed(seen, now, None) <= 50 / spacing + 2
+
+
+def test_no_picture_is_taken_beside_the_line() -> None:
+    """A drone that has slid round a corner comes back first, but not for ever."""
+    trigger = PhotoTrigger(Waypoint("b", 50, 0, 9, trigger_distance=5.0), np.array([0, 0, 9.0]), 0)
+    beside = Odometry(np.array([1.0, 2.0, 9.0]), np.zeros(3), 0.0)
+    back = trigger.place_ahead(beside, 0)
+    assert back is not None
+    assert tuple(back) == (1.0, 0.0, 9.0)
+    assert trigger.passed(beside, 0, None) == 0
+    ahead = trigger.place_ahead(beside, 5 * NANOSECONDS)
+    assert ahead is not None
+    assert tuple(ahead) == (9.0, 0.0, 9.0)
+    assert trigger.passed(beside, 5 * NANOSECONDS, None) == 1
+
+
+def test_places_that_were_passed_unseen_are_counted() -> None:
+    """One picture is taken, of the newest; the others are lost and told."""
+    log = MissionLog("drone/mission")
+    shutter = Shutter(Surveyor(), log, 4.0)
+    shutter.trigger("line", 3, 0)
+    shutter.look(0)
+    assert (len(shutter.photos), shutter.lost) == (1, 2)
+    (alert,) = log.alerts
+    assert alert.text.startswith("on the way to line: a picture is missed")
+    assert alert.text.endswith("their places were passed before the camera was asked")
 
 
 def test_legs_of_one_interval_count_on() -> None:
