@@ -188,24 +188,34 @@ def test_the_drone_does_not_stop_for_pictures_on_the_way() -> None:
     assert not lost(made)
 
 
-def test_a_busy_camera_misses_pictures_and_says_so_once() -> None:
-    """They are counted, and the drone flies on; the camera's own time-out frees it again."""
-
-    class Slow(Surveyor):
-        """A camera that tells of its pictures after four seconds."""
-
-    vehicle = Slow()
+def slow(duration: float) -> Surveyor:
+    """A vehicle whose camera tells of its pictures after so many seconds."""
+    vehicle = Surveyor()
     assert vehicle.photo_camera is not None
     ready = vehicle.photo_camera.outcomes
     held: list[Photo] = []
 
     def late() -> list[Photo]:
         held.extend(ready())  # type: ignore[arg-type]
-        due = [one for one in held if vehicle.clock.now - one.stamp >= 4 * NANOSECONDS]
+        due = [one for one in held if vehicle.clock.now - one.stamp >= duration * NANOSECONDS]
         held[:] = [one for one in held if one not in due]
         return due
 
     vehicle.photo_camera.outcomes = late  # type: ignore[method-assign,assignment]
+    return vehicle
+
+
+def test_at_its_end_the_drone_waits_for_a_busy_camera() -> None:
+    """There it has the time: both pictures of a short line are taken."""
+    line = (LINE[0], Waypoint("line", 3, 0, 3, speed=2, trigger_distance=3.0))
+    made = surveyed(slow(5.0), *line, timeout=9.0)
+    assert made.status.photos == (2, 0)
+
+
+def test_a_busy_camera_misses_pictures_and_says_so_once() -> None:
+    """They are counted, and the drone flies on; the camera's own time-out frees it again."""
+
+    vehicle = slow(4.0)
     made = surveyed(vehicle, timeout=9.0)
     taken, missed = made.status.photos
     assert taken + missed == 5
