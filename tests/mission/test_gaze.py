@@ -163,6 +163,19 @@ def test_a_waypoints_own_yaw_is_kept() -> None:
     assert wrap_angle(vehicle.yaw + photo.gimbal.yaw - math.pi / 2) == pytest.approx(0, abs=0.1)
 
 
+def test_a_waypoints_own_yaw_is_kept_by_a_gimbal_that_cannot_turn() -> None:
+    """It looks up and down as it should, which is all that can be waited for."""
+    vehicle = Surveyor()
+    vehicle.gimbal = Tilting(vehicle.clock)
+    assert vehicle.photo_camera is not None
+    vehicle.photo_camera.gimbal = vehicle.gimbal
+    asked = Waypoint("south", 0, -8, 6, yaw=0.2, look_at=(0.0, 0.0, 0.0), photo=True)
+    made = flight(add(asked), vehicle=vehicle)
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert made.status.photos == (1, 0)
+
+
 def test_a_gimbal_that_raises_ends_no_flight() -> None:
     """It is told, and the waypoints are visited."""
 

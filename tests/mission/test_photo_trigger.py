@@ -212,9 +212,26 @@ def test_at_its_end_the_drone_waits_for_a_busy_camera() -> None:
     assert made.status.photos == (2, 0)
 
 
+def test_a_waypoints_own_picture_waits_for_the_one_before() -> None:
+    """A camera is asked for one at a time: drivers give up the first for the second."""
+    vehicle = slow(3.0)
+    camera = vehicle.photo_camera
+    assert camera is not None
+    take, asked = camera.take_photo, list[int]()
+
+    def noted(label: str) -> int:
+        asked.append(vehicle.clock.now)
+        return take(label)
+
+    camera.take_photo = noted  # type: ignore[method-assign]
+    line = (LINE[0], Waypoint("line", 3, 0, 3, speed=2, trigger_distance=3.0, photo=True))
+    made = surveyed(vehicle, *line, timeout=15.0)
+    assert made.status.photos == (3, 0)
+    assert all(b - a >= 3 * NANOSECONDS for a, b in pairwise(asked))
+
+
 def test_a_busy_camera_misses_pictures_and_says_so_once() -> None:
     """They are counted, and the drone flies on; the camera's own time-out frees it again."""
-
     vehicle = slow(4.0)
     made = surveyed(vehicle, timeout=9.0)
     taken, missed = made.status.photos
