@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from surveyors import Gimbal, Surveyor, lost, simulated
 
+from aerodaas.config.model import MissionConfig
 from aerodaas.mission.gaze import Gaze, direction_to
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
@@ -174,6 +175,19 @@ def test_a_waypoints_own_yaw_is_kept_by_a_gimbal_that_cannot_turn() -> None:
     made.run()
     made.expect(MissionState.LANDED)
     assert made.status.photos == (1, 0)
+
+
+def test_a_picture_waits_until_the_gimbal_looks_there() -> None:
+    """One that does not come costs the picture, and is told."""
+    vehicle = Surveyor()
+    assert vehicle.gimbal is not None
+    vehicle.gimbal.stuck = True
+    asked = Waypoint("south", 0, -8, 6, look_at=(0.0, 0.0, 0.0), photo=True)
+    made = flight(add(asked), vehicle=vehicle, options=MissionConfig(photo_timeout=2.0))
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert made.status.photos == (0, 1)
+    assert any("the gimbal was not there" in text for text in lost(made))
 
 
 def test_a_gimbal_that_raises_ends_no_flight() -> None:
