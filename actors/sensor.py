@@ -7,7 +7,7 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.stream_names import end_stream
-from aerodaas.cameras.base import Camera, GimballedCamera, Picture, most_memory
+from aerodaas.cameras.base import Camera, GimballedCamera, Picture, ToldCamera, most_memory
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
@@ -53,6 +53,7 @@ class SensorActor(StreamActor):
         if most is not None:
             limit_memory(most)
         self._camera.open()
+        self._told_camera = self._camera if isinstance(self._camera, ToldCamera) else None
         self._gimballed = self._camera if isinstance(self._camera, GimballedCamera) else None
         self._frames = self.publisher(self._stream)
         self._commands = self.publisher(end_stream(self._stream))
@@ -76,6 +77,8 @@ class SensorActor(StreamActor):
         self.follow(message.stamp)
         if isinstance(message.item, VehicleState):
             self._vehicle = message.item
+            if self._told_camera is not None:
+                self._told_camera.follow_video(message.item.video)
 
     def _capture(self, stamp: int) -> None:
         vehicle = self._vehicle

@@ -87,6 +87,15 @@ class GimballedCamera(Camera, Protocol):
         ...
 
 
+@runtime_checkable
+class ToldCamera(Camera, Protocol):
+    """A camera whose video's address the vehicle may tell."""
+
+    def follow_video(self, address: str) -> None:
+        """Read from there, where the settings say so; empty: the vehicle tells none."""
+        ...
+
+
 def most_memory(camera: Camera) -> int | None:
     """Bytes that the process of `camera` may allocate from `open` on; None for any number.
 

@@ -41,9 +41,19 @@ class LiveSource:
     from 16 others, takes 0.8 GB; without a bound, a server that sends one frame without an end
     takes all memory of the machine, and the read timeout never strikes."""
 
-    def __init__(self, address: SecretUrl, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
-        """Read from `address`; `open` waits up to `timeout` seconds for the first frame."""
+    def __init__(
+        self,
+        address: SecretUrl,
+        *,
+        timeout: float = _FIRST_FRAME_TIMEOUT,
+        protocols: str | None = None,
+    ) -> None:
+        """Read from `address`; `open` waits up to `timeout` seconds for the first frame.
+
+        `protocols` are the only ones that FFmpeg may use for it, separated by commas; None for all.
+        """
         self._address = address
+        self._protocols = protocols
         self._timeout = timeout
         self._lock = threading.Lock()
         self._arrived = threading.Event()
@@ -57,10 +67,14 @@ class LiveSource:
         self._frames = 0
         """Frames decoded so far."""
 
-    def open(self) -> NDArray[np.uint8]:
-        """Start decoding and return the first frame; raises SourceError without one."""
+    def start(self) -> None:
+        """Start decoding."""
         self._thread = threading.Thread(target=self._decode, name="live-source", daemon=True)
         self._thread.start()
+
+    def open(self) -> NDArray[np.uint8]:
+        """Start decoding and return the first frame; raises SourceError without one."""
+        self.start()
         if not self._arrived.wait(self._timeout):
             self.close()
             message = (
@@ -92,7 +106,7 @@ class LiveSource:
     def _decode(self) -> None:
         wait = _SHORTEST_WAIT
         while not self._closing.is_set():
-            capture = _connect(self._address.get_secret_value())
+            capture = _connect(self._address.get_secret_value(), self._protocols)
             before = self._frames
             try:
                 self._drain(capture)
@@ -125,7 +139,7 @@ class LiveSource:
             self._arrived.set()
 
 
-def _connect(address: str) -> cv2.VideoCapture:
+def _connect(address: str, protocols: str | None) -> cv2.VideoCapture:
     device = address.removeprefix("/dev/video")
     if device != address and device.isdigit():
         return cv2.VideoCapture(int(device), cv2.CAP_V4L2)
@@ -135,13 +149,15 @@ def _connect(address: str) -> cv2.VideoCapture:
         cv2.CAP_PROP_READ_TIMEOUT_MSEC,
         _READ_TIMEOUT_MS,
     ]
-    with _low_latency():
+    with _low_latency(protocols):
         return cv2.VideoCapture(address, cv2.CAP_FFMPEG, timeouts)
 
 
 @contextmanager
-def _low_latency() -> Iterator[None]:
+def _low_latency(protocols: str | None) -> Iterator[None]:
     """Disable FFmpeg's buffering for captures opened within this context.
+
+    `protocols` are the only ones that it may use, whatever else the environment says.
 
     OpenCV takes FFmpeg's options from the environment only, where they would also affect files
     that are opened later.
@@ -149,6 +165,8 @@ def _low_latency() -> Iterator[None]:
     with _OPENING:
         before = os.environ.get(_OPTIONS)
         os.environ.setdefault(_OPTIONS, "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay")
+        if protocols is not None:
+            os.environ[_OPTIONS] += f"|protocol_whitelist;{protocols}"
         try:
             yield
         finally:

@@ -7,6 +7,7 @@ import re
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
+from aerodaas.cameras.told_video import TOLD, ToldSource
 from aerodaas.cameras.video_file import VideoFile
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
@@ -21,8 +22,9 @@ _LIVE = re.compile(r"^([a-z][a-z0-9+.\-]*://|/dev/video\d+$)", re.IGNORECASE)
 class VideoCamera:
     """Plays a video file by mission time, or returns the newest frame of a live source.
 
-    Settings: `path` (a file, a URL such as `rtsp://…` or `udp://…`, or `/dev/video0`), `loop`
-    for files, and the lens and mount of `CameraConfig`.
+    Settings: `path` (a file, a URL such as `rtsp://…` or `udp://…`, or `/dev/video0`; `mavlink`
+    for where the MAVLink vehicle itself says that its video is), `loop` for files, and the lens and
+    mount of `CameraConfig`.
     """
 
     settings_model = CameraConfig
@@ -30,22 +32,23 @@ class VideoCamera:
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Validate the settings of `sensor`; raises ConfigError."""
-        del environment
         self._settings = camera_settings(sensor)
         path = SecretUrl(required_path(sensor, self._settings, "video file, URL or device"))
         self._label = str(path)
-        self._source: VideoFile | LiveSource = (
-            LiveSource(path)
-            if _LIVE.match(path.get_secret_value())
-            else VideoFile(path, sensor.rate, loop=self._settings.loop)
-        )
-        if isinstance(self._source, LiveSource):
+        self._source: VideoFile | LiveSource | ToldSource
+        if path.get_secret_value() == TOLD and environment.camera_driver(sensor) == "mavlink":
+            self._source = ToldSource(sensor.full_id)
+        elif _LIVE.match(path.get_secret_value()):
+            self._source = LiveSource(path)
+        else:
+            self._source = VideoFile(path, sensor.rate, loop=self._settings.loop)
+        if not isinstance(self._source, VideoFile):
             self.most_memory = LiveSource.most_memory
         self._model: CameraModel | None = None
 
     @property
     def model(self) -> CameraModel | None:
-        """Calibration for the size of the newest frame; None before `open`."""
+        """Calibration for the size of the newest frame; None before the first."""
         return self._model
 
     @property
@@ -61,7 +64,13 @@ class VideoCamera:
     def open(self) -> None:
         """Open the source; raises SourceError if it returns no frame."""
         first = self._source.open()
-        self._model = camera_model(self._settings, first.shape[1], first.shape[0])
+        if first is not None:
+            self._model = camera_model(self._settings, first.shape[1], first.shape[0])
+
+    def follow_video(self, address: str) -> None:
+        """Take the address that the vehicle tells, where the settings say so."""
+        if isinstance(self._source, ToldSource):
+            self._source.follow(address)
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Return the newest frame at mission time `stamp`; None if there is no new one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.types.geometry import GeodeticOrigin
+    from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["app"]
 
@@ -52,10 +54,26 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
         above = HeightReference(one.above or HeightReference.HOME).value
         typer.echo(
             f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above {above}{speed}{hover}"
+            f"{_pictures(one)}"
         )
     for notice in notices:
         typer.echo(printable(f"not done: {notice}"))
     typer.echo(f"{plan}: waypoints: {len(waypoints)}, not done: {len(notices)}")
+
+
+def _pictures(waypoint: Waypoint) -> str:
+    said = []
+    if waypoint.trigger_distance is not None:
+        said.append(f", a picture every {waypoint.trigger_distance:g} m on the way")
+    if waypoint.trigger_interval is not None:
+        said.append(f", a picture every {waypoint.trigger_interval:g} s on the way")
+    if waypoint.look_at is not None:
+        x, y, z = waypoint.look_at
+        said.append(f", looks at {x:.7f}, {y:.7f}, {z:g} m")
+    elif waypoint.gimbal is not None:
+        pitch, yaw = map(math.degrees, (waypoint.gimbal.pitch, waypoint.gimbal.yaw))
+        said.append(f", gimbal at pitch {pitch:.0f}, yaw {yaw:.0f} degrees")
+    return "".join([*said, ", a picture" if waypoint.photo else ""])
 
 
 @app.command()

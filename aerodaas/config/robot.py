@@ -196,8 +196,9 @@ class CameraConfig(Strict):
     """The gimbal that a simulated camera hangs from, pitched and turned as above at first; None:
     it is bolted to the body."""
     path: SecretUrl | None = None
-    """Folder of pictures, video file or URL, for the drivers that read one. User, password and
-    parameters of a URL are shown, logged and recorded nowhere."""
+    """Folder of pictures, video file or URL, for the drivers that read one; `mavlink` for where a
+    MAVLink vehicle itself says that its video is. User, password and parameters of a URL are shown,
+    logged and recorded nowhere."""
     topic: str | None = None
     """Channel of the recording at `path`; None where it holds one camera's pictures only."""
     loop: bool = False

@@ -11,7 +11,7 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
@@ -107,6 +107,12 @@ class WaypointEntry(BaseModel):
         default_factory=dict
     )
     """Positions by actuator, in order."""
+    trigger_distance: Annotated[_Number, Field(ge=0.1)] | None = None
+    """Metres between pictures on the way there."""
+    trigger_interval: Annotated[_Number, Field(ge=0.1)] | None = None
+    """Seconds between pictures on the way there and during the stay."""
+    look_at: Annotated[tuple[_Number, _Number, _Number], Strict(strict=False)] | None = None
+    """Place that is looked at, counted as x, y and z are."""
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:

@@ -140,6 +140,13 @@ class SimulatedVehicle:
                 f"{self._name}: simulated time cannot run backwards, "
                 f"from {self._now} to {stamp} ns; advance to later stamps only"
             )
+        if self._camera is not None and self._camera.waits and self._connected:
+            # A picture is of the next step of time, however long the caller's steps are.
+            self._advance_to(min(stamp, (self._steps + 1) * STEP_NS))
+            self._camera.expose(self.read())
+        self._advance_to(stamp)
+
+    def _advance_to(self, stamp: int) -> None:
         self._now = stamp
         step = self._autopilot.step
         for _ in range(stamp // STEP_NS - self._steps):
@@ -150,8 +157,6 @@ class SimulatedVehicle:
             self._gimbal.advance_to(stamp)
         if self._camera is not None:
             self._camera.advance_to(stamp)
-            if self._camera.waits and self._connected:
-                self._camera.expose(self.read())
 
     def read(self) -> VehicleState:
         """Return the state at the time last advanced to."""

@@ -78,10 +78,16 @@ class Leg:
         stalled = seconds(now - self._nearer_at) > self._stall_timeout
         return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
 
-    def setpoint(self, place: Vector, position: Vector, cruise_speed: float) -> PositionSetpoint:
-        """Fly on to `place`, the waypoint or a corner before it, at the waypoint's speed."""
+    def setpoint(
+        self, place: Vector, position: Vector, cruise_speed: float, heading: float | None = None
+    ) -> PositionSetpoint:
+        """Fly on to `place`, the waypoint or a corner before it, at the waypoint's speed.
+
+        `heading` is for a waypoint without a yaw; None faces along the path.
+        """
         waypoint = self.stop.waypoint
-        return setpoint_towards(place, position, waypoint.yaw, waypoint.speed or cruise_speed)
+        yaw = heading if waypoint.yaw is None else waypoint.yaw
+        return setpoint_towards(place, position, yaw, waypoint.speed or cruise_speed)
 
     def _is_facing(self, yaw: float) -> bool:
         asked = self.stop.waypoint.yaw

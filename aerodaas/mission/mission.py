@@ -468,16 +468,15 @@ class Mission:
         if self._planning.awaited(stop, self._machine.since if holds else None, self._now):
             self._to(MissionState.HOLDING, "waiting for a plan")
             return self._hover(state)
+        limits = self.limits
         diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
         if self._leg is None or self._leg.stop is not stop:
             self._navigator.queue.leave_place()
-            self._leg = Leg(
-                stop, self._now, self.limits.arrival_radius, self._options.stall_timeout
-            )
+            self._leg = Leg(stop, self._now, limits.arrival_radius, self._options.stall_timeout)
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        busy = self.photographer.attend(stop, self._now)
+        busy = self.photographer.attend(stop, state.odometry, self._now)
         busy = busy or self.actuation.attend(stop, position, self._now)
         if failure := self.actuation.take_failure():
             return self._after_failure(failure, state)
@@ -492,7 +491,8 @@ class Mission:
         else:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         self._anchor = None
-        return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
+        place, heading = self.photographer.steer(place, state.odometry, self._now)
+        return Fly(self._leg.setpoint(place, position, limits.cruise_speed, heading), stop.cause)
 
     def _after_failure(self, failure: str, state: VehicleState) -> Action:
         """What follows where an actuator has failed, and the flight is not to go on."""

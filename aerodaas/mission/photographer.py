@@ -1,4 +1,4 @@
-"""Pictures at waypoints: aims the gimbal, waits for it, has the picture taken, tells what failed.
+"""Pictures of a mission: aims the gimbal, waits for it, has pictures taken, tells what failed.
 
 It only asks and looks, and never waits: the setpoint loop goes on while the drone hovers, and with
 it all that keeps the drone safe. What a component does not do in time costs its picture and raises
@@ -10,45 +10,40 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from aerodaas.mission.gaze import Gaze, fresh, near
 from aerodaas.mission.log import MissionLog
+from aerodaas.mission.photo_trigger import PhotoTrigger
 from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.shutter import NO_CAMERA, PhotoRequest, Shutter
 from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Odometry
 from aerodaas.types.errors import VehicleError, failure_line
-from aerodaas.types.geometry import wrap_angle
-from aerodaas.types.payload import (
-    Gimbal,
-    GimbalAttitude,
-    GimbalTarget,
-    Photo,
-    PhotoCamera,
-    PhotoOutcome,
-)
+from aerodaas.types.geometry import Vector
+from aerodaas.types.payload import Gimbal, GimbalTarget, Photo
 from aerodaas.types.vehicle import PayloadVehicle
 
 __all__ = ["Photographer"]
 
-_AIMED = 0.05
-"""Radians of pitch and yaw within which a gimbal looks where it is to: some three degrees, less
-than a twentieth of a usual picture."""
-_FRESH = NANOSECONDS
-"""Nanoseconds for which a gimbal's word counts."""
 _AGAIN = 2 * NANOSECONDS
 """Nanoseconds after which a gimbal that is not there yet is told again."""
 
 
 @dataclass(slots=True)
 class _Task:
-    """What is to be done at one stop."""
+    """What is to be done on the way to one stop, and there."""
 
     stop: QueuedWaypoint
     aim: GimbalTarget | None
     """Where the gimbal is to look, within its range; None to leave it."""
+    trigger: PhotoTrigger
     told_at: int | None = None
     """Mission clock at which the gimbal was told, nanoseconds."""
     began: int | None = None
     """Mission clock at arrival, nanoseconds."""
-    number: int | None = None
-    """That of the picture that was asked for."""
+    request: PhotoRequest | None = None
+    """The picture that was asked for."""
     over: bool = False
 
 
@@ -60,124 +55,173 @@ class Photographer:
 
         `timeout` in seconds is what both get at a waypoint, together; alerts go to `log`.
         """
-        self.photos: list[Photo] = []
-        """All pictures taken, in order; the list only grows."""
-        self.lost = 0
-        """How many waypoints' pictures were not taken."""
         self._vehicle = vehicle if isinstance(vehicle, PayloadVehicle) else None
         self._log = log
         self._timeout = timeout
+        self._shutter = Shutter(self._vehicle, log, timeout)
+        self._gaze = Gaze()
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
-        self._asked: dict[int, _Task] = {}
-        """By the number of the picture that is awaited."""
+        self._served: _Task | None = None
+
+    @property
+    def photos(self) -> list[Photo]:
+        """All pictures taken, in order; the list only grows."""
+        return self._shutter.photos
+
+    @property
+    def lost(self) -> int:
+        """How many pictures were asked for and not taken."""
+        return self._shutter.lost
+
+    def steer(self, place: Vector, odometry: Odometry, now: int) -> tuple[Vector, float | None]:
+        """Where to fly for the pictures' sake on the way to `place`, and where the nose looks.
+
+        Metres ENU, and radians counter-clockwise from east; None as the drone flies. `place` stays
+        unless it is the waypoint's own, to which the way is straight.
+        """
+        task, heading = self._served, self._gaze.heading
+        if task is None:
+            return place, heading
+        straight = np.array_equal(place, task.stop.waypoint.position)
+        ahead = task.trigger.place_ahead(odometry, now) if straight else None
+        if ahead is None:
+            return place, heading
+        return ahead, task.trigger.bearing if heading is None else heading
 
     def look(self, now: int) -> None:
         """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
-        try:
-            camera = self._camera()
-            for outcome in () if camera is None else camera.outcomes():
-                self._note(outcome, now)
-        except Exception as error:  # noqa: BLE001 - a driver's camera must not end a flight
-            self._log.alert(now, "photo", f"the camera: {failure_line(error)}")
+        self._shutter.look(now)
 
-    def _note(self, outcome: PhotoOutcome, now: int) -> None:
-        task = None if outcome.number is None else self._asked.pop(outcome.number, None)
-        if isinstance(outcome, Photo):
-            self.photos.append(outcome)
-            if task is not None:
-                task.over = True
-        elif task is not None and not task.over:
-            self._give_up(task, outcome.reason, now)
-
-    def attend(self, stop: QueuedWaypoint, now: int) -> bool:
+    def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, to which the drone flies or at which it is.
 
         Returns whether the drone has to stay there for it; never for longer than the time-out.
         """
-        task = self._tasks.get(stop.id)
-        if task is None or task.stop is not stop:
-            waypoint = stop.waypoint
-            task = self._tasks[stop.id] = _Task(stop, waypoint.gimbal)
-            task.over = waypoint.gimbal is None and not waypoint.photo
+        task = self._task(stop, odometry, now)
+        if not stop.arrived:
+            task.began = None
+        elif task.began is None:
+            task.began = now
+        self._keep_looking(task, odometry, now)
+        awaits = self._trigger(task, odometry, now)
         if task.over:
-            return False
+            return awaits
         try:
             self._advance(task, now)
         except VehicleError as error:
             self._give_up(task, str(error), now)
         except Exception as error:  # noqa: BLE001 - a driver's gimbal must not end a flight
             self._give_up(task, failure_line(error), now)
-        return not task.over
+        return awaits or not task.over
+
+    def _task(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> _Task:
+        """The task of `stop`, which begins where the stop before it was reached."""
+        before = self._served
+        if before is not None and before.stop is stop:
+            return before
+        task = self._tasks.get(stop.id)
+        waypoint = stop.waypoint
+        if task is None or task.stop is not stop:
+            # A stop that the drone has left for another one has not arrived any more.
+            follows = before is not None and before.stop.arrived
+            start = before.stop.waypoint.position if before and follows else odometry.position
+            earlier = before.trigger if before and follows else None
+            trigger = PhotoTrigger(waypoint, start, now, earlier)
+            task = self._tasks[stop.id] = _Task(stop, waypoint.gimbal, trigger)
+            task.over = waypoint.gimbal is None and not waypoint.photo
+        self._served = task
+        if waypoint.look_at is not None:
+            self._gaze.at(np.array(waypoint.look_at))
+        elif waypoint.gimbal is not None:
+            self._gaze.at(None)
+        return task
+
+    def _keep_looking(self, task: _Task, odometry: Odometry, now: int) -> None:
+        if self._gaze.place is None:
+            return
+        try:
+            self._gaze.turn(self._gimbal(), odometry, now, task.stop.waypoint.yaw)
+        except Exception as error:  # noqa: BLE001 - a driver's gimbal must not end a flight
+            self._log.alert(now, "photo", f"the gimbal: {failure_line(error)}")
+
+    def _trigger(self, task: _Task, odometry: Odometry, now: int) -> bool:
+        """Take the pictures that are due on the way; returns whether one is due at its end yet."""
+        trigger, late = task.trigger, False
+        if task.began is not None and trigger.awaits:
+            late = seconds(now - task.began) > self._timeout
+            if self._shutter.busy and not late:
+                # Only here there is time to wait for the camera: the drone has arrived.
+                return True
+        if count := trigger.passed(odometry, now, task.began):
+            self._shutter.trigger(task.stop.id, count, now)
+        return trigger.awaits and not late
 
     def _advance(self, task: _Task, now: int) -> None:
         """Take the next step; raises what the components raise."""
+        if task.request is not None:
+            self._await(task, task.request, now)
+            return
         gimbal = self._gimbal()
         if task.aim is not None and gimbal is None:
             raise VehicleError("the vehicle has no gimbal, or none that answers")
-        if task.stop.waypoint.photo and self._camera() is None:
-            raise VehicleError("the vehicle has no camera for pictures, or none that answers")
-        there = gimbal is None or task.aim is None or self._aims(task, gimbal, now)
-        if not task.stop.arrived:
-            task.began = None
+        if task.stop.waypoint.photo and self._shutter.camera is None:
+            raise VehicleError(NO_CAMERA)
+        there = self._gaze.place is None or self._gaze.there
+        if gimbal is not None and task.aim is not None:
+            there = self._aims(task, gimbal, now)
+        if task.began is None:
             return
-        task.began = now if task.began is None else task.began
         if seconds(now - task.began) > self._timeout:
-            raise VehicleError(self._lateness(task, gimbal, now))
-        if task.number is not None or not there:
+            raise VehicleError(self._lateness(gimbal, now))
+        if not there or self._shutter.busy:
             return
-        camera = self._camera()
-        if task.stop.waypoint.photo and camera is not None:
-            task.number = camera.take_photo(task.stop.id)
-            self._asked[task.number] = task
+        if task.stop.waypoint.photo:
+            task.request = self._shutter.take(task.stop.id, now)
         else:
             task.over = True
+
+    def _await(self, task: _Task, request: PhotoRequest, now: int) -> None:
+        task.over = request.photo is not None
+        if request.failure:
+            raise VehicleError(request.failure)
+        # The camera's time ends with the stay, of which the gimbal had its part.
+        if task.began is not None and seconds(now - task.began) > self._timeout:
+            raise VehicleError(f"the camera took none within {self._timeout:g} s")
 
     def _aims(self, task: _Task, gimbal: Gimbal, now: int) -> bool:
         """Whether the gimbal looks where it is to; tells it (again) if not."""
         assert task.aim is not None  # noqa: S101 - asked only then
-        attitude = _fresh(gimbal.attitude, now)
-        there = attitude is not None and _near(attitude, task.aim)
+        attitude = fresh(gimbal.attitude, now)
+        there = attitude is not None and near(attitude, task.aim)
         untold = task.told_at is None
         if task.told_at is None or (not there and now - task.told_at >= _AGAIN):
             task.told_at = now
             task.aim = gimbal.aim(task.aim)
         return there and not untold
 
-    def _lateness(self, task: _Task, gimbal: Gimbal | None, now: int) -> str:
+    def _lateness(self, gimbal: Gimbal | None, now: int) -> str:
         """What was missing when time was up."""
-        if task.number is not None:
-            return f"the camera took none within {self._timeout:g} s"
-        attitude = _fresh(gimbal.attitude, now) if gimbal is not None else None
+        if self._shutter.busy:
+            return f"the camera was busy for {self._timeout:g} s"
+        if gimbal is None:
+            return f"the nose did not turn to the place within {self._timeout:g} s"
+        attitude = fresh(gimbal.attitude, now)
         where = (
             "it does not say where it looks"
             if attitude is None
             else f"it looks at pitch {math.degrees(attitude.pitch):.0f}, "
             f"yaw {math.degrees(attitude.yaw):.0f} degrees"
         )
-        why = f": {gimbal.fault}" if gimbal is not None and gimbal.fault else ""
+        why = f": {gimbal.fault}" if gimbal.fault else ""
         return f"the gimbal was not there within {self._timeout:g} s; {where}{why}"
 
     def _give_up(self, task: _Task, reason: str, now: int) -> None:
         task.over = True
-        self.lost += task.stop.waypoint.photo
-        lost = "no picture" if task.stop.waypoint.photo else "gimbal not aimed"
-        self._log.alert(now, "photo", f"{task.stop.id}: {lost}: {reason}")
+        if task.stop.waypoint.photo:
+            self._shutter.lose(task.stop.id, reason, now)
+        else:
+            self._log.alert(now, "photo", f"{task.stop.id}: gimbal not aimed: {reason}")
 
     def _gimbal(self) -> Gimbal | None:
         return None if self._vehicle is None else self._vehicle.gimbal
-
-    def _camera(self) -> PhotoCamera | None:
-        return None if self._vehicle is None else self._vehicle.photo_camera
-
-
-def _fresh(attitude: GimbalAttitude | None, now: int) -> GimbalAttitude | None:
-    """An attitude that is new and finite; a gimbal may say anything."""
-    if attitude is None or now - attitude.stamp > _FRESH:
-        return None
-    return attitude if math.isfinite(attitude.pitch) and math.isfinite(attitude.yaw) else None
-
-
-def _near(attitude: GimbalAttitude, aim: GimbalTarget) -> bool:
-    pitch = abs(wrap_angle(attitude.pitch - aim.pitch))
-    return max(pitch, abs(wrap_angle(attitude.yaw - aim.yaw))) <= _AIMED

@@ -133,6 +133,9 @@ class VehicleState:
     """Other aircraft that it hears of, the nearest first."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
+    video: str = field(default="", repr=False)
+    """Address of its camera's video, as it says; it may hold a password, and is recorded nowhere.
+    Empty where it tells none that may be read."""
 
 
 @runtime_checkable

@@ -17,6 +17,7 @@ from aerodaas.types.records import fast_pickle, shared_pickle
 
 __all__ = [
     "DEFAULT_PRIORITY",
+    "LEAST_TRIGGER",
     "HeightDatum",
     "HeightReference",
     "NavigationItem",
@@ -87,6 +88,8 @@ class SchedulingType(str, enum.Enum):
 
 _HALF_TURN = 3.1416
 """Radians: pi, and the rounding of who writes it by hand."""
+LEAST_TRIGGER = 0.1
+"""Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
 
@@ -165,6 +168,16 @@ class Waypoint:
     actuate: dict[str, str] | tuple[tuple[str, str], ...] = ()
     """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
     other, after the picture; kept as a tuple of pairs."""
+    trigger_distance: float | None = None
+    """Metres between pictures on the way there, along the straight line from where it begins; the
+    drone does not stop for them. None takes none."""
+    trigger_interval: float | None = None
+    """Seconds between pictures on the way there and during the stay; the drone does not stop for
+    them. None takes none."""
+    look_at: tuple[float, float, float] | None = None
+    """A place that the gimbal keeps looking at from the way there on, or the nose where the gimbal
+    cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
+    x, y and z are."""
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -184,12 +197,7 @@ class Waypoint:
         self._check_camera(owner)
         if self.actuate != ():
             object.__setattr__(self, "actuate", _moves(owner, self.actuate))
-        north_pole, date_line = 90.0, 180.0
-        if self.waypoint_type in _ON_THE_GLOBE and (
-            abs(self.x) > north_pole or abs(self.y) > date_line
-        ):
-            message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
-            raise InvalidWaypointError(message)
+        self._require_on_the_globe(owner, self.x, self.y)
 
     def _check_camera(self, owner: str) -> None:
         for name, angle in (("gimbal_pitch", self.gimbal_pitch), ("gimbal_yaw", self.gimbal_yaw)):
@@ -199,6 +207,39 @@ class Waypoint:
         photo: object = self.photo
         if not isinstance(photo, bool):
             message = f"{owner}: photo must be True or False, not {photo!r}"
+            raise InvalidWaypointError(message)
+        for name in ("trigger_distance", "trigger_interval"):
+            value = getattr(self, name)
+            if value is not None and value < LEAST_TRIGGER:
+                message = f"{owner}: {name} must be at least {LEAST_TRIGGER}, not {value}"
+                raise InvalidWaypointError(message)
+        if self.trigger_distance is not None and self.trigger_interval is not None:
+            message = f"{owner}: give it trigger_distance or trigger_interval, not both"
+            raise InvalidWaypointError(message)
+        self._check_look_at(owner)
+
+    def _check_look_at(self, owner: str) -> None:
+        if self.look_at is None:
+            return
+        if self.gimbal is not None:
+            message = f"{owner}: give it look_at or the gimbal's angles, not both"
+            raise InvalidWaypointError(message)
+        place: object = self.look_at
+        if not (
+            isinstance(place, tuple | list)
+            and len(place) == len("xyz")
+            and all(isinstance(one, int | float | np.floating) for one in place)
+            and all(map(math.isfinite, place))
+        ):
+            message = f"{owner}: look_at must be three finite numbers (x, y, z), not {place!r}"
+            raise InvalidWaypointError(message)
+        object.__setattr__(self, "look_at", tuple(map(float, place)))
+        self._require_on_the_globe(owner, *self.look_at[:2])
+
+    def _require_on_the_globe(self, owner: str, x: float, y: float) -> None:
+        north_pole, date_line = 90.0, 180.0
+        if self.waypoint_type in _ON_THE_GLOBE and (abs(x) > north_pole or abs(y) > date_line):
+            message = f"{owner}: ({x}, {y}) is no latitude and longitude in degrees"
             raise InvalidWaypointError(message)
 
     def _type_named(self, owner: str) -> WaypointType:
@@ -226,6 +267,12 @@ class Waypoint:
         ground. Raises InvalidWaypointError if a global waypoint meets an environment without a
         geodetic home, or one above sea or ground meets one whose own height is not known.
         """
+        if self.look_at is not None:
+            x, y, z = self.look_at
+            bare = replace(self, look_at=None)
+            seen = replace(bare, x=x, y=y, z=z).resolve(takeoff, origin, datum)
+            there = bare.resolve(takeoff, origin, datum)
+            return replace(there, look_at=(seen.x, seen.y, seen.z))
         if self.above is not None:
             kind = self.waypoint_type
             if kind is WaypointType.GLOBAL:
@@ -295,7 +342,7 @@ _NUMBERS = tuple(
     if field.name
     in {
         *("x", "y", "z", "hover_duration", "yaw", "speed", "deadline"),
-        *("gimbal_pitch", "gimbal_yaw"),
+        *("gimbal_pitch", "gimbal_yaw", "trigger_distance", "trigger_interval"),
     }
 )
 

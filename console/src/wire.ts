@@ -239,9 +239,12 @@ export interface WaypointEntry {
   gimbal_yaw?: number | null;
   hover_duration?: number;
   id: string;
+  look_at?: [number, number, number] | null;
   photo?: boolean;
   priority?: number;
   speed?: number | null;
+  trigger_distance?: number | null;
+  trigger_interval?: number | null;
   waypoint_type?: "relative" | "local" | "global" | "global_relative";
   x: number;
   y: number;

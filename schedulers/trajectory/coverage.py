@@ -17,6 +17,7 @@ import shapely
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
+from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
 from aerodaas.types.errors import SchedulerError
 from aerodaas.types.free_path import FreeArea, Place
 from aerodaas.types.waypoints import Waypoint
@@ -27,6 +28,8 @@ _ANGLE_STEP = 15
 """Degrees between the angles tried beside those of the area's edges."""
 _SAME = 1e-6
 """Metres within which two places are one."""
+_SHORTEST = 0.5
+"""Metres between two pictures at least."""
 _TURN = 3.0
 """Metres of straight flight that the braking and turning between two strips is worth."""
 
@@ -36,7 +39,8 @@ class Coverage:
     """A path that covers an area."""
 
     waypoints: tuple[Waypoint, ...]
-    """Local ENU, in order."""
+    """Local ENU, in order; with a camera, those at the ends of its lines have a
+    `trigger_distance`."""
     angle: float
     """Direction of the sweeps, radians counter-clockwise from east."""
     length: float
@@ -57,8 +61,9 @@ def cover(
     outline: Sequence[Place],
     *,
     height: float,
-    width: float,
+    width: float | None = None,
     overlap: float = 0.2,
+    camera: SurveyCamera | None = None,
     holes: Iterable[Sequence[Place]] = (),
     no_fly: Iterable[Sequence[Place]] = (),
     clearance: float = 0.0,
@@ -69,11 +74,18 @@ def cover(
     """Plan a path over the area inside `outline` (ENU metres) at `height` metres.
 
     `width` is that of the camera's footprint across the sweep; neighbouring strips share
-    `overlap` (0 to 1) of it. `holes` need not be seen but may be flown over; `no_fly` zones are
-    flown around with `clearance` metres. `start` is where the drone comes from; without `angle`
-    (radians), the one with the shortest way is taken. Raises SchedulerError for an area that is
+    `overlap` (0 to 1) of it. A `camera` in their place knows both, looks straight down and takes
+    pictures on the strips, no farther apart than it needs, from one end to the other. `holes` need
+    not be seen but may be flown over; `no_fly` zones are flown around with `clearance` metres.
+    `start` is where the drone comes from; without `angle` (radians), the one with the shortest way
+    is taken. Raises SchedulerError for an area that is
     none, or that no-fly zones cut in pieces that cannot all be reached.
     """
+    if (width is None) == (camera is None):
+        raise SchedulerError("coverage needs a width or a camera: give it one of them")
+    if camera is not None:
+        width, overlap = camera.footprint(height)[0], camera.side_overlap
+    assert width is not None  # noqa: S101 - given, or the camera's
     if not 0.0 <= overlap < 1.0 or width <= 0.0:
         raise SchedulerError(
             "coverage needs a positive width and an overlap of 0 to less than 1, "
@@ -90,23 +102,56 @@ def cover(
     free = FreeArea(flyable)
     spacing = width * (1.0 - overlap)
     angles = _angles(outline) if angle is None else [angle]
-    best: tuple[float, float, list[Place], int] | None = None
+    best: tuple[float, float, _Way, int] | None = None
     for candidate in angles:
         strips = _strips(wanted, candidate, spacing, width)
         way = _join(strips, flyable, free, start)
         if way is None:
             continue
-        cost = _length(way) + _TURN * len(strips)
+        cost = _length(way.places) + _TURN * len(strips)
         if best is None or cost < best[0] - 1e-9:
             best = cost, candidate, way, len(strips)
     if best is None:
         raise SchedulerError("no-fly zones cut the area in pieces that cannot all be reached")
     _, chosen, way, sweeps = best
+    spacings = way.spacings(None if camera is None else camera.trigger_distance(height))
+    down = -math.pi / 2 if camera is not None and camera.gimbal else None
     waypoints = tuple(
-        Waypoint(f"sweep{number}", x, y, height, waypoint_type="local", speed=speed)
-        for number, (x, y) in enumerate(way, start=1)
+        Waypoint(
+            f"sweep{number}",
+            x,
+            y,
+            height,
+            waypoint_type="local",
+            speed=speed,
+            gimbal_pitch=down,
+            trigger_distance=distance,
+        )
+        for number, ((x, y), distance) in enumerate(zip(way.places, spacings, strict=True), start=1)
     )
-    return Coverage(waypoints, chosen, _length(way), sweeps)
+    return Coverage(waypoints, chosen, _length(way.places), sweeps)
+
+
+@dataclass
+class _Way:
+    """Places to fly to, and on which strip each leg lies that leads to one."""
+
+    places: list[Place]
+    strips: list[int | None]
+    """None for a leg between two strips."""
+
+    def spacings(self, most: float | None) -> list[float | None]:
+        """Metres between pictures on each leg, at most `most`, which divide its strip evenly."""
+        lengths: dict[int, float] = {}
+        for (a, b), strip in zip(pairwise(self.places), self.strips[1:], strict=True):
+            if strip is not None:
+                lengths[strip] = lengths.get(strip, 0.0) + math.dist(a, b)
+        return [
+            None
+            if most is None or strip is None
+            else max(lengths[strip] / max(1, math.ceil(lengths[strip] / most - 1e-9)), _SHORTEST)
+            for strip in self.strips
+        ]
 
 
 def _polygon(outline: Sequence[Place], what: str) -> shapely.Polygon:
@@ -169,10 +214,11 @@ def _join(
     flyable: BaseGeometry,
     free: FreeArea,
     start: Place | None,
-) -> list[Place] | None:
+) -> _Way | None:
     """Fly the strips one after the other, always the one whose end is nearest, around obstacles."""
     left = list(strips)
     way: list[Place] = []
+    on: list[int | None] = []
     here = start
     while left:
         origin = here if here is not None else left[0][0]
@@ -186,10 +232,12 @@ def _join(
         if way and not _append(way, flyable, free, entry):
             return None
         way = way or [entry]
+        on += [None] * (len(way) - len(on))
         if not _append(way, flyable, free, leave):
             return None
+        on += [len(left)] * (len(way) - len(on))
         here = way[-1]
-    return way
+    return _Way(way, on)
 
 
 def _append(way: list[Place], flyable: BaseGeometry, free: FreeArea, target: Place) -> bool:

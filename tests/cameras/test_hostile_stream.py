@@ -71,7 +71,7 @@ def test_a_frame_without_memory_is_skipped_and_asked_for_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The reading thread outlives it."""
-    monkeypatch.setattr(live, "_connect", lambda _: _Full())
+    monkeypatch.setattr(live, "_connect", lambda *_: _Full())
     monkeypatch.setattr(live, "_SHORTEST_WAIT", 0.001)
     monkeypatch.setattr(live, "_LONGEST_WAIT", 0.001)
     source = LiveSource(SecretUrl("rtsp://cam/live"), timeout=1.0)

@@ -42,10 +42,24 @@ def test_a_plan_is_shown(plan: Callable[..., Result]) -> None:
     shown = "item2 47.0010000, 8.0000000, 20 m above home, 4 m/s, hovers 2 s"
     assert " ".join(lines[0].split()) == shown
     assert lines[1].endswith("12 m above home, 4 m/s")
-    assert lines[2].startswith("not done: item 4: DO_SET_CAM_TRIGG_DIST: no picture")
+    assert lines[2].startswith("not done: item 4: DO_SET_CAM_TRIGG_DIST: no waypoint")
     assert lines[3] == "a.waypoints: waypoints: 2, not done: 1"
     higher = plan("show", "a.waypoints", "--home-altitude", "480").output
     assert "20 m above home, 4 m/s\n" in higher
+
+
+def test_what_is_photographed_is_shown(plan: Callable[..., Result], tmp_path: Path) -> None:
+    """Triggers, single pictures, the gimbal, and what is looked at."""
+    rows = [
+        *("2 205 -90 0 0 0 0 0 2", "3 16 0 0 0 0 47.001 8 20", "2 2000 0 0 1 0 0 0 0"),
+        *("2 206 5 0 1 0 0 0 0", "3 195 0 0 0 0 47.1 8.1 3", "3 16 0 0 0 0 47.002 8 20"),
+    ]
+    fields = [f"{n} 0 {row} 1".replace(" ", "\t") for n, row in enumerate(rows, start=1)]
+    path = tmp_path / "b.waypoints"
+    path.write_text("\n".join([*LINES.splitlines()[:2], *fields]))
+    first, second, *_ = plan("show", "b.waypoints").output.splitlines()
+    assert first.endswith("gimbal at pitch -90, yaw 0 degrees, a picture")
+    assert second.endswith("a picture every 5 m on the way, looks at 47.1000000, 8.1000000, 3 m")
 
 
 def test_a_plan_is_converted(plan: Callable[..., Result], tmp_path: Path) -> None:

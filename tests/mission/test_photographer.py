@@ -3,111 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import pytest
 from flights import Flight, KinematicVehicle, add, flight
+from surveyors import Surveyor, lost
 
 from aerodaas.config.model import MissionConfig
-from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import (
-    GimbalAttitude,
-    GimbalTarget,
-    Photo,
-    PhotoFailure,
-    PhotoOutcome,
-)
+from aerodaas.types.payload import GimbalTarget
 from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import Waypoint
 
 DOWN = -math.pi / 2
-
-
-class Clock:
-    """The mission clock of a test."""
-
-    now = 0
-
-
-@dataclass
-class Gimbal:
-    """Turns at 1 rad/s, or does as a test says."""
-
-    clock: Clock
-    pitch: float = 0.0
-    yaw: float = 0.0
-    fault: str = ""
-    stuck: bool = False
-    nonsense: bool = False
-    stale: bool = False
-    aims: list[GimbalTarget] = field(default_factory=list)
-    _seen: int = 0
-
-    def aim(self, target: GimbalTarget) -> GimbalTarget:
-        """Turn from now on."""
-        self.aims.append(target)
-        return target
-
-    @property
-    def attitude(self) -> GimbalAttitude:
-        """Where it looks, or says so."""
-        most = (self.clock.now - self._seen) / NANOSECONDS
-        self._seen = self.clock.now
-        if self.aims and not self.stuck:
-            target = self.aims[-1]
-            self.pitch += min(max(target.pitch - self.pitch, -most), most)
-            self.yaw += min(max(target.yaw - self.yaw, -most), most)
-        stamp = 0 if self.stale else self.clock.now
-        return GimbalAttitude(stamp, math.nan if self.nonsense else self.pitch, self.yaw)
-
-
-@dataclass
-class Camera:
-    """Takes pictures at once, or does as a test says."""
-
-    clock: Clock
-    gimbal: Gimbal | None
-    refuses: str = ""
-    silent: bool = False
-    lies: bool = False
-    """Answers with other numbers."""
-    asked: list[str] = field(default_factory=list)
-    _ready: list[PhotoOutcome] = field(default_factory=list)
-
-    def take_photo(self, label: str) -> int:
-        """Take one."""
-        self.asked.append(label)
-        number = len(self.asked)
-        if self.refuses:
-            self._ready.append(PhotoFailure(number, self.refuses))
-        elif not self.silent:
-            attitude = self.gimbal.attitude if self.gimbal else None
-            told = number + 100 if self.lies else number
-            self._ready.append(Photo(told, self.clock.now, label, gimbal=attitude))
-        return number
-
-    def outcomes(self) -> list[PhotoOutcome]:
-        """What came of it."""
-        ready, self._ready = self._ready, []
-        return ready
-
-
-class Surveyor(KinematicVehicle):
-    """A vehicle with both, unless a test takes them away."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.clock = Clock()
-        self.gimbal: Gimbal | None = Gimbal(self.clock)
-        self.photo_camera: Camera | None = Camera(self.clock, self.gimbal)
-
-    def read(self) -> VehicleState:
-        """Let its components know the time."""
-        state = super().read()
-        self.clock.now = state.stamp
-        return state
 
 
 STOPS = (
@@ -125,11 +32,6 @@ def flown(vehicle: KinematicVehicle, *waypoints: Waypoint, timeout: float = 4.0)
     )
     made.run()
     return made
-
-
-def lost(made: Flight) -> list[str]:
-    """What people were told of pictures."""
-    return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
 
 
 def unharmed(made: Flight) -> None:

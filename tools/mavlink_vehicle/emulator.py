@@ -17,6 +17,7 @@ from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
 from aerodaas.types.geometry import Vector
 from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
+from tools.mavlink_vehicle.components import EmulatedComponent
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
@@ -71,10 +72,17 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         kind = EmulatedPX4 if self.options.family == "px4" else EmulatedArduPilot
         self.firmware: Firmware = kind(self.options, self._flight, self._say)
         self._mav = self._codec(1)
-        aside = self._codec(EmulatedTransmitter.component)
+        self._codecs = {1: self._mav}
+        """One for each component, with its own numbers and signatures."""
         self.transmitter = EmulatedTransmitter(
-            lambda message: self._say(message, aside), present=self.options.remote_id
+            lambda message: self._say_as(message, EmulatedTransmitter.component),
+            present=self.options.remote_id,
         )
+        self.components = {
+            number: EmulatedComponent(self.firmware, number, self._say_as)
+            for number in self.options.components
+        }
+        """Cameras and gimbals with ids of their own."""
         seed = self.options.seed
         self._up = Channel(self.options.uplink, f"{seed}/up", self._hear)
         self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
@@ -170,6 +178,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             steps = int((now - self._flown_to) / STEP + _ROUNDING)
             self._flown_to += steps * STEP
             self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
+            for component in self.components.values():
+                component.turn(now)
             self._report(now)
             self._down.turn(now)
 
@@ -190,14 +200,22 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         for message in messages:
             if message.get_type() != "BAD_DATA":
                 self.heard.append((self._now, message))
-                self._obey(message)
+                self._pass_on(message)
 
-    def _obey(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        kind = message.get_type()
-        firmware = self.firmware
+    def _pass_on(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Give a message for this vehicle to whom of its components it is for."""
         if getattr(message, "target_system", 0) not in {0, self.options.system}:
             return
         self.transmitter.hear(message, self._now)
+        component = self.components.get(getattr(message, "target_component", 0))
+        if component is not None:
+            component.hear(message)
+        else:
+            self._obey(message)
+
+    def _obey(self, message: Any) -> None:  # noqa: ANN401 - as above
+        kind = message.get_type()
+        firmware = self.firmware
         if kind == "COMMAND_LONG":
             values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
             result = firmware.obey(message.command, values, None)
@@ -209,6 +227,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             self._acknowledge(message, firmware.obey(message.command, values, message.frame))
         elif kind == "SET_POSITION_TARGET_LOCAL_NED":
             firmware.setpoint(message)
+        elif kind == "GIMBAL_MANAGER_SET_PITCHYAW":
+            firmware.payload.track(message)
         elif kind in _STORED:
             for answer in _STORED[kind](firmware).handle(message):
                 self._say(answer)
@@ -233,8 +253,13 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
                 self._say(message)
         self.transmitter.turn(now)
 
-    def _say(self, message: Any, codec: Any = None) -> None:  # noqa: ANN401
-        codec = codec or self._mav
+    def _say(self, message: Any) -> None:  # noqa: ANN401
+        self._say_as(message, 1)
+
+    def _say_as(self, message: Any, component: int) -> None:  # noqa: ANN401
+        if component not in self._codecs:
+            self._codecs[component] = self._codec(component)
+        codec = self._codecs[component]
         packet = message.pack(codec)
         codec.seq = (codec.seq + 1) % 256
         for peer in self._peers:

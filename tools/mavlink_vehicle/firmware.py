@@ -95,7 +95,7 @@ class Firmware(ABC):
         self._drifted = np.zeros(3)
         self._say = say
         self._extras = Extras(self)
-        self.payload = EmulatedPayload(self, say)
+        self.payload = EmulatedPayload(self, say, gimbal=options.gimbal, camera=options.camera)
         self.traffic = EmulatedTraffic(self)
         self.actuators = EmulatedActuators(self)
         self._armed_at = 0.0

@@ -48,6 +48,8 @@ class AutopilotOptions:
     """Whether it carries a Remote ID transmitter."""
     actuators: bool = False
     """Whether it carries a gripper, servos, relays and a parachute."""
+    components: tuple[int, ...] = ()
+    """Ids of cameras (100 to 105) and gimbals (154, 171 to 175) that speak MAVLink themselves."""
     uplink: Impairment = field(default_factory=Impairment)
     """On the way to the vehicle."""
     downlink: Impairment = field(default_factory=Impairment)

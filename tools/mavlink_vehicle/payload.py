@@ -18,6 +18,10 @@ _RATE = math.radians(60.0)
 """rad/s at which it turns."""
 _DEVICE = 1
 _LOWEST, _HIGHEST, _WIDEST = math.radians(-90.0), math.radians(20.0), math.radians(170.0)
+_AXES = (
+    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
+)
+_YAW_AXIS = mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
 _SHUTTER = 0.3
 """Seconds from a request to the word of its picture."""
 
@@ -25,13 +29,28 @@ _SHUTTER = 0.3
 class EmulatedPayload:
     """Gimbal and camera of one vehicle; its attributes are what goes wrong with them."""
 
-    def __init__(self, firmware: Firmware, say: Callable[[Any], None]) -> None:
-        """Carry what the firmware's options say; `say` sends a message."""
-        options = firmware.options
-        self.has_gimbal, self.has_camera = options.gimbal, options.camera
+    def __init__(
+        self, firmware: Firmware, say: Callable[[Any], None], *, gimbal: bool, camera: bool
+    ) -> None:
+        """Carry a gimbal, a camera, or both; `say` sends a message."""
+        self.has_gimbal, self.has_camera = gimbal, camera
+        self.device = _DEVICE
+        """Id of the gimbal's device."""
+        self.flags = 0
+        """CAMERA_CAP_FLAGS that the camera tells."""
+        self.free: float | None = None
+        """MiB left on the camera's card; None: it tells nothing of it."""
+        self.video = ""
+        """Address that the camera tells of its video."""
+        self.by_itself = False
+        """The camera tells of its pictures by CAMERA_IMAGE_CAPTURED, whatever the autopilot is."""
         self.gimbal_refuses = self.camera_refuses = False
         self.stuck = False
         """It acknowledges and does not turn."""
+        self.turns = True
+        """It has a yaw axis."""
+        self.tracked = 0
+        """Targets that came without a command."""
         self.nonsense = False
         """Its attitude is not a number."""
         self.blind = False
@@ -55,11 +74,7 @@ class EmulatedPayload:
         if number == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW and self.has_gimbal:
             if self.gimbal_refuses or self.controller is None:
                 return mavlink.MAV_RESULT_DENIED
-            pitch, right = (math.radians(value) for value in values[:2])
-            self._wanted = (
-                min(max(pitch, _LOWEST), _HIGHEST),
-                min(max(right, -_WIDEST), _WIDEST),
-            )
+            self._turn_to(*(math.radians(value) for value in values[:2]))
             return _OK
         if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE and self.has_camera:
             if self.camera_refuses:
@@ -68,6 +83,16 @@ class EmulatedPayload:
                 self._due.append(self._firmware.now + _SHUTTER)
             return _OK
         return None
+
+    def track(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Turn as a GIMBAL_MANAGER_SET_PITCHYAW says, which nothing answers."""
+        if self.has_gimbal and not self.gimbal_refuses and self.controller is not None:
+            self.tracked += 1
+            self._turn_to(message.pitch, message.yaw)
+
+    def _turn_to(self, pitch: float, right: float) -> None:
+        widest = _WIDEST if self.turns else 0.0
+        self._wanted = min(max(pitch, _LOWEST), _HIGHEST), min(max(right, -widest), widest)
 
     def advance(self) -> None:
         """Let time pass until the firmware's."""
@@ -87,7 +112,7 @@ class EmulatedPayload:
         lat, lon, _ = flight.origin.to_geodetic(flight.believed.position)
         stamp, place = round(self._firmware.now * 1e3), (round(lat * 1e7), round(lon * 1e7))
         index = len(self.taken)
-        if self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
+        if self.by_itself or self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
             name = f"DCIM/{index:04d}.JPG".encode()
             height = (round(flight.altitude * 1e3), 0)
             self._say(
@@ -107,20 +132,38 @@ class EmulatedPayload:
         """Its message of that number; None if it has none."""
         stamp = round(self._firmware.now * 1e3)
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION and self.has_gimbal:
-            ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -_WIDEST, _WIDEST)
-            return mavlink.MAVLink_gimbal_manager_information_message(stamp, 0, _DEVICE, *ranges)
+            widest, able = (_WIDEST, _AXES | _YAW_AXIS) if self.turns else (0.0, _AXES)
+            ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -widest, widest)
+            return mavlink.MAVLink_gimbal_manager_information_message(
+                stamp, able, self.device, *ranges
+            )
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS and self.has_gimbal:
             flags = mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
             unknown = (math.nan, math.nan, math.nan)
             return mavlink.MAVLink_gimbal_device_attitude_status_message(
                 0, 0, stamp, flags, self._quaternion(), *unknown, 0
             )
+        if number == mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION and self.free is not None:
+            ready = mavlink.STORAGE_STATUS_READY
+            return mavlink.MAVLink_storage_information_message(
+                stamp, 1, 1, ready, 32_000.0, 32_000.0 - self.free, self.free, 90.0, 60.0
+            )
+        if number == mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION and self.video:
+            return mavlink.MAVLink_video_stream_information_message(
+                1, 1, 0, 1, 30.0, 1920, 1080, 4_000_000, 0, 80, b"main", self.video.encode()
+            )
         if number == mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION and self.has_camera:
             name = list(b"emulated".ljust(32, b"\0"))
             return mavlink.MAVLink_camera_information_message(
-                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, 0, 0, b""
+                stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, self._told_flags, 0, b""
             )
         return None
+
+    @property
+    def _told_flags(self) -> int:
+        films: int = mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if self.video else 0
+        takes: int = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE if films else 0
+        return self.flags | films | takes
 
     def _quaternion(self) -> list[float]:
         if self.nonsense:

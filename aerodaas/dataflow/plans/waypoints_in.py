@@ -28,6 +28,7 @@ from aerodaas.dataflow.plans.commands import (
     why_not,
 )
 from aerodaas.dataflow.plans.numbers import LatLon, finite, place
+from aerodaas.dataflow.plans.pictures_in import PictureItems
 from aerodaas.dataflow.plans.plan import Notice, Plan, PlanItem
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import yaw_ned_to_enu
@@ -98,22 +99,19 @@ class _Flown:
         actuators: Sequence[ActuatorConfig],
     ) -> None:
         self._actuators = actuators
-        self._carried_out: dict[int, Callable[[PlanItem], None]] = {
-            **dict.fromkeys(_FLIES_TO, self._fly),
-            **(dict.fromkeys(MOVES, self._move) if actuators else {}),
-            NAV_DELAY: self._delay,
-            DO_CHANGE_SPEED: self._change_speed,
-        }
         self.waypoints: list[Waypoint] = []
         self._ardupilot = plan.ardupilot
         self._sea = home_altitude
         self._ground = ground
         self._speed: float | None = None
         self._ended: str | None = None
+        self._pictures = PictureItems(self._height, ardupilot=plan.ardupilot)
         self._said: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
 
     def notices(self) -> list[Notice]:
         """What was left out, in the order of first mention."""
+        for item, why in self._pictures.left():
+            self._say(item, why)
         return [Notice(tuple(items), name, why) for (name, why), items in self._said.items()]
 
     def add(self, item: PlanItem) -> None:
@@ -124,8 +122,10 @@ class _Flown:
             return
         if not item.continues:
             self._say(item, "the drone goes on, though autoContinue is false")
-        if command in self._carried_out:
-            self._carried_out[command](item)
+        if command in _FLIES_TO:
+            self._fly(item)
+        elif command == NAV_DELAY:
+            self._delay(item)
         elif command in _TAKES_OFF:
             self._say(item, f"climbs to limits.takeoff_height, not to {_metres(item.z)}")
         elif command == NAV_RETURN_TO_LAUNCH:
@@ -134,12 +134,24 @@ class _Flown:
             self._say(item, "the drone comes back to its take-off and lands there")
             self._ended = command_name(command)
         elif command > NAV_LAST:
-            self._say(item, why_not(command))
+            self._do(item)
         else:
             raise ConfigError(
                 f"item {item.number}: {command_name(command)} cannot be flown; "
                 "put waypoints in its place"
             )
+
+    def _do(self, item: PlanItem) -> None:
+        """Take in what is done on the way."""
+        if item.command == DO_CHANGE_SPEED:
+            self._change_speed(item)
+        elif item.command in PictureItems.commands:
+            if why := self._pictures.take(item, self.waypoints):
+                self._say(item, why)
+        elif item.command in MOVES and self._actuators:
+            self._move(item)
+        else:
+            self._say(item, why_not(item.command))
 
     def _say(self, item: PlanItem, why: str) -> None:
         self._said[command_name(item.command), why].append(item.number)
@@ -170,19 +182,21 @@ class _Flown:
         if item.command != NAV_WAYPOINT or self._ardupilot:
             # Only PX4 has a heading here, and only of a waypoint.
             yaw = None
-        self.waypoints.append(
-            Waypoint(
-                f"item{item.number}",
-                latitude,
-                longitude,
-                height,
-                hover_duration=_seconds(hover or 0.0, where),
-                waypoint_type=WaypointType.GLOBAL_RELATIVE,
-                yaw=None if yaw is None else yaw_ned_to_enu(math.radians(yaw)),
-                speed=self._speed,
-                above=above,
-            )
+        plain = Waypoint(
+            f"item{item.number}",
+            latitude,
+            longitude,
+            height,
+            hover_duration=_seconds(hover or 0.0, where),
+            waypoint_type=WaypointType.GLOBAL_RELATIVE,
+            yaw=None if yaw is None else yaw_ned_to_enu(math.radians(yaw)),
+            speed=self._speed,
+            above=above,
         )
+        waypoint, refused = self._pictures.given(plain)
+        self.waypoints.append(waypoint)
+        for asked, why in refused:
+            self._say(asked, why)
 
     def _height(self, item: PlanItem, at: LatLon) -> tuple[float, HeightReference | None]:
         """Metres above home, or above what follows."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from aerodaas.dataflow.plans.commands import (
     NAV_TAKEOFF,
     NAV_WAYPOINT,
 )
+from aerodaas.dataflow.plans.pictures_out import PictureWriter
 from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon, Notice, Plan, PlanHome, PlanItem
 from aerodaas.dataflow.plans.waypoint_file import HEADER
 from aerodaas.types.errors import ConfigError
@@ -60,7 +62,10 @@ def planned(
             moves what is none of `actuators`.
     """
     places = [_place(waypoint, home) for waypoint in waypoints]
-    items = list(_items(waypoints, places, home, actuators))
+    items = [
+        replace(item, number=number)
+        for number, item in enumerate(_items(waypoints, places, home, actuators), start=1)
+    ]
     return (
         Plan(tuple(items), home=PlanHome(home.latitude, home.longitude, home_altitude)),
         list(_left_out(waypoints)),
@@ -104,6 +109,14 @@ def _place(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, floa
     return waypoint.x, waypoint.y, waypoint.z - (home.altitude if ellipsoid else 0.0)
 
 
+def _spot(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, float] | None:
+    """The place that a waypoint looks at, as `_place` writes one."""
+    if waypoint.look_at is None:
+        return None
+    x, y, z = waypoint.look_at
+    return _place(replace(waypoint, x=x, y=y, z=z, look_at=None), home)
+
+
 def _items(
     waypoints: Sequence[Waypoint],
     places: Sequence[tuple[float, float, float]],
@@ -114,32 +127,31 @@ def _items(
     above_home = places and waypoints[0].above is not HeightReference.SEA
     climb = max(places[0][2], _LOWEST_TAKEOFF) if above_home else _LOWEST_TAKEOFF
     start = (home.latitude, home.longitude, climb)
-    yield PlanItem(1, NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
-    number, speed = 2, None
+    yield PlanItem(0, NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
+    pictures, speed = PictureWriter(), None
     for waypoint, at in zip(waypoints, places, strict=True):
         if waypoint.speed != speed:
             speed = waypoint.speed
             values = (_GROUND_SPEED, _DEFAULT_SPEED if speed is None else speed, -1.0, 0.0)
-            yield PlanItem(number, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
-            number += 1
+            yield PlanItem(0, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
         yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
         held = (waypoint.hover_duration, 0.0, 0.0, yaw)
         above = HeightReference(waypoint.above or HeightReference.HOME)
         frame = _FRAMES.get(above, FRAME_RELATIVE)
-        yield PlanItem(number, NAV_WAYPOINT, frame, held, *at)
-        number += 1
+        yield from pictures.before(waypoint, frame, _spot(waypoint, home))
+        yield PlanItem(0, NAV_WAYPOINT, frame, held, *at)
+        yield from pictures.behind(waypoint)
         for name, position in waypoint.moves.items():
-            yield move_item(number, name, position, actuators)
-            number += 1
+            yield move_item(0, name, position, actuators)
+    yield from pictures.end()
     still = (0.0, 0.0, 0.0, 0.0)
-    yield PlanItem(number, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
+    yield PlanItem(0, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
 
 
 def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
     for what, named in (
         ("priorities", [w.id for w in waypoints if w.priority != DEFAULT_PRIORITY]),
         ("deadlines", [w.id for w in waypoints if w.deadline is not None]),
-        ("pictures", [w.id for w in waypoints if w.photo or w.gimbal is not None]),
     ):
         if named:
             yield Notice(

@@ -69,6 +69,10 @@ def _tell(vehicle: MavlinkVehicle) -> None:
         gps = state.gps
         place = f"{gps.latitude:.6f}, {gps.longitude:.6f}"
         typer.echo(f"at {place}, {gps.satellites} satellites")
+    for camera, stream in vehicle.payload.streams():
+        typer.echo(f"video of {camera}: {stream}")
+    for camera, card in vehicle.payload.cards():
+        typer.echo(f"card of {camera}: {card}")
     for reason in vehicle.preflight():
         typer.echo(f"would not take off: {reason}")
 

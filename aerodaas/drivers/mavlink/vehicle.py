@@ -102,7 +102,8 @@ class MavlinkVehicle:
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
-        self._payload = Payload(self._clock, self._lock)
+        self.payload = Payload(self._clock, self._lock)
+        """Gimbals and cameras that it carries."""
         self._actuators = MavlinkActuators(self._robot.actuators, self._settings, self._lock)
         self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._left_alone: FlightMode | None = None
@@ -122,7 +123,7 @@ class MavlinkVehicle:
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
-        self._clock = self._payload.clock = clock
+        self._clock = self.payload.clock = clock
         self._watchdog.belong()
 
     def connect(self, timeout: float = 10.0) -> None:
@@ -138,6 +139,7 @@ class MavlinkVehicle:
             self._settings,
             on_message=self._take,
             on_turn=self._turned,
+            on_component=self.payload.take_component,
             healthy=self._watchdog.healthy,
             stands=self._stands,
         )
@@ -177,7 +179,7 @@ class MavlinkVehicle:
             )
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
-            self._payload.search(commander)
+            self.payload.search(commander)
             self._airspace.begin(link, commander, self._connection.alignment)
             self._actuators.use(commander)
         except BaseException:
@@ -242,17 +244,17 @@ class MavlinkVehicle:
             link, now = self._connected().link, time.monotonic()
             state = self._report.state(self._clock.now(), now, link.counts, link.reports(now))
             state.actuators.update(self._actuators.positions)
-            return self._payload.complete(state)
+            return self.payload.complete(state)
 
     @property
     def gimbal(self) -> Gimbal | None:
         """The gimbal that it carries, once it is found."""
-        return self._payload.gimbal
+        return self.payload.gimbal
 
     @property
     def photo_camera(self) -> PhotoCamera | None:
         """The camera that it carries, once it is found."""
-        return self._payload.camera
+        return self.payload.camera
 
     @property
     def actuators(self) -> MavlinkActuators:
@@ -484,7 +486,7 @@ class MavlinkVehicle:
             elif kind == "HEARTBEAT":
                 self._observe(now)
             elif kind in Payload.messages:
-                self._payload.take(message, now)
+                self.payload.take(message, now)
             elif kind in MavlinkActuators.messages:
                 self._actuators.take(message)
             else:
@@ -537,7 +539,7 @@ class MavlinkVehicle:
             self._commander.turn(now)
             self._rates.turn(self._telemetry, now)
             self._touchdown.turn(now)
-            self._payload.turn(now)
+            self.payload.turn(now)
             self._airspace.turn(now)
             self._actuators.turn(now)
             if self._connection is not None:

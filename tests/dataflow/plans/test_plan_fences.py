@@ -126,9 +126,10 @@ def test_a_structure_scan_is_flown_around_the_structure(tmp_path: Path) -> None:
     assert places[0] == pytest.approx(places[-1])
     assert [(one.command, len(one.numbers)) for one in notices] == [
         ("DO_SET_ROI_WPNEXT_OFFSET", 1),
-        ("DO_SET_CAM_TRIGG_DIST", 8),
         ("DO_SET_ROI_NONE", 1),
     ]
+    triggered = [one.trigger_distance is not None for one in waypoints]
+    assert triggered == [False, *[False, True, True, True, True] * 4, False]
 
 
 def test_a_structure_scan_from_the_top(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from plan_files import item, lines, mavwp, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, HeightReference, WaypointType
-from aerodaas.dataflow.plans.commands import NAV_LAST, command_name
+from aerodaas.dataflow.plans.commands import IMAGE_STOP_CAPTURE, NAV_LAST, command_name
 from aerodaas.dataflow.plans.plan import Plan, PlanItem
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.dataflow.plans.waypoints_in import waypoints_of
@@ -75,12 +75,10 @@ def test_global_relative_needs_a_home(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("command", "line"),
     [
-        (206, "items 2, 3: DO_SET_CAM_TRIGG_DIST: no picture is taken"),
-        (2000, "items 2, 3: IMAGE_START_CAPTURE: no picture is taken"),
+        (202, "items 2, 3: DO_DIGICAM_CONFIGURE: no picture is taken"),
         (2500, "items 2, 3: VIDEO_START_CAPTURE: no picture is taken"),
-        (205, "items 2, 3: DO_MOUNT_CONTROL: no gimbal is moved"),
-        (1000, "items 2, 3: DO_GIMBAL_MANAGER_PITCHYAW: no gimbal is moved"),
-        (195, "items 2, 3: DO_SET_ROI_LOCATION: no gimbal is moved"),
+        (204, "items 2, 3: DO_MOUNT_CONFIGURE: no gimbal is moved"),
+        (196, "items 2, 3: DO_SET_ROI_WPNEXT_OFFSET: no gimbal is moved"),
         (183, "items 2, 3: DO_SET_SERVO: no payload is moved"),
         (177, "items 2, 3: DO_JUMP: the way is flown once"),
         (115, "items 2, 3: CONDITION_YAW: the drone does not turn"),
@@ -103,7 +101,8 @@ def test_no_item_vanishes() -> None:
         done = PlanItem(1, command, 2, (9.0, 1.0, 1.0, 1.0), 1.0, 1.0, 1.0)
         waypoints, notices = waypoints_of(Plan((done,)))
         assert not waypoints
-        assert [one.command for one in notices] == [command_name(command)]
+        stops = [command_name(command)] * (command != IMAGE_STOP_CAPTURE)
+        assert [one.command for one in notices] == stops
 
 
 @pytest.mark.parametrize(
@@ -468,9 +467,9 @@ def test_a_warning_has_an_end(tmp_path: Path) -> None:
     many = [item(40_000 + index, [0] * 7, 2) for index in range(100)]
     with pytest.warns(UserWarning, match=r"and 80 more: `aerodaas plan show` lists them"):
         AeroNavigation.from_plan(plan(tmp_path / "a.plan", *many))
-    triggers = [item(206, [0] * 7, 2)] * 500
-    (line,) = told(plan(tmp_path / "b.plan", *triggers))
-    assert line.startswith("items 1, 2, 3, 4, 5, 6, 7, 8 and 492 more: DO_SET_CAM_TRIGG_DIST")
+    servos = [item(183, [0] * 7, 2)] * 500
+    (line,) = told(plan(tmp_path / "b.plan", *servos))
+    assert line.startswith("items 1, 2, 3, 4, 5, 6, 7, 8 and 492 more: DO_SET_SERVO")
     path = plan(tmp_path / "c.plan", {"type": "\x1b[2J", "complexItemType": "\x1b[2J"})
     with pytest.raises(ConfigError) as raised:
         read_plan(path)

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from payload_flights import fly, found, outcome, take, told
 from stepped import Stepped
 
-from aerodaas.config.model import MissionConfig
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.mission.commands import AddNavigation, Start
-from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure, PhotoOutcome
+from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
 from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 
@@ -38,42 +31,6 @@ def ends(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ste
 def carried(ends: Stepped) -> EmulatedPayload:
     """What goes wrong with them."""
     return ends.autopilot.firmware.payload
-
-
-def wait(ends: Stepped, condition: Callable[[], object], timeout: float = 15.0) -> None:
-    """Turn both ends until `condition` holds."""
-    end = ends.now + timeout
-    while not condition():
-        assert ends.now < end, "waited in vain"
-        ends.turn()
-
-
-def found(ends: Stepped) -> None:
-    """Wait for both components, and the gimbal's first word."""
-    vehicle = ends.vehicle
-    wait(ends, lambda: vehicle.gimbal and vehicle.photo_camera and vehicle.gimbal.attitude)
-
-
-def outcome(ends: Stepped, timeout: float = 15.0) -> PhotoOutcome:
-    """The next word of a picture."""
-    said: list[PhotoOutcome] = []
-
-    def look() -> bool:
-        camera = ends.vehicle.photo_camera
-        assert camera is not None
-        said.extend(camera.outcomes())
-        return bool(said)
-
-    wait(ends, look, timeout)
-    (one,) = said
-    return one
-
-
-def take(ends: Stepped, label: str = "wp1") -> int:
-    """Ask for a picture."""
-    camera = ends.vehicle.photo_camera
-    assert camera is not None
-    return camera.take_photo(label)
 
 
 def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
@@ -269,47 +226,6 @@ def test_no_attitude_is_anything_but_finite(
     assert seen is None or all(map(math.isfinite, (seen.pitch, seen.yaw, seen.roll)))
 
 
-class _Clock:
-    """The mission's clock: that of both ends."""
-
-    def __init__(self, ends: Stepped) -> None:
-        self._ends = ends
-
-    def now(self) -> int:
-        """Nanoseconds."""
-        return round(self._ends.now * 1e9)
-
-
-def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
-    """A whole mission of two pictures; `each` is called at each turn."""
-    clock = _Clock(ends)
-    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
-    mission = Mission(
-        ends.robot.model_copy(update={"mission": MissionConfig(photo_timeout=4.0)}),
-        InlinePlanner(OrderedScheduler()),
-        takeoff=ends.vehicle.read().odometry.position,
-        payload=ends.vehicle,
-    )
-    loop = SetpointLoop(ends.vehicle, mission)
-    stops = [
-        Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
-        Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
-    ]
-    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
-    mission.handle(Start(), clock.now())
-    end = ends.now + 120.0
-    while not mission.finished and ends.now < end:
-        ends.advance(0.05)
-        loop.turn(clock.now())
-        each(mission)
-    return mission
-
-
-def told(mission: Mission) -> list[str]:
-    """What people were told of pictures."""
-    return [alert.text for alert in mission.alerts if alert.kind == "photo"]
-
-
 def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
     """Each once the gimbal looks there, straight down included."""
     with ends:
@@ -342,3 +258,36 @@ def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, faul
         assert list(mission.status.visited) == ["a", "b"]
         assert mission.status.photos == (1, 1)
         assert any(text.startswith("b: no picture: ") for text in told(mission))
+
+
+def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:
+    """Targets that follow one another go as messages, with a command now and then."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        for step in range(60):
+            gimbal.aim(GimbalTarget(-0.5 - step / 200, step / 100))
+            ends.advance(0.1)
+        ends.watch(0.5)
+        theirs = carried(ends)
+        commands = [
+            message
+            for _, message in ends.autopilot.heard
+            if message.get_type() == "COMMAND_LONG"
+            and message.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+        ]
+        assert theirs.tracked > 50
+        assert 2 <= len(commands) <= 6
+        assert theirs.pitch == pytest.approx(-0.795, abs=0.01)
+        assert theirs.right == pytest.approx(-0.59, abs=0.01)
+
+
+def test_a_gimbal_without_a_yaw_axis_says_so(ends: Stepped) -> None:
+    """By its manager's capabilities; a target comes back with the yaw that it keeps."""
+    with ends:
+        carried(ends).turns = False
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        assert gimbal.aim(GimbalTarget(-0.5, 0.7)) == GimbalTarget(-0.5, 0.0)

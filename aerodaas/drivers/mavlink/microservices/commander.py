@@ -114,6 +114,19 @@ class Commander:
                 CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
             )
 
+    def send(self, make: Callable[[int, int], Any]) -> None:
+        """Send what `make` makes for the target's system and component; nothing answers it."""
+        self._send(make(*self._target))
+
+    @property
+    def component(self) -> int:
+        """Id of the component that is commanded."""
+        return self._target[1]
+
+    def to(self, component: int) -> Commander:
+        """A commander of its own for another component of the same system."""
+        return Commander(self._send, (self._target[0], component), self._ours)
+
     def withdraw(self, number: int) -> None:
         """Withdraw the command of this `number`; its `done` is not called."""
         with self._lock:

@@ -31,6 +31,11 @@ _LEVEL = mavlink.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | mavlink.GIMBAL_MANAGER_FLAGS_P
 """Roll and pitch keep to the horizon; without YAW_LOCK, yaw counts from the nose."""
 _TO_NORTH = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 """Flags of an attitude whose yaw counts from north."""
+_TRACKING = 0.5
+"""Seconds after a target within which another one tracks something: it is sent without an
+acknowledgement, for the next one comes soon."""
+_CONFIRMED = 2.0
+"""Seconds after which a target is commanded all the same, so that a refusal is heard."""
 _POLE = 5e-4
 """Within 1.8 degrees of straight down roll and yaw cannot be told apart in single precision."""
 _UNIT = 0.1
@@ -51,7 +56,12 @@ class MavlinkGimbal:
         self._pitch = _range(information.pitch_min, information.pitch_max, math.pi)
         right = _range(information.yaw_min, information.yaw_max, math.pi)
         self._yaw = (-right[1], -right[0])
+        if information.cap_flags and not (
+            information.cap_flags & mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
+        ):
+            self._yaw = (0.0, 0.0)
         self._ours = False
+        self._aimed_at = self._commanded_at = -math.inf
 
     def silence(self, now: float) -> float:
         """Seconds since its newest attitude; 0 before the first, which it may never tell."""
@@ -63,8 +73,22 @@ class MavlinkGimbal:
             raise VehicleError(f"a gimbal needs finite angles, not {target}")
         pitch = min(max(target.pitch, self._pitch[0]), self._pitch[1])
         yaw = min(max(target.yaw, self._yaw[0]), self._yaw[1])
+        tracks = now - self._aimed_at <= _TRACKING and now - self._commanded_at <= _CONFIRMED
+        self._aimed_at = now
+        if tracks and self._ours and not self.fault:
+            self._commander.send(
+                lambda *target: mavlink.MAVLink_gimbal_manager_set_pitchyaw_message(
+                    *target, _LEVEL, self.device, pitch, -yaw, math.nan, math.nan
+                )
+            )
+        else:
+            self._command(pitch, yaw, now)
+        return GimbalTarget(pitch, yaw)
+
+    def _command(self, pitch: float, yaw: float, now: float) -> None:
         if not self._ours:
             self._take_control(now)
+        self._commanded_at = now
         self._commander.give(
             PendingCommand(
                 mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
@@ -77,7 +101,6 @@ class MavlinkGimbal:
             self._answered,
             now=now,
         )
-        return GimbalTarget(pitch, yaw)
 
     def _take_control(self, now: float) -> None:
         def done(outcome: CommandResult) -> None:

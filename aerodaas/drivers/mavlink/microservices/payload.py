@@ -1,28 +1,29 @@
-"""What a vehicle carries: discovery of gimbal and camera, and their messages, beside the flight.
+"""What a vehicle carries: gimbals and cameras, the autopilot's and those with ids of their own.
 
-It is asked for after connecting, and again in flight until it answers or refuses; nothing waits
-for it. The link's thread calls `take` and `turn`, the loop's thread the rest, under one lock.
+They are asked for after connecting, and again in flight until they answer or refuse; nothing waits
+for them. The link's thread calls `take`, `take_component` and `turn`, the loop's thread the rest,
+under one lock.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
-from aerodaas.drivers.mavlink.microservices.commander import (
-    Commander,
-    CommandResult,
-    PendingCommand,
-)
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.microservices.storage import CardState
+from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.clock import Clock
 from aerodaas.types.data import Odometry
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import yaw_enu_to_ned
 from aerodaas.types.payload import (
     Gimbal,
@@ -35,34 +36,19 @@ from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["Payload"]
 
-_PAUSE = 2.0
-"""Seconds between two requests for the same message."""
-_REQUESTS = 5
-"""Requests for a message that is promised and does not come."""
-_RATE = 10.0
-"""Attitudes of the gimbal a second."""
-_OVERDUE = 3.0
-"""Seconds without an attitude after which it is asked for again."""
-_GONE = 5.0
-"""Seconds without an attitude after which a gimbal that had told one counts as gone."""
-
-
-@dataclass(slots=True)
-class _Search:
-    """How far the search for one component is."""
-
-    message: int
-    left: int = _REQUESTS
-    due: float = -math.inf
-
 
 class Payload:
-    """Gimbal and camera of one vehicle."""
+    """Gimbals and cameras of one vehicle, of which one of each is used.
+
+    One with an id of its own comes before the autopilot's, and of several the one with the lowest
+    id: the choice depends on what is there, and not on who answered first.
+    """
 
     messages: ClassVar[frozenset[str]] = frozenset(
         {
             *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
             *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
+            *("VIDEO_STREAM_INFORMATION", "STORAGE_INFORMATION"),
         }
     )
     """What `take` processes."""
@@ -72,114 +58,140 @@ class Payload:
         self.clock = clock
         """The mission's."""
         self._lock = lock
-        self._commander: Commander | None = None
-        self._gimbal: MavlinkGimbal | None = None
-        self._camera: MavlinkCamera | None = None
+        self._autopilot: PayloadComponent | None = None
+        self._own: dict[int, PayloadComponent] = {}
+        """Those with an id of their own."""
         self._odometry: Odometry | None = None
-        self._searches = [
-            _Search(mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION),
-            _Search(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION),
-        ]
-        self._asked_at = -math.inf
+        self._count = itertools.count(1)
+        """Numbers of pictures, over all cameras."""
 
     def search(self, commander: Commander) -> None:
-        """Begin to search, by `commander`."""
-        self._commander = commander
+        """Begin to search, by the autopilot's `commander`."""
+        self._autopilot = self._component(commander, own=False)
+
+    def _component(self, commander: Commander, *, own: bool) -> PayloadComponent:
+        return PayloadComponent(
+            commander.component, commander, moment=self._moment, count=self._count, own=own
+        )
+
+    def _ranked(self) -> list[PayloadComponent]:
+        """All components, the preferred ones first."""
+        own = [self._own[number] for number in sorted(self._own)]
+        return own if self._autopilot is None else [*own, self._autopilot]
+
+    def _gimbal(self, now: float) -> MavlinkGimbal | None:
+        found = (one.gimbal_now(now) for one in self._ranked())
+        return next((one for one in found if one is not None), None)
 
     @property
     def gimbal(self) -> Gimbal | None:
-        """The gimbal; None before it is found, and while it says nothing any more."""
+        """The gimbal; None before one is found, and while none says anything any more."""
         with self._lock:
-            gimbal = self._gimbal
-            silent = gimbal is not None and gimbal.silence(time.monotonic()) > _GONE
-            return None if gimbal is None or silent else _LockedGimbal(gimbal, self._lock)
+            gimbal = self._gimbal(time.monotonic())
+            return None if gimbal is None else _LockedGimbal(gimbal, self._lock)
 
     @property
     def camera(self) -> PhotoCamera | None:
-        """The camera; None before it is found."""
-        return None if self._camera is None else _LockedCamera(self._camera, self._lock)
+        """The camera; None before one is found, and while none says anything any more."""
+        with self._lock:
+            tells = any(
+                one.camera is not None and one.camera.has_outcomes for one in self._ranked()
+            )
+            known = tells or self.used_camera() is not None
+            return _Cameras(self, self._lock) if known else None
+
+    def used_camera(self) -> MavlinkCamera | None:
+        """The camera that takes the next picture; the caller locks."""
+        found = (one.camera_now(time.monotonic()) for one in self._ranked())
+        return next((one for one in found if one is not None), None)
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """What became of pictures of all cameras; the caller locks."""
+        cameras = [one.camera for one in self._ranked() if one.camera is not None]
+        return [outcome for camera in cameras for outcome in camera.outcomes()]
 
     def complete(self, state: VehicleState) -> VehicleState:
-        """`state` with the gimbal's attitude; it is the newest from now on."""
+        """`state` with the gimbal's attitude and what is wrong; it is the newest from now on."""
         self._odometry = state.odometry
-        gimbal = self._gimbal
-        return state if gimbal is None else replace(state, gimbal=gimbal.attitude)
+        now = time.monotonic()
+        faults = [
+            f"{one.name}: no word from it any more" for one in self._own.values() if one.gone(now)
+        ]
+        faults += [
+            f"{one.name}: {one.card.trouble}"
+            for one in self._ranked()
+            if one.card is not None and one.card.trouble and not one.gone(now)
+        ]
+        attitude, video = self._attitude(), self._video()
+        if attitude is None and not faults and not video:
+            return state
+        return replace(state, gimbal=attitude, faults=(*state.faults, *faults), video=video)
+
+    def streams(self) -> list[tuple[str, VideoStream]]:
+        """Video that its cameras tell of, with the camera's name, the preferred one first."""
+        with self._lock:
+            return [
+                (one.name, one.streams[number])
+                for one in self._ranked()
+                for number in sorted(one.streams)
+            ]
+
+    def cards(self) -> list[tuple[str, CardState]]:
+        """What its cameras say of their cards, with the camera's name, the preferred one first."""
+        with self._lock:
+            return [(one.name, one.card) for one in self._ranked() if one.card is not None]
+
+    def _video(self) -> str:
+        return next((stream.uri for _, stream in self.streams() if not stream.objection), "")
+
+    def _attitude(self) -> GimbalAttitude | None:
+        """The newest word of the gimbal that is used, or was last."""
+        gimbal = self._gimbal(time.monotonic())
+        if gimbal is None:
+            gimbal = next((one.gimbal for one in self._ranked() if one.gimbal is not None), None)
+        return None if gimbal is None else gimbal.attitude
 
     def _moment(self) -> tuple[int, Odometry | None, GimbalAttitude | None]:
-        gimbal = self._gimbal
-        return self.clock.now(), self._odometry, None if gimbal is None else gimbal.attitude
+        return self.clock.now(), self._odometry, self._attitude()
 
     def take(self, message: Message, now: float) -> None:
-        """Process one of `messages`; in the link's thread."""
-        if self._commander is None:
+        """Process one of the autopilot's `messages`; in the link's thread."""
+        if self._autopilot is not None:
+            self._hear(self._autopilot, message, now)
+
+    def take_component(self, message: Message, now: float) -> None:
+        """Process what a component with an id of its own says; in the link's thread."""
+        with self._lock:
+            if self._autopilot is None:
+                return
+            number = message.get_srcComponent()
+            if number not in self._own:
+                if message.get_type() != "HEARTBEAT" and message.get_type() not in self.messages:
+                    return
+                commander = self._autopilot.commander.to(number)
+                self._own[number] = self._component(commander, own=True)
+            self._hear(self._own[number], message, now)
+
+    def _hear(self, component: PayloadComponent, message: Message, now: float) -> None:
+        component.take(message, now)
+        if message.get_type() != "GIMBAL_DEVICE_ATTITUDE_STATUS":
             return
-        kind = message.get_type()
-        if kind == "GIMBAL_MANAGER_INFORMATION":
-            if self._gimbal is None:
-                self._gimbal = MavlinkGimbal(message, self._commander)
-        elif kind == "CAMERA_INFORMATION":
-            if self._camera is None:
-                self._camera = MavlinkCamera(self._commander, self._moment)
-        elif kind == "GIMBAL_DEVICE_ATTITUDE_STATUS":
-            if self._gimbal is not None:
-                yaw = math.nan if self._odometry is None else self._odometry.yaw
-                heading = yaw_enu_to_ned(yaw) if math.isfinite(yaw) else 0.0
-                self._gimbal.take(message, now, self.clock.now(), heading)
-        elif self._camera is not None:
-            self._camera.take(message)
+        yaw = math.nan if self._odometry is None else self._odometry.yaw
+        heading = yaw_enu_to_ned(yaw) if math.isfinite(yaw) else 0.0
+        for one in self._ranked():
+            # A device speaks for itself, or whoever manages it speaks for it.
+            if one.gimbal is not None and component.number in {one.number, one.gimbal.device}:
+                one.gimbal.take(message, now, self.clock.now(), heading)
 
     def turn(self, now: float) -> None:
-        """Search on, and see to the gimbal's attitude; in the link's thread."""
-        if self._commander is None:
-            return
-        if self._camera is not None:
-            self._camera.turn(now)
-        busy = self._commander.under_way(mavlink.MAV_CMD_REQUEST_MESSAGE) is not None
-        found = (self._gimbal, self._camera)
-        for search, component in zip(self._searches, found, strict=True):
-            if component is None and search.left and now >= search.due and not busy:
-                self._request(self._commander, search, now)
-                return
-        self._see_to_attitude(self._commander, now)
+        """Search on, and see to the gimbals' attitudes; in the link's thread."""
+        for one in self._ranked():
+            one.turn(now)
+            one.see_to_attitude(now, self._commander_of)
 
-    @staticmethod
-    def _request(commander: Commander, search: _Search, now: float) -> None:
-        search.left -= 1
-        search.due = now + _PAUSE
-
-        def done(outcome: CommandResult) -> None:
-            if not (outcome.accepted or outcome.replaced) and outcome.text != "no answer":
-                search.left = 0
-
-        commander.give(
-            PendingCommand(
-                mavlink.MAV_CMD_REQUEST_MESSAGE,
-                (float(search.message), *[0.0] * 6),
-                "tell what it carries",
-                insists=False,
-            ),
-            done,
-            now=now,
-        )
-
-    def _see_to_attitude(self, commander: Commander, now: float) -> None:
-        gimbal = self._gimbal
-        if gimbal is None or now - self._asked_at < _OVERDUE:
-            return
-        number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        missing = gimbal.heard_at is None or gimbal.silence(now) > _OVERDUE
-        # An autopilot takes one such command at a time, and the flight's own come first.
-        first = self._asked_at == -math.inf
-        if not (missing or first) or commander.under_way(number) is not None:
-            return
-        self._asked_at = now
-        message = float(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
-        commander.give(
-            PendingCommand(
-                number, (message, 1e6 / _RATE, *[0.0] * 5), "tell where the gimbal looks"
-            ),
-            now=now,
-        )
+    def _commander_of(self, device: int) -> Commander | None:
+        component = self._own.get(device)
+        return None if component is None else component.commander
 
 
 class _LockedGimbal:
@@ -205,19 +217,22 @@ class _LockedGimbal:
         return self._gimbal.fault
 
 
-class _LockedCamera:
-    """A camera for the loop's thread."""
+class _Cameras:
+    """All cameras for the loop's thread: one takes pictures, all tell what became of theirs."""
 
-    def __init__(self, camera: MavlinkCamera, lock: AbstractContextManager[object]) -> None:
-        self._camera = camera
+    def __init__(self, payload: Payload, lock: AbstractContextManager[object]) -> None:
+        self._payload = payload
         self._lock = lock
 
     def take_photo(self, label: str) -> int:
         """See `PhotoCamera`."""
         with self._lock:
-            return self._camera.take_photo(label, time.monotonic())
+            camera = self._payload.used_camera()
+            if camera is None:
+                raise VehicleError("no camera answers any more")
+            return camera.take_photo(label, time.monotonic())
 
     def outcomes(self) -> list[PhotoOutcome]:
         """See `PhotoCamera`."""
         with self._lock:
-            return self._camera.outcomes()
+            return self._payload.outcomes()

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
@@ -21,7 +22,10 @@ from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.data import Odometry
 from aerodaas.types.payload import GimbalAttitude, Photo, PhotoFailure, PhotoOutcome, PhotoPlace
 
-__all__ = ["MavlinkCamera"]
+__all__ = ["MavlinkCamera", "Moment"]
+
+Moment: TypeAlias = Callable[[], tuple[int, Odometry | None, GimbalAttitude | None]]
+"""Mission clock, vehicle and gimbal now."""
 
 _PATIENCE = 8.0
 """Seconds from a request to the word of its picture."""
@@ -42,22 +46,21 @@ class MavlinkCamera:
     def __init__(
         self,
         commander: Commander,
-        moment: Callable[[], tuple[int, Odometry | None, GimbalAttitude | None]],
+        moment: Moment,
+        count: Iterator[int],
     ) -> None:
-        """Command it by `commander`; `moment` is mission clock, vehicle and gimbal now."""
+        """Command it by `commander`; `count` numbers the pictures of all cameras."""
         self._commander = commander
         self._moment = moment
-        self._taken = 0
+        self._count = count
         self._request: _Request | None = None
         self._newest: int | None = None
         self._outcomes: deque[PhotoOutcome] = deque(maxlen=_MOST)
 
     def take_photo(self, label: str, now: float) -> int:
         """Ask for one picture; one that is still awaited is given up."""
-        if self._request is not None:
-            self._fail(self._request, "another picture was asked for before it came")
-        self._taken += 1
-        number = self._taken
+        self.give_up("another picture was asked for before it came")
+        number = next(self._count)
         self._request = _Request(number, label, now + _PATIENCE)
 
         def done(outcome: CommandResult) -> None:
@@ -76,6 +79,11 @@ class MavlinkCamera:
         )
         return number
 
+    @property
+    def has_outcomes(self) -> bool:
+        """Whether something is to be told."""
+        return bool(self._outcomes)
+
     def outcomes(self) -> list[PhotoOutcome]:
         """What became of pictures since the last call."""
         found = list(self._outcomes)
@@ -86,6 +94,11 @@ class MavlinkCamera:
         """Give up a picture that is not told."""
         if self._request is not None and now >= self._request.deadline:
             self._fail(self._request, "the camera does not tell of the picture")
+
+    def give_up(self, reason: str) -> None:
+        """Give up a picture that is awaited."""
+        if self._request is not None:
+            self._fail(self._request, reason)
 
     def _fail(self, request: _Request, reason: str) -> None:
         self._request = None

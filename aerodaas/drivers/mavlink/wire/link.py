@@ -55,8 +55,11 @@ _WANTED = frozenset(
         *(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED),
         *(mavlink.MAVLINK_MSG_ID_LOG_ENTRY, mavlink.MAVLINK_MSG_ID_LOG_DATA),
         *(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED),
-        mavlink.MAVLINK_MSG_ID_CAMERA_FEEDBACK,
-        mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
+        *(mavlink.MAVLINK_MSG_ID_CAMERA_FEEDBACK, mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION),
+        *(
+            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
+            mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+        ),
         mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
         *(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mavlink.MAVLINK_MSG_ID_RELAY_STATUS),
         mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO,
@@ -94,7 +97,8 @@ class LinkCounts:
 class MavlinkLink:
     """Link to one vehicle; `send` may be called from any thread.
 
-    `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second, and
+    `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second;
+    `on_component` with messages of the vehicle's cameras and gimbals that have ids of their own;
     `healthy` before each heartbeat: no heartbeat without a working control loop. Every message
     before `adopt` counts as the vehicle's; from then on only those from its own address. After a
     silence it may have another one, if it `stands` on the ground or if packets are signed.
@@ -107,6 +111,7 @@ class MavlinkLink:
         *,
         on_message: Callable[[Message, float, Peer], None],
         on_turn: Callable[[float], None],
+        on_component: Callable[[Message, float], None] = lambda *_: None,
         healthy: Callable[[float], bool],
         stands: Callable[[], bool],
     ) -> None:
@@ -116,6 +121,7 @@ class MavlinkLink:
         self._settings = settings
         self._on_message = on_message
         self._on_turn = on_turn
+        self._on_component = on_component
         self._healthy = healthy
         self._key = load_key(settings, name)
         self._mav: Any = SignedCodec(None, settings.sender, settings.own_component)
@@ -282,6 +288,9 @@ class MavlinkLink:
         if sender != target:
             self._pins.meet(sender, peer)
         if target is not None:
+            if self._pins.carries(sender, peer):
+                self._on_component(message, now)
+                return
             if sender != target:
                 if self._is_aboard(message, sender, target, peer):
                     self._on_message(message, now, peer)

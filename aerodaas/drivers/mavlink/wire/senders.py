@@ -7,7 +7,12 @@ from collections.abc import Callable
 from aerodaas.drivers.mavlink.wire.framing import senders
 from aerodaas.drivers.pin import Peer, Pin
 
-__all__ = ["Sender", "SenderPins"]
+__all__ = ["CAMERAS", "GIMBALS", "Sender", "SenderPins"]
+
+CAMERAS = frozenset(range(100, 106))
+"""Component ids of cameras (MAV_COMP_ID_CAMERA to CAMERA6)."""
+GIMBALS = frozenset({154, *range(171, 176)})
+"""Component ids of gimbals (MAV_COMP_ID_GIMBAL to GIMBAL6)."""
 
 Sender = tuple[int, int]
 """System and component."""
@@ -39,6 +44,12 @@ class SenderPins:
         """Remember a sender other than the adopted vehicle."""
         if len(self._others) < _MOST:
             self._others.setdefault(sender, peer)
+
+    def carries(self, sender: Sender, peer: Peer) -> bool:
+        """Whether a packet is of a camera or gimbal of the vehicle, from the vehicle's address."""
+        target = self.target
+        known = target is not None and sender[0] == target[0] and sender != target
+        return known and sender[1] in CAMERAS | GIMBALS and peer == self.pin.address
 
     @property
     def addresses(self) -> tuple[Peer, ...]:

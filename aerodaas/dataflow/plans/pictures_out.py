@@ -1,0 +1,71 @@
+"""Pictures, gimbal and places to look at of waypoints, as a plan's items."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from aerodaas.dataflow.plans.commands import (
+    DO_MOUNT_CONTROL,
+    DO_SET_CAM_TRIGG_DIST,
+    DO_SET_ROI_LOCATION,
+    FRAME_MISSION,
+    IMAGE_START_CAPTURE,
+    IMAGE_STOP_CAPTURE,
+    MOUNT_MAVLINK_TARGETING,
+)
+from aerodaas.dataflow.plans.plan import PlanItem
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["PictureWriter"]
+
+_AT_ONCE = 1.0
+"""DO_SET_CAM_TRIGG_DIST: the first picture is taken at the beginning."""
+
+
+class PictureWriter:
+    """Items before and behind each waypoint, in order; their numbers are the caller's."""
+
+    def __init__(self) -> None:
+        """Take no pictures yet."""
+        self._distance: float | None = None
+        self._interval: float | None = None
+
+    def before(
+        self, waypoint: Waypoint, frame: int, spot: tuple[float, float, float] | None
+    ) -> Iterator[PlanItem]:
+        """What begins on the way to `waypoint`; `spot` is what it looks at, in its `frame`."""
+        yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
+        gimbal = waypoint.gimbal
+        if gimbal is not None:
+            values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)
+            yield PlanItem(
+                *(0, DO_MOUNT_CONTROL, FRAME_MISSION, values, 0.0, 0.0),
+                float(MOUNT_MAVLINK_TARGETING),
+            )
+        if spot is not None:
+            yield PlanItem(0, DO_SET_ROI_LOCATION, frame, (0.0, 0.0, 0.0, 0.0), *spot)
+
+    def behind(self, waypoint: Waypoint) -> Iterator[PlanItem]:
+        """What is done at `waypoint`."""
+        if waypoint.photo:
+            yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
+
+    def end(self) -> Iterator[PlanItem]:
+        """What ends with the last waypoint."""
+        yield from self._triggers(None, None)
+
+    def _triggers(self, distance: float | None, interval: float | None) -> Iterator[PlanItem]:
+        # A camera by distance is not stopped by what stops one by time, and the other way round.
+        if self._interval is not None and interval is None:
+            yield _item(IMAGE_STOP_CAPTURE)
+        if distance != self._distance and (distance or self._distance):
+            yield _item(DO_SET_CAM_TRIGG_DIST, distance or 0.0, 0.0, _AT_ONCE if distance else 0.0)
+        if interval is not None and interval != self._interval:
+            yield _item(IMAGE_START_CAPTURE, 0.0, interval, 0.0)
+        self._distance, self._interval = distance, interval
+
+
+def _item(command: int, *values: float) -> PlanItem:
+    first, second, third, fourth = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
+    return PlanItem(0, command, FRAME_MISSION, (first, second, third, fourth), 0.0, 0.0, 0.0)

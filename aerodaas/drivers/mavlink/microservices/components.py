@@ -1,0 +1,241 @@
+"""Components with MAVLink ids of their own: cameras and gimbals, each found, asked and lost alone.
+
+The link hands on only what comes from the vehicle's own system and address. What a component does
+not do costs what was asked of it, and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from aerodaas.drivers.mavlink.microservices.commander import (
+    Commander,
+    CommandResult,
+    PendingCommand,
+)
+from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
+from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
+from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.drivers.mavlink.wire.senders import CAMERAS
+
+__all__ = ["PayloadComponent"]
+
+_CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
+_VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+_STORAGE = mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION
+_CARD_AGAIN = 20.0
+"""Seconds after which a camera that tells of its card is asked again."""
+_MOST_STREAMS = 8
+"""Streams of one camera that are remembered."""
+_PAUSE = 2.0
+"""Seconds between two requests for the same message."""
+_REQUESTS = 5
+"""Requests for a message that is promised and does not come."""
+_RATE = 10.0
+"""Attitudes of the gimbal a second."""
+_OVERDUE = 3.0
+"""Seconds without an attitude after which it is asked for again."""
+_GONE = 5.0
+"""Seconds without a word after which a component, or a gimbal's attitude, counts as gone."""
+
+
+@dataclass(slots=True)
+class _Search:
+    """How far the search for one message is."""
+
+    message: int
+    left: int = _REQUESTS
+    due: float = -math.inf
+
+
+class PayloadComponent:
+    """Camera or gimbal of one MAVLink id, or what the autopilot itself manages; the caller locks.
+
+    The link's thread calls `take` and `turn`.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        commander: Commander,
+        *,
+        moment: Moment,
+        count: Iterator[int],
+        own: bool,
+    ) -> None:
+        """Search for what component `number` is, by `commander`.
+
+        `moment` and `count` are a camera's. `own` is whether the id is its own, and so are its
+        heartbeats and its commander's turns.
+        """
+        self.number = number
+        self.gimbal: MavlinkGimbal | None = None
+        self.camera: MavlinkCamera | None = None
+        self.streams: dict[int, VideoStream] = {}
+        """Of its video, by number; the first word of each counts."""
+        self.card: CardState | None = None
+        """What its camera said of its card; None before."""
+        self._card_at = -math.inf
+        self.commander = commander
+        self._moment = moment
+        self._count = count
+        self._own = own
+        self._heard_at: float | None = None
+        self._asked_at = -math.inf
+        self._informed = False
+        self._begin()
+
+    def _begin(self) -> None:
+        gimbals = [mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION]
+        cameras = [mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION]
+        wanted = gimbals + cameras
+        if self._own:
+            wanted = cameras if self.number in CAMERAS else gimbals
+        self._searches = [_Search(one) for one in wanted]
+
+    @property
+    def name(self) -> str:
+        """What people are told of it."""
+        if not self._own:
+            return "the autopilot's camera"
+        return f"{'camera' if self.number in CAMERAS else 'gimbal'} (component {self.number})"
+
+    def silent(self, now: float) -> float:
+        """Seconds since a component of its own was heard; 0 for the autopilot, heard otherwise."""
+        return 0.0 if self._heard_at is None else now - self._heard_at
+
+    def gone(self, now: float) -> bool:
+        """Whether it has fallen silent."""
+        return self.silent(now) > _GONE
+
+    def gimbal_now(self, now: float) -> MavlinkGimbal | None:
+        """Its gimbal; None without one, or while that says nothing any more."""
+        gimbal = self.gimbal
+        silent = gimbal is None or gimbal.silence(now) > _GONE or self.gone(now)
+        return None if silent else gimbal
+
+    def camera_now(self, now: float) -> MavlinkCamera | None:
+        """Its camera; None without one, or while it says nothing any more."""
+        return None if self.gone(now) else self.camera
+
+    def take(self, message: Message, now: float) -> None:
+        """Process a message of its own, other than an attitude."""
+        if self._own:
+            if self.gone(now):
+                self._begin()
+            self._heard_at = now
+        kind = message.get_type()
+        if kind == "COMMAND_ACK":
+            if self._own:
+                self.commander.take(message, now)
+        elif kind in {"CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"}:
+            if self.camera is not None:
+                self.camera.take(message)
+        else:
+            self._learn(message, kind, now)
+
+    def _learn(self, message: Message, kind: str, now: float) -> None:
+        """Take in what was searched for."""
+        if kind == "GIMBAL_MANAGER_INFORMATION":
+            self.gimbal = self.gimbal or MavlinkGimbal(message, self.commander)
+        elif kind == "CAMERA_INFORMATION":
+            self._inform(message)
+        elif kind == "VIDEO_STREAM_INFORMATION" and len(self.streams) < _MOST_STREAMS:
+            self.streams.setdefault(int(message.stream_id), video_stream(message))
+        elif kind == "STORAGE_INFORMATION":
+            self.card, self._card_at = card_state(message), now
+            for search in self._searches:
+                search.left = _REQUESTS if search.message == _STORAGE else search.left
+
+    def _inform(self, information: Message) -> None:
+        self._informed = True
+        if self.camera is None and _takes_pictures(information):
+            self.camera = MavlinkCamera(self.commander, self._moment, self._count)
+        if self.camera is not None and all(one.message != _STORAGE for one in self._searches):
+            self._searches.append(_Search(_STORAGE))
+        films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+        if films and all(search.message != _VIDEO for search in self._searches):
+            self._searches.append(_Search(_VIDEO))
+
+    def _knows(self, message: int, now: float) -> bool:
+        """Whether what a search is for has been found."""
+        if message == _STORAGE:
+            return now - self._card_at < _CARD_AGAIN
+        if message == _VIDEO:
+            return bool(self.streams)
+        return self._informed if message == _CAMERA else self.gimbal is not None
+
+    def turn(self, now: float) -> None:
+        """Repeat commands, search on, and give up what does not come."""
+        if self._own:
+            if self.gone(now):
+                if self.camera is not None:
+                    self.camera.give_up("the camera says nothing any more")
+                return
+            self.commander.turn(now)
+        if self.camera is not None:
+            self.camera.turn(now)
+        busy = self.commander.under_way(mavlink.MAV_CMD_REQUEST_MESSAGE) is not None
+        for search in self._searches:
+            if (
+                not self._knows(search.message, now)
+                and search.left
+                and now >= search.due
+                and not busy
+            ):
+                self._request(search, now)
+                return
+
+    def _request(self, search: _Search, now: float) -> None:
+        search.left -= 1
+        search.due = now + _PAUSE
+
+        def done(outcome: CommandResult) -> None:
+            if not (outcome.accepted or outcome.replaced) and outcome.text != "no answer":
+                search.left = 0
+
+        self.commander.give(
+            PendingCommand(
+                mavlink.MAV_CMD_REQUEST_MESSAGE,
+                (float(search.message), *[0.0] * 6),
+                "tell what it carries",
+                insists=False,
+            ),
+            done,
+            now=now,
+        )
+
+    def see_to_attitude(self, now: float, device: Callable[[int], Commander | None]) -> None:
+        """Ask for the gimbal's attitude, at first and where it does not come.
+
+        `device` is the commander of a gimbal device that speaks for itself, by its id.
+        """
+        gimbal = self.gimbal
+        if gimbal is None or self.gone(now) or now - self._asked_at < _OVERDUE:
+            return
+        commander = device(gimbal.device) or self.commander
+        number = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+        missing = gimbal.heard_at is None or gimbal.silence(now) > _OVERDUE
+        # An autopilot takes one such command at a time, and the flight's own come first.
+        first = self._asked_at == -math.inf
+        if not (missing or first) or commander.under_way(number) is not None:
+            return
+        self._asked_at = now
+        message = float(mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)
+        commander.give(
+            PendingCommand(
+                number, (message, 1e6 / _RATE, *[0.0] * 5), "tell where the gimbal looks"
+            ),
+            now=now,
+        )
+
+
+def _takes_pictures(information: Message) -> bool:
+    """Whether a camera says so; one without any capability is an old one that takes pictures."""
+    flags = int(information.flags)
+    return not flags or bool(flags & mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE)

@@ -1,0 +1,294 @@
+"""Cameras and gimbals with MAVLink ids of their own: found, commanded, lost, and never obeyed."""
+
+from __future__ import annotations
+
+import math
+import socket
+from collections.abc import Callable
+
+import pytest
+from payload_flights import fly, found, outcome, take, told
+from stepped import Stepped
+
+from aerodaas.drivers.mavlink.microservices.storage import card_state
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.mission import Mission
+from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
+from aerodaas.types.status import MissionState
+from tools.mavlink_vehicle import AutopilotOptions
+
+CAMERA, GIMBAL = 100, 154
+
+
+@pytest.fixture(params=["px4", "ardupilot"])
+def ends(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Stepped:
+    """Both families, with one of each that speak for themselves, and none on the autopilot."""
+    options = AutopilotOptions(family=request.param, components=(CAMERA, GIMBAL))
+    return Stepped(monkeypatch, options)
+
+
+def commands(ends: Stepped, component: int, number: int) -> int:
+    """How many commands of that number went to a component."""
+    return sum(
+        message.get_type() == "COMMAND_LONG"
+        and message.command == number
+        and message.target_component == component
+        for _, message in ends.autopilot.heard
+    )
+
+
+def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Stepped) -> None:
+    """Pictures by the camera, angles by the gimbal; the autopilot gets none of it."""
+    with ends:
+        found(ends)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        gimbal.aim(GimbalTarget(-0.8, 0.5))
+        ends.watch(3.0)
+        theirs = ends.autopilot.components[GIMBAL].payload
+        assert (theirs.pitch, theirs.right) == pytest.approx((-0.8, -0.5))
+        seen = ends.vehicle.read().gimbal
+        assert seen is not None
+        assert (seen.pitch, seen.yaw) == pytest.approx((-0.8, 0.5))
+        take(ends)
+        photo = outcome(ends)
+        assert isinstance(photo, Photo)
+        assert photo.gimbal is not None
+        assert photo.file == "DCIM/0001.JPG"
+        turn, capture = (
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        )
+        assert (commands(ends, GIMBAL, turn), commands(ends, CAMERA, capture)) == (1, 1)
+        assert (commands(ends, 1, turn), commands(ends, 1, capture)) == (0, 0)
+        assert ends.vehicle.read().extra.get("stranger_packets", 0) == 0
+
+
+def test_a_mission_takes_its_pictures_with_them(ends: Stepped) -> None:
+    """As with what the autopilot manages."""
+    with ends:
+        mission = fly(ends)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert told(mission) == []
+        first, second = mission.photographer.photos
+        assert first.gimbal is not None
+        assert second.gimbal is not None
+        assert first.gimbal.pitch == pytest.approx(-math.pi / 2, abs=0.06)
+        assert second.gimbal.yaw == pytest.approx(0.7, abs=0.06)
+
+
+def _vanish(ends: Stepped) -> None:
+    for component in ends.autopilot.components.values():
+        component.vanished = True
+
+
+def _stall(ends: Stepped) -> None:
+    for component in ends.autopilot.components.values():
+        component.stalls = True
+
+
+def _lie(ends: Stepped) -> None:
+    ends.autopilot.components[GIMBAL].payload.nonsense = True
+
+
+def _refuse(ends: Stepped) -> None:
+    ends.autopilot.components[CAMERA].payload.camera_refuses = True
+
+
+@pytest.mark.parametrize("strike", [_vanish, _stall, _lie, _refuse])
+def test_what_fails_in_flight_costs_the_second_picture_alone(
+    ends: Stepped, strike: Callable[[Stepped], None]
+) -> None:
+    """It is told, and the drone flies on, comes home and lands."""
+
+    def each(mission: Mission) -> None:
+        if mission.status.visits:
+            strike(ends)
+
+    with ends:
+        mission = fly(ends, each)
+        assert mission.state is MissionState.LANDED, mission.status.reason
+        assert list(mission.status.visited) == ["a", "b"]
+        assert mission.status.photos == (1, 1)
+        assert any(text.startswith("b: no picture: ") for text in told(mission))
+
+
+def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
+    """A picture that is awaited is given up; with its next heartbeat it is back."""
+    with ends:
+        found(ends)
+        number = take(ends)
+        ends.autopilot.components[CAMERA].vanished = True
+        failure = outcome(ends, 7.0)
+        assert isinstance(failure, PhotoFailure)
+        assert failure.number == number
+        assert "says nothing any more" in failure.reason
+        assert ends.vehicle.photo_camera is None
+        faults = ends.vehicle.read().faults
+        assert faults == ("camera (component 100): no word from it any more",)
+        ends.autopilot.components[CAMERA].vanished = False
+        ends.watch(2.0)
+        assert ends.vehicle.read().faults == ()
+        assert take(ends) > number
+        assert isinstance(outcome(ends), Photo)
+
+
+def test_a_camera_that_comes_late_is_found_in_flight(ends: Stepped) -> None:
+    """Its heartbeat is enough."""
+    for component in ends.autopilot.components.values():
+        component.vanished = True
+    with ends:
+        ends.watch(8.0)
+        assert ends.vehicle.photo_camera is None
+        for component in ends.autopilot.components.values():
+            component.vanished = False
+        found(ends)
+
+
+def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the autopilot's; where it vanishes the next one takes its place."""
+    options = AutopilotOptions(components=(101, 103), camera=True)
+    with Stepped(monkeypatch, options) as ends:
+        ends.watch(4.0)
+        capture = mavlink.MAV_CMD_IMAGE_START_CAPTURE
+        numbers = []
+        for component in (101, 103, 1):
+            numbers.append(take(ends))
+            ends.watch(1.0)
+            assert commands(ends, component, capture) == 1
+            photo = outcome(ends)
+            assert isinstance(photo, Photo)
+            assert photo.number == numbers[-1]
+            if component != 1:
+                ends.autopilot.components[component].vanished = True
+                ends.watch(6.0)
+        assert len(set(numbers)) == 3
+
+
+def test_a_camera_that_only_films_takes_no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By its own flags."""
+    with Stepped(monkeypatch, AutopilotOptions(components=(100,))) as ends:
+        ends.autopilot.components[100].payload.flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
+        ends.watch(8.0)
+        assert ends.vehicle.photo_camera is None
+
+
+def test_a_managed_gimbals_device_speaks_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As with PX4: the autopilot manages, and component 154 tells where it looks."""
+    with Stepped(monkeypatch, AutopilotOptions(gimbal=True, components=(154,))) as ends:
+        managed, device = ends.autopilot.firmware.payload, ends.autopilot.components[154].payload
+        managed.device = 154
+        device.has_gimbal = False
+        ends.watch(3.0)
+        device.has_gimbal, device.pitch = True, -0.4
+        managed.has_gimbal = False
+        device.stuck = True
+        ends.watch(6.0)
+        gimbal = ends.vehicle.gimbal
+        assert gimbal is not None
+        assert gimbal.attitude is not None
+        assert gimbal.attitude.pitch == pytest.approx(-0.4)
+
+
+@pytest.mark.parametrize(("system", "elsewhere"), [(1, True), (2, False), (2, True)])
+def test_strangers_are_no_components(
+    monkeypatch: pytest.MonkeyPatch,
+    system: int,
+    elsewhere: bool,  # noqa: FBT001
+) -> None:
+    """Who speaks from another address, or as another system, is neither heard nor commanded."""
+    with Stepped(monkeypatch, AutopilotOptions()) as ends:
+        ends.watch(1.0)
+        forger = mavlink.MAVLink(None, system, CAMERA)
+        name = list(b"forged".ljust(32, b"\0"))
+        said = [
+            mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_CAMERA, 8, 0, 0, 4, 3),
+            mavlink.MAVLink_camera_information_message(
+                0, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, 2, 0, b""
+            ),
+        ]
+        content = b"".join(message.pack(forger) for message in said)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+            for _ in range(20):
+                if elsewhere:
+                    other.sendto(content, ends.autopilot.options.peer)
+                else:
+                    ends.autopilot.inject(content)
+                ends.turn()
+        assert ends.vehicle.photo_camera is None
+        assert not any(
+            message.get_type() == "COMMAND_LONG" and message.target_component == CAMERA
+            for _, message in ends.autopilot.heard
+        )
+
+
+@pytest.mark.parametrize("component", [1, CAMERA])
+def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, component: int) -> None:
+    """The autopilot's camera or one with an id of its own; people do not see its password."""
+    own = () if component == 1 else (component,)
+    options = AutopilotOptions(components=own, camera=component == 1)
+    with Stepped(monkeypatch, options) as ends:
+        autopilot = ends.autopilot
+        payload = (
+            autopilot.firmware.payload if component == 1 else autopilot.components[CAMERA].payload
+        )
+        payload.video = "rtsp://me:secret@10.0.0.9:8554/main"
+        ends.watch(8.0)
+        state = ends.vehicle.read()
+        assert state.video == "rtsp://me:secret@10.0.0.9:8554/main"
+        assert "secret" not in repr(state)
+        ((name, stream),) = ends.vehicle.payload.streams()
+        assert str(stream) == "rtsp://10.0.0.9:8554/main (main), 1920x1080, 30/s"
+        assert name == ("the autopilot's camera" if component == 1 else "camera (component 100)")
+        take(ends)
+        assert isinstance(outcome(ends), Photo)
+        payload.video = "rtsp://10.6.6.6/other"
+        ends.watch(8.0)
+        assert ends.vehicle.read().video == state.video
+
+
+def test_a_card_that_fills_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked again and again; its room is shown, and its end is a fault of the vehicle."""
+    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
+        payload = ends.autopilot.components[CAMERA].payload
+        payload.free = 12_000.0
+        ends.watch(6.0)
+        ((name, card),) = ends.vehicle.payload.cards()
+        assert (name, str(card)) == ("camera (component 100)", "12000 MiB free")
+        assert ends.vehicle.read().faults == ()
+        payload.free = 20.0
+        ends.watch(25.0)
+        assert ends.vehicle.read().faults == (
+            "camera (component 100): its card is full: 20 MiB are left",
+        )
+
+
+@pytest.mark.parametrize(
+    ("status", "free", "said"),
+    [
+        (2, 5000.0, "5000 MiB free"),
+        (2, math.nan, "room not told"),
+        (2, -1.0, "room not told"),
+        (2, 0.0, "0 MiB free; its card is full: 0 MiB are left"),
+        (0, 0.0, "room not told; it has no card"),
+        (1, 0.0, "room not told; its card is not formatted"),
+        (3, 0.0, "room not told"),
+        (99, 0.0, "room not told"),
+    ],
+)
+def test_what_a_camera_says_of_its_card(status: int, free: float, said: str) -> None:
+    """A status that is not known says nothing."""
+    told = mavlink.MAVLink_storage_information_message(0, 1, 1, status, 1e4, 0.0, free, 0, 0)
+    assert str(card_state(told)) == said
+
+
+def test_an_address_that_leads_elsewhere_is_shown_and_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A file of this machine is none of the vehicle's."""
+    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
+        ends.autopilot.components[CAMERA].payload.video = "file:///etc/passwd"
+        ends.watch(6.0)
+        assert ends.vehicle.read().video == ""
+        ((_, stream),) = ends.vehicle.payload.streams()
+        assert "only rtsp, rtsps, tcp, udp are, not 'file'" in str(stream)

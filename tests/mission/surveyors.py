@@ -1,0 +1,142 @@
+"""A vehicle with a gimbal and a camera, which do as a test says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from flights import PERIOD, Flight, KinematicVehicle
+
+from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.payload import (
+    GimbalAttitude,
+    GimbalTarget,
+    Photo,
+    PhotoFailure,
+    PhotoOutcome,
+)
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated"]
+
+
+class Clock:
+    """The mission clock of a test."""
+
+    now = 0
+
+
+@dataclass
+class Gimbal:
+    """Turns at 1 rad/s, or does as a test says."""
+
+    clock: Clock
+    pitch: float = 0.0
+    yaw: float = 0.0
+    fault: str = ""
+    stuck: bool = False
+    nonsense: bool = False
+    stale: bool = False
+    aims: list[GimbalTarget] = field(default_factory=list)
+    _seen: int = 0
+
+    def aim(self, target: GimbalTarget) -> GimbalTarget:
+        """Turn from now on."""
+        self.aims.append(target)
+        return target
+
+    @property
+    def attitude(self) -> GimbalAttitude:
+        """Where it looks, or says so."""
+        most = (self.clock.now - self._seen) / NANOSECONDS
+        self._seen = self.clock.now
+        if self.aims and not self.stuck:
+            target = self.aims[-1]
+            self.pitch += min(max(target.pitch - self.pitch, -most), most)
+            self.yaw += min(max(target.yaw - self.yaw, -most), most)
+        stamp = 0 if self.stale else self.clock.now
+        return GimbalAttitude(stamp, math.nan if self.nonsense else self.pitch, self.yaw)
+
+
+@dataclass
+class Camera:
+    """Takes pictures at once, or does as a test says."""
+
+    clock: Clock
+    gimbal: Gimbal | None
+    refuses: str = ""
+    silent: bool = False
+    lies: bool = False
+    """Answers with other numbers."""
+    asked: list[str] = field(default_factory=list)
+    _ready: list[PhotoOutcome] = field(default_factory=list)
+
+    def take_photo(self, label: str) -> int:
+        """Take one."""
+        self.asked.append(label)
+        number = len(self.asked)
+        if self.refuses:
+            self._ready.append(PhotoFailure(number, self.refuses))
+        elif not self.silent:
+            attitude = self.gimbal.attitude if self.gimbal else None
+            told = number + 100 if self.lies else number
+            self._ready.append(Photo(told, self.clock.now, label, gimbal=attitude))
+        return number
+
+    def outcomes(self) -> list[PhotoOutcome]:
+        """What came of it."""
+        ready, self._ready = self._ready, []
+        return ready
+
+
+class Surveyor(KinematicVehicle):
+    """A vehicle with both, unless a test takes them away."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.clock = Clock()
+        self.gimbal: Gimbal | None = Gimbal(self.clock)
+        self.photo_camera: Camera | None = Camera(self.clock, self.gimbal)
+
+    def read(self) -> VehicleState:
+        """Let its components know the time."""
+        state = super().read()
+        self.clock.now = state.stamp
+        return state
+
+
+def lost(made: Flight) -> list[str]:
+    """What people were told of pictures."""
+    return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
+
+
+def simulated(*waypoints: Waypoint, noise: float, wind: float) -> Mission:
+    """A flight of the simulated drone, in its own time."""
+    sensor = {"id": "cam", "type": "camera", "rate": 2, "settings": {"gimbal": {}}}
+    limits = LimitsConfig(max_speed=8, cruise_speed=5)
+    robot = RobotConfig.model_validate({"id": "drone", "sensors": [sensor], "limits": limits})
+    world = {"sensor_noise": noise, "wind": (wind, wind, 0.0), "gust": wind / 3}
+    environment = EnvironmentConfig.model_validate({"robots": [robot], "simulation": world})
+    vehicle = SimulatedVehicle(robot, environment)
+    vehicle.connect()
+    planner = InlinePlanner(OrderedScheduler())
+    place = vehicle.read().odometry.position
+    mission = Mission(robot, planner, takeoff=place, payload=vehicle)
+    loop = SetpointLoop(vehicle, mission)
+    mission.handle(AddNavigation(AeroNavigation(data=waypoints)), 0)
+    mission.handle(Start(), 0)
+    now = 0
+    while not mission.finished and now < 300 * NANOSECONDS:
+        loop.turn(now)
+        now += PERIOD
+        vehicle.advance_to(now)
+    return mission
