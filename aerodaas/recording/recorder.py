@@ -49,6 +49,7 @@ LATENCY = json_schema(
     seq="integer",
     id="integer",
     source="string",
+    empty="boolean",
     total_ms="number",
     hops={"type": "array", "items": {"type": "object"}},
 )
@@ -297,6 +298,7 @@ def _latency(message: Message[Any]) -> Entry:
         "seq": message.seq,
         "id": message.header.id,
         "source": message.header.source,
+        "empty": message.item is None,
         "total_ms": message.latency_ns / _MILLISECOND,
         "hops": spans,
     }

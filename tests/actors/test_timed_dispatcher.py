@@ -31,6 +31,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,
@@ -181,6 +182,10 @@ def test_a_flight_agrees_with_the_laboratory(
             assert found["reason"].partition(":")[0] == result.place.value
     assert len(wanted) > 100
     assert {one.place for one in wanted} == set(TaskPlace)
+    # A lost task's empty answer is no result, however late it is.
+    latencies = recorded(run).latencies
+    assert 0.0 < max(latencies["drone/one"].age) <= 400.0
+    assert 0.0 < max(latencies["drone/two"].age) <= 500.0
 
 
 class Swerve(NavigableAnalytics):
@@ -225,8 +230,10 @@ def test_a_drone_flies_by_results_as_old_as_they_would_be(flyer: Flyer) -> None:
             for record in recording.records(topics=["/drone/swerve/navigation"])
         ]
         first = RecordedFlight.read(recording)
+        told = str(FlightSummary.of(recording, first))
     assert len(ages) > 30
     assert set(ages) == {130.0}
+    assert "swerve: 130.0 ms median, 130.0 ms 99th percentile since capture in mission time" in told
     with _swerve(flyer, 2) as recording:
         again = RecordedFlight.read(recording)
     assert np.array_equal(first.robots["drone"]._columns, again.robots["drone"]._columns)

@@ -146,6 +146,7 @@ def test_the_way_of_a_message_in_full(tmp_path: Path) -> None:
         "seq": 6,
         "id": 17,
         "source": "nav/cam",
+        "empty": False,
         "total_ms": 7.5,
         "hops": [
             {"node": "cam", "wait_ms": 1.0, "work_ms": 3.0},

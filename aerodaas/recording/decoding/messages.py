@@ -155,6 +155,7 @@ class _Hop(TypedDict):
 @with_config(_OPEN)
 class _Latency(TypedDict):
     stream: Word
+    empty: NotRequired[bool]
     total_ms: Number
     hops: list[_Hop]
 

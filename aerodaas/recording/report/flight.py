@@ -153,10 +153,12 @@ class RobotFlight:
 
 @dataclass
 class StreamLatency:
-    """Latencies of the messages of one stream, in milliseconds of the host's clock."""
+    """Latencies of the messages of one stream, in milliseconds; but for `age`, of the host."""
 
     total: list[float] = field(default_factory=list)
     """From capture to publishing."""
+    age: list[float] = field(default_factory=list)
+    """The same in mission time, of results: in lockstep 0, or what simulated executions took."""
     overhead: list[float] = field(default_factory=list)
     """The part of `total` without computation: transport between actors and queueing."""
     wait: dict[str, list[float]] = field(default_factory=lambda: _Table(list))
@@ -279,6 +281,8 @@ def _latency(flight: RecordedFlight, record: Record) -> None:
         return
     latency = flight.latencies[record.value["stream"]]
     latency.total.append(float(record.value["total_ms"]))
+    if not record.value.get("empty", False):
+        latency.age.append((record.stamp - record.captured) / 1e6)
     for hop in record.value["hops"]:
         latency.wait[hop["node"]].append(float(hop["wait_ms"]))
         latency.work[hop["node"]].append(float(hop["work_ms"]))

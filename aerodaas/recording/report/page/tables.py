@@ -45,11 +45,15 @@ def sections(summary: FlightSummary) -> Iterator[str]:
     """Yield sections of figures, latencies, scheduler reasons, alerts and dropped messages."""
     yield section("Figures", table(["", ""], figures(summary).items()))
     if summary.latencies:
-        rows = [
+        rows: list[tuple[object, ...]] = [
             (stream, it.count, it.median_ms, it.p99_ms, it.overhead_ms)
             for stream, it in summary.latencies.items()
         ]
         head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
+        if summary.simulates_executions:
+            ages = [(it.age_ms, it.age_p99_ms) for it in summary.latencies.values()]
+            rows = [(*row, *age) for row, age in zip(rows, ages, strict=True)]
+            head += ["in mission time", "99th perc."]
         yield section("Latency since capture", table(head, rows))
     if summary.reasons:
         why = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
