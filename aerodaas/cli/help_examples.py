@@ -13,6 +13,8 @@ _BLOCK = re.compile(r"(?:^(?: {4}|aerodaas ).*(?:\n|$))+", re.MULTILINE)
 """Examples of a docstring: lines indented by four, or commands where it is nothing but these, for
 then their indentation is everybody's and gone."""
 
+_FENCE = "```text\n"
+
 
 class ExampleGroup(TyperGroup):
     """A group whose commands' examples are code blocks.
@@ -28,7 +30,9 @@ class ExampleGroup(TyperGroup):
 
 
 def _fenced(text: str) -> str:
-    return _BLOCK.sub(lambda found: f"```text\n{_dedented(found[0])}\n```\n", text)
+    if _FENCE in text:
+        return text  # a group has been through its own hands before its parent's
+    return _BLOCK.sub(lambda found: f"{_FENCE}{_dedented(found[0])}\n```\n", text)
 
 
 def _dedented(block: str) -> str:

@@ -9,6 +9,7 @@ import typer.main
 from rich.console import Console
 from rich.markdown import Markdown
 from typer.core import TyperCommand, TyperGroup
+from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 
@@ -44,3 +45,11 @@ def test_there_are_examples() -> None:
     """Three commands in four teach by one; the others are words like `pause`."""
     taught = [name for name, one in ALL.items() if "```text" in (one.help or "")]
     assert len(taught) >= 0.75 * len(ALL), sorted(set(ALL) - set(taught))
+
+
+@pytest.mark.parametrize("group", ["cluster", "sim"])
+def test_a_group_shows_its_examples_as_they_are(group: str) -> None:
+    """A group is a command of another one, and its help is made ready once."""
+    shown = CliRunner().invoke(app, [group, "--help"]).output
+    assert "`" not in shown
+    assert f"  aerodaas {group} " in shown
