@@ -18,6 +18,8 @@ import ray
 from flying import FLAT, Flyer, hop, recorded
 
 from aerodaas.cli.app import main
+from aerodaas.cli.seeds.figures import rows
+from aerodaas.cli.seeds.runs import SeededRun
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
@@ -82,6 +84,20 @@ def test_each_run_is_that_of_its_seed_alone(
     assert rows[2]["distance m"] == pytest.approx(alone.robots["drone"].distance, abs=1e-3)
     with (folder / "table.csv").open() as file:
         assert [row["waypoints"] for row in csv.DictReader(file)] == ["1", "", "1"]
+
+
+def test_a_row_tells_what_became_of_the_scheduler_s_tasks() -> None:
+    """Of all that ended, how many in time; of those begun, how many in the cloud."""
+    counts = {"edge": 30, "cloud": 10, "done": 33, "late": 2, "timeout": 1, "failed": 1,
+              "drop": 4, "dropped": 9, "retry": 3}  # fmt: skip
+    summary = {"robots": {}, "alerts": [], "detections": {}, "utility": {}}
+    busy, idle = (
+        SeededRun(seed, Path("runs"), summary={**summary, "decisions": decisions})
+        for seed, decisions in enumerate((counts, {}))
+    )
+    first, second = rows([busy, idle])
+    assert (first["in time %"], first["in the cloud %"]) == (66.0, 25.0)
+    assert (second["in time %"], second["in the cloud %"]) == (None, None)
 
 
 def test_wrong_input_is_told_once(flyer: Flyer, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from aerodaas.cli.seeds.runs import SeededRun
@@ -12,14 +12,16 @@ from aerodaas.terminal.figures import Row, show_figures
 __all__ = ["rows", "show"]
 
 _OUTCOME, _FAILED = "outcome", "failed"
+_ENDS = ("done", "late", "timeout", "failed", "drop", "dropped")
+"""How a task ends; `drop` is a decision that is its end as well."""
 
 
 def rows(runs: Sequence[SeededRun]) -> list[dict[str, Any]]:
     """One row for each run: seed, outcome, figures; the same columns for all.
 
     Of several robots, flight times and heights are the largest, distances and waypoints sums.
-    What the application counts comes last: detections by label, utility of the analytics
-    scheduler. A figure that a run has not is None.
+    What the application counts comes last: detections by label, and of an analytics scheduler
+    the tasks in time, of those begun the ones in the cloud, and utility. A figure that a run has not is None.
     """
     found = [{"seed": run.seed, _OUTCOME: _outcome(run), **_figures(run)} for run in runs]
     columns = dict.fromkeys(name for row in found for name in row)
@@ -67,7 +69,20 @@ def _figures(run: SeededRun) -> dict[str, float]:
         figures.update({"battery used %": round(100 * max(used), 2)} if used else {})
     figures["alerts"] = len(summary["alerts"])
     figures.update({f"{label} seen": count for label, count in summary["detections"].items()})
+    figures.update(_tasks(summary["decisions"]))
     figures.update({f"{name} utility": value for name, value in summary["utility"].items()})
+    return figures
+
+
+def _tasks(decisions: Mapping[str, int]) -> dict[str, float]:
+    """Shares of an analytics scheduler's tasks, from the counts of its decisions and outcomes."""
+    ended = sum(decisions.get(action, 0) for action in _ENDS)
+    begun = sum(decisions.get(action, 0) for action in ("edge", "cloud"))
+    figures = {}
+    if ended:
+        figures["in time %"] = round(100 * decisions.get("done", 0) / ended, 2)
+    if begun:
+        figures["in the cloud %"] = round(100 * decisions.get("cloud", 0) / begun, 2)
     return figures
 
 
