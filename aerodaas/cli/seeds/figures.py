@@ -21,7 +21,8 @@ def rows(runs: Sequence[SeededRun]) -> list[dict[str, Any]]:
 
     Of several robots, flight times and heights are the largest, distances and waypoints sums.
     What the application counts comes last: detections by label, and of an analytics scheduler
-    the tasks in time, of those begun the ones in the cloud, and utility. A figure that a run has not is None.
+    the tasks in time, of those begun the ones in the cloud, and utility. A figure that a run has
+    not is None.
     """
     found = [{"seed": run.seed, _OUTCOME: _outcome(run), **_figures(run)} for run in runs]
     columns = dict.fromkeys(name for row in found for name in row)
