@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -90,7 +91,7 @@ def test_a_row_tells_what_became_of_the_scheduler_s_tasks() -> None:
     """Of all that ended, how many in time; of those begun, how many in the cloud."""
     counts = {"edge": 30, "cloud": 10, "done": 33, "late": 2, "timeout": 1, "failed": 1,
               "drop": 4, "dropped": 9, "retry": 3}  # fmt: skip
-    summary = {"robots": {}, "alerts": [], "detections": {}, "utility": {}}
+    summary: dict[str, Any] = {"robots": {}, "alerts": [], "detections": {}, "utility": {}}
     busy, idle = (
         SeededRun(seed, Path("runs"), summary={**summary, "decisions": decisions})
         for seed, decisions in enumerate((counts, {}))
