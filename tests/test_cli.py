@@ -145,7 +145,7 @@ BAD_FILES = {
     "no robots": ('{"robots": []}', "environment.json: robots: List should have at least 1 item"),
     "an unknown key": (
         '{"robots": [{"id": "d", "colour": 1}]}',
-        "environment.json: robots.0.colour: there is no such setting (of d) (known: driver, edge,",
+        "robots.0.colour: there is no such setting (of d) (known: actuators, driver, edge,",
     ),
     "two of one id": (
         '{"robots": [{"id": "d"}, {"id": "d"}]}',
