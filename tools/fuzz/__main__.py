@@ -31,7 +31,7 @@ def main(
     seconds: Annotated[float | None, typer.Option(help="Seconds for each target.", min=0.1)] = None,
     seed: Annotated[int, typer.Option(help="The same one makes the same inputs.", min=0)] = 0,
     jobs: Annotated[int, typer.Option(help="Processes at once.", min=1)] = 1,
-    limit: Annotated[float, typer.Option(help="Processor's seconds of one input.")] = 2.0,
+    limit: Annotated[float, typer.Option(help="Processor's seconds of one input.")] = 5.0,
     memory: Annotated[int, typer.Option(help="MiB of one input.")] = 512,
     replay_: Annotated[
         list[Path] | None, typer.Option("--replay", help="Run this input as it is; repeatable.")

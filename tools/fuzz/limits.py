@@ -23,9 +23,9 @@ class TooLongError(BaseException):
 class Limits:
     """What one input may take."""
 
-    seconds: float = 2.0
-    """Of the processor."""
-    wall: float = 10.0
+    seconds: float = 5.0
+    """Of the processor. A good recording's plots take two on a slow core."""
+    wall: float = 25.0
     """By the wall clock, without the time in which other programs kept the process waiting."""
     memory: int = 512 * 2**20
     """Bytes on top of what the process has before its first input."""
