@@ -16,7 +16,6 @@ import json as json_format
 import shutil
 import statistics
 import tempfile
-from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -102,15 +101,11 @@ def _flown(scheduler: str, network: str, seed: int) -> Row:
     try:
         flown = fly(_MISSION, seed, folder, settings=settings, options=("--scheduler", scheduler))
         if flown.code:
-            raise typer.Exit(_failed(flown.output))
+            typer.echo(flown.output, err=True)
+            raise typer.Exit(1)
         return _row(scheduler, network, seed, flown.recording)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-
-
-def _failed(output: str) -> int:
-    typer.echo(output, err=True)
-    return 1
 
 
 def _row(scheduler: str, network: str, seed: int, path: Path) -> Row:
@@ -130,7 +125,7 @@ def _row(scheduler: str, network: str, seed: int, path: Path) -> Row:
         seed,
         len(ends),
         len(done) / len(ends),
-        Counter(done)["cloud"] / len(done) if done else 0.0,
+        done.count("cloud") / len(done) if done else 0.0,
         (float(np.median(ages)), float(np.percentile(ages, 99))),
         float((np.abs(away[steady] - _DISTANCE) <= _WITHIN).mean()) if steady.any() else 0.0,
         float(away[evidence.during("following")].min()),

@@ -79,6 +79,8 @@ class TimedDispatcherActor(LockstepDispatcherActor):
     def _take(self, message: Message[Any]) -> None:
         if message.stream == ADVANCE:
             self._steps.append(message)
+            # Two cameras' frames of one moment come as the host will have it.
+            self._held = deque(sorted(self._held, key=lambda one: (one.stamp, one.stream, one.seq)))
         else:
             super()._take(message)
 
@@ -108,8 +110,6 @@ class TimedDispatcherActor(LockstepDispatcherActor):
 
     def _reach(self, until: int) -> bool:
         """Let happen what happens before `until`; False while an analysis is still at work."""
-        # Two cameras' frames of one moment come as the host will have it.
-        self._held = deque(sorted(self._held, key=lambda one: (one.stamp, one.stream, one.seq)))
         while True:
             event = self._events[0] if self._events and self._events[0].at < until else None
             frame = self._held[0] if self._held and self._held[0].stamp < until else None

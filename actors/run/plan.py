@@ -139,6 +139,10 @@ class _Planner:
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
         self._add_sensors()
+        self.simulated = frozenset[str]()
+        """Analyses whose executions take mission time in lockstep."""
+        if session.simulates_executions:
+            self.simulated = frozenset(node.id for node in self.managed())
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
     def _add_sensors(self) -> None:
@@ -182,20 +186,14 @@ class _Planner:
         )
 
     def acknowledgements(self, stream: str) -> int:
-        later = self.simulated()
-        return paths(self.graph, stream, self.steering, recorded=self.recorded, later=later)
+        recorded, later = self.recorded, self.simulated
+        return paths(self.graph, stream, self.steering, recorded=recorded, later=later)
 
     def is_waited_for(self, node: Node) -> bool:
         """Whether mission time waits for the analysis itself, for want of a reader."""
-        if node.id in self.simulated():
+        if node.id in self.simulated:
             return False  # it answers when its execution is over
         return self.session.lockstep and not self.acknowledgements(node.id)
-
-    def simulated(self) -> frozenset[str]:
-        """Analyses whose executions take mission time in lockstep."""
-        if not self.session.simulates_executions:
-            return frozenset()
-        return frozenset(node.id for node in self.managed())
 
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
@@ -383,7 +381,7 @@ class _Planner:
     def reaches_simulated(self, stream: str) -> bool:
         """Whether an analysis whose executions are simulated is downstream."""
         return any(
-            node.id in self.simulated() or self.reaches_simulated(node.id)
+            node.id in self.simulated or self.reaches_simulated(node.id)
             for node in self.graph.downstream(stream)
         )
 
@@ -412,8 +410,7 @@ class _Planner:
         ]
         if self.recorded:
             readers.append(f"{ACKS}/recorder")
-        simulated = self.simulated()
-        if simulated:
+        if self.simulated:
             windows[ADVANCE] = 0
             readers.append(PROGRESS)
         return LockstepSchedule(
@@ -421,7 +418,7 @@ class _Planner:
             acknowledgements={source: self.acknowledgements(source) for source in windows},
             windows=windows,
             readers=tuple(readers),
-            answers={stream: self.acknowledgements(stream) for stream in simulated},
+            answers={stream: self.acknowledgements(stream) for stream in self.simulated},
         )
 
 

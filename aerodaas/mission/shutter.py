@@ -25,6 +25,8 @@ class PhotoRequest:
     """The waypoint that it is for."""
     asked_at: int
     """Mission clock, nanoseconds."""
+    on_the_way: bool = False
+    """Whether no waypoint waits for it."""
     photo: Photo | None = None
     """What was taken."""
     failure: str = ""
@@ -45,8 +47,6 @@ class Shutter:
         self._timeout = timeout
         self._awaited: dict[int, PhotoRequest] = {}
         """By number."""
-        self._triggered: set[int] = set()
-        """Numbers of pictures that no waypoint waits for."""
         self._told: set[str] = set()
         """Reasons that were told of pictures on the way."""
 
@@ -60,12 +60,15 @@ class Shutter:
         """Whether a picture is awaited."""
         return bool(self._awaited)
 
-    def take(self, label: str, now: int) -> PhotoRequest:
-        """Ask for a picture that the caller waits for; raises VehicleError and what cameras do."""
+    def take(self, label: str, now: int, *, on_the_way: bool = False) -> PhotoRequest:
+        """Ask for a picture, for which a waypoint waits or, `on_the_way`, nobody.
+
+        Raises VehicleError and what cameras do.
+        """
         camera = self.camera
         if camera is None:
             raise VehicleError(NO_CAMERA)
-        request = PhotoRequest(label, now)
+        request = PhotoRequest(label, now, on_the_way)
         self._awaited[camera.take_photo(label)] = request
         return request
 
@@ -77,13 +80,11 @@ class Shutter:
             self._miss(label, 1, _BUSY, now)
             return
         try:
-            request = self.take(label, now)
+            self.take(label, now, on_the_way=True)
         except VehicleError as error:
             self._miss(label, 1, str(error), now)
         except Exception as error:  # noqa: BLE001 - a driver's camera must not end a flight
             self._miss(label, 1, failure_line(error), now)
-        else:
-            self._triggered |= {key for key, one in self._awaited.items() if one is request}
 
     def look(self, now: int) -> None:
         """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
@@ -111,15 +112,13 @@ class Shutter:
             if request is not None and number is not None:
                 request.photo = outcome
                 del self._awaited[number]
-                self._triggered.discard(number)
         elif request is not None:
             self._fail(outcome.number, request, outcome.reason, now)
 
     def _fail(self, number: int, request: PhotoRequest, reason: str, now: int) -> None:
         request.failure = reason
         del self._awaited[number]
-        if number in self._triggered:
-            self._triggered.discard(number)
+        if request.on_the_way:
             self._miss(request.label, 1, reason, now)
 
     def _miss(self, label: str, count: int, reason: str, now: int) -> None:

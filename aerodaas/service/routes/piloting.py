@@ -55,25 +55,29 @@ class PilotingRoutes:
         self, mission: str, body: RearrangeIn, request: Request, later: BackgroundTasks
     ) -> AnswerOut:
         """Change the order of a robot's coming waypoints, or remove some."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        with self._admission.auditing(principal, request):
-            answer = self._desk.fly(principal, mission, body)
-        later.add_task(
-            self._audit.note_answer, principal, "plan", f"{mission}/{body.robot}", answer
-        )
-        return answer
+        return self._flown(request, later, mission, body, "plan", f"{mission}/{body.robot}")
 
     def actuate(
         self, mission: str, body: ActuateIn, request: Request, later: BackgroundTasks
     ) -> AnswerOut:
         """Move an actuator that the provider lets this tenant move."""
+        about = f"{mission}/{body.robot}/{body.actuator}"
+        return self._flown(request, later, mission, body, "actuate", about)
+
+    def _flown(
+        self,
+        request: Request,
+        later: BackgroundTasks,
+        mission: str,
+        body: RearrangeIn | ActuateIn,
+        action: str,
+        about: str,
+    ) -> AnswerOut:
+        """Have a mission's robot do what a pilot may ask; audited as `action`, `about` that."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):
             answer = self._desk.fly(principal, mission, body)
-        later.add_task(
-            self._audit.note_answer,
-            *(principal, "actuate", f"{mission}/{body.robot}/{body.actuator}", answer),
-        )
+        later.add_task(self._audit.note_answer, principal, action, about, answer)
         return answer
 
     async def controls(self, socket: WebSocket, mission: str, robot: Word) -> None:

@@ -6,18 +6,14 @@ import math
 from collections.abc import Callable
 
 from stepped import Stepped
+from stepped_missions import started
 
 from aerodaas.config.model import MissionConfig
-from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.mission.commands import AddNavigation, Start
-from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.payload import PhotoOutcome
 from aerodaas.types.waypoints import Waypoint
 
-__all__ = ["fly", "found", "outcome", "take", "told", "wait"]
+__all__ = ["fly", "fly_to", "found", "outcome", "take", "told", "wait"]
 
 
 def wait(ends: Stepped, condition: Callable[[], object], timeout: float = 15.0) -> None:
@@ -56,40 +52,30 @@ def take(ends: Stepped, label: str = "wp1") -> int:
     return camera.take_photo(label)
 
 
-class _Clock:
-    """The mission's clock: that of both ends."""
-
-    def __init__(self, ends: Stepped) -> None:
-        self._ends = ends
-
-    def now(self) -> int:
-        """Nanoseconds."""
-        return round(self._ends.now * 1e9)
+def fly_to(
+    ends: Stepped,
+    stops: list[Waypoint],
+    options: MissionConfig,
+    each: Callable[[Mission], None] = lambda _: None,
+) -> Mission:
+    """A whole mission to some places; `each` is called at each turn."""
+    loop = started(ends, stops, options, ends.vehicle)
+    mission = loop.mission
+    end = ends.now + 120.0
+    while not mission.finished and ends.now < end:
+        ends.advance(0.05)
+        loop.turn(round(ends.now * 1e9))
+        each(mission)
+    return mission
 
 
 def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
     """A whole mission of two pictures; `each` is called at each turn."""
-    clock = _Clock(ends)
-    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
-    mission = Mission(
-        ends.robot.model_copy(update={"mission": MissionConfig(photo_timeout=4.0)}),
-        InlinePlanner(OrderedScheduler()),
-        takeoff=ends.vehicle.read().odometry.position,
-        payload=ends.vehicle,
-    )
-    loop = SetpointLoop(ends.vehicle, mission)
     stops = [
         Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
         Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
     ]
-    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
-    mission.handle(Start(), clock.now())
-    end = ends.now + 120.0
-    while not mission.finished and ends.now < end:
-        ends.advance(0.05)
-        loop.turn(clock.now())
-        each(mission)
-    return mission
+    return fly_to(ends, stops, MissionConfig(photo_timeout=4.0), each)
 
 
 def told(mission: Mission) -> list[str]:

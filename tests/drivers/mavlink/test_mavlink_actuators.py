@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from payload_flights import fly_to
 from stepped import Stepped
 
 from aerodaas.config.actuators import (
@@ -15,13 +16,9 @@ from aerodaas.config.actuators import (
     ServoConfig,
 )
 from aerodaas.config.model import MissionConfig
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.mission.commands import AddNavigation, ReleaseParachute, Start
-from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.commands import ReleaseParachute
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.actuators import MoveResult
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState
@@ -221,40 +218,13 @@ def test_who_only_observes_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
         assert carried(ends).asked == []
 
 
-class _Clock:
-    """The mission's clock: that of both ends."""
-
-    def __init__(self, ends: Stepped) -> None:
-        self._ends = ends
-
-    def now(self) -> int:
-        """Nanoseconds."""
-        return round(self._ends.now * 1e9)
-
-
 def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
     """A mission that drops its load; `each` is called at each turn."""
-    clock = _Clock(ends)
-    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
-    mission = Mission(
-        ends.robot.model_copy(update={"mission": MissionConfig(actuator_timeout=4.0)}),
-        InlinePlanner(OrderedScheduler()),
-        takeoff=ends.vehicle.read().odometry.position,
-        payload=ends.vehicle,
-    )
-    loop = SetpointLoop(ends.vehicle, mission)
     stops = [
         Waypoint("a", 3, 0, 2, actuate={"hatch": "open", "hook": "release"}),
         Waypoint("b", 3, 3, 2, hover_duration=2.5, actuate={"hatch": "closed"}),
     ]
-    mission.handle(AddNavigation(AeroNavigation(data=stops)), clock.now())
-    mission.handle(Start(), clock.now())
-    end = ends.now + 120.0
-    while not mission.finished and ends.now < end:
-        ends.advance(0.05)
-        loop.turn(clock.now())
-        each(mission)
-    return mission
+    return fly_to(ends, stops, MissionConfig(actuator_timeout=4.0), each)
 
 
 def test_a_mission_drops_its_load(ends: Stepped) -> None:

@@ -12,17 +12,15 @@ from handmade import Handmade
 from hypothesis import given
 from hypothesis import strategies as st
 from stepped import Stepped
+from stepped_missions import started
 
 from aerodaas.config.remote_id import RemoteIdConfig
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.mission.commands import AddNavigation, ReturnHome, Start
+from aerodaas.mission.commands import ReturnHome
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.checklist import Checklist
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.health import HealthItem, Verdict
 from aerodaas.types.status import MissionState as S
 from aerodaas.types.vehicle import VehicleMode
@@ -144,7 +142,7 @@ def test_what_is_not_known_is_told_as_unknown() -> None:
 def test_the_place_of_the_take_off_stays_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """While the drone flies away from it."""
     with ends_of(monkeypatch) as ends:
-        flying = mission_of(ends, Waypoint("far", 40, 0, 3))
+        flying = started(ends, [Waypoint("far", 40, 0, 3)])
         fly(flying, ends, until=lambda: bool(flying.mission.status.visited))
         system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
         assert ends.autopilot.truth.position[0] > 39.0
@@ -216,31 +214,6 @@ def test_the_list_before_take_off_has_the_transmitters_own_words(
         assert bool(found.remedy) is (verdict in {Verdict.WARNING, Verdict.REFUSED})
 
 
-class _Clock:
-    """The mission's clock: that of both ends."""
-
-    def __init__(self, ends: Stepped) -> None:
-        self._ends = ends
-
-    def now(self) -> int:
-        """Nanoseconds."""
-        return round(self._ends.now * 1e9)
-
-
-def mission_of(ends: Stepped, *stops: Waypoint) -> SetpointLoop:
-    """A mission that has been started."""
-    clock = _Clock(ends)
-    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
-    mission = Mission(
-        ends.robot,
-        InlinePlanner(OrderedScheduler()),
-        takeoff=ends.vehicle.read().odometry.position,
-    )
-    mission.handle(AddNavigation(AeroNavigation(data=list(stops))), clock.now())
-    mission.handle(Start(), clock.now())
-    return SetpointLoop(ends.vehicle, mission)
-
-
 def fly(
     loop: SetpointLoop,
     ends: Stepped,
@@ -265,7 +238,7 @@ def test_a_take_off_is_refused_with_the_transmitters_own_words(
     """Where the robot requires it; nothing moves."""
     with ends_of(monkeypatch, family) as ends:
         ends.autopilot.transmitter.error = "bad LOC accuracy"
-        mission = fly(mission_of(ends, STOP), ends)
+        mission = fly(started(ends, [STOP]), ends)
         assert mission.state is S.ABORTED
         assert "take-off refused: remote_id: bad LOC accuracy" in mission.status.reason
         assert ends.autopilot.firmware.motions == []
@@ -279,7 +252,7 @@ def test_a_transmitter_that_becomes_ready_in_time_is_waited_for(
     with ends_of(monkeypatch) as ends:
         transmitter = ends.autopilot.transmitter
         transmitter.error = "no GPS fix"
-        loop = mission_of(ends, STOP)
+        loop = started(ends, [STOP])
         fly(loop, ends, 2.0)
         assert loop.mission.state is S.PREFLIGHT
         transmitter.error = ""
@@ -296,7 +269,7 @@ def test_a_transmitter_lost_in_flight_is_told_once(
 ) -> None:
     """On the way out as on the way home; the flight goes on as it would have."""
     with ends_of(monkeypatch) as ends:
-        loop = mission_of(ends, STOP)
+        loop = started(ends, [STOP])
         mission = loop.mission
         fly(loop, ends, until=lambda: mission.state is S.ENROUTE)
         if leaving:
@@ -321,7 +294,7 @@ def test_a_flight_without_the_transmitter_that_is_configured_is_told_of(
 ) -> None:
     """By a warning before take-off, where that is all that is asked for, and in flight."""
     with ends_of(monkeypatch, carried=False, preflight={"remote_id": "warn"}) as ends:
-        mission = fly(mission_of(ends, STOP), ends)
+        mission = fly(started(ends, [STOP]), ends)
         assert mission.state is S.LANDED
         texts = {alert.text for alert in mission.alerts}
         assert "Remote ID: no transmitter is heard" in texts

@@ -10,16 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from stepped import Stepped
+from stepped_missions import started
 
 from aerodaas.config.traffic import TrafficConfig
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.microservices.traffic import TrafficTable
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.mission.commands import AddNavigation, Start
-from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import MissionState as S
 from aerodaas.types.traffic import Traffic
@@ -348,33 +344,17 @@ def test_a_receiver_beside_the_autopilot_is_heard_too(monkeypatch: pytest.Monkey
             assert len(ends.turn().traffic) == seen
 
 
-class _Clock:
-    """The mission's clock: that of both ends."""
-
-    def __init__(self, ends: Stepped) -> None:
-        self._ends = ends
-
-    def now(self) -> int:
-        """Nanoseconds."""
-        return round(self._ends.now * 1e9)
-
-
 def fly(
     ends: Stepped, stop: Waypoint, timeout: float = 200.0
 ) -> tuple[Mission, list[VehicleState]]:
     """A whole mission to one place, and all that was read."""
-    clock = _Clock(ends)
-    ends.vehicle.use_clock(clock)  # type: ignore[arg-type]
-    takeoff = ends.vehicle.read().odometry.position
-    mission = Mission(ends.robot, InlinePlanner(OrderedScheduler()), takeoff=takeoff)
-    loop = SetpointLoop(ends.vehicle, mission)
-    mission.handle(AddNavigation(AeroNavigation(data=[stop])), clock.now())
-    mission.handle(Start(), clock.now())
+    loop = started(ends, [stop])
+    mission = loop.mission
     states, end = list[VehicleState](), ends.now + timeout
     while not mission.finished:
         assert ends.now < end, mission.status.reason
         ends.advance(0.05)
-        loop.turn(clock.now())
+        loop.turn(round(ends.now * 1e9))
         assert loop.state is not None
         states.append(loop.state)
     return mission, states
