@@ -27,11 +27,10 @@ from aerodaas.actors.session import (
 )
 from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
 from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["ANSWER_TIMEOUT", "CHANGES", "COMMANDS", "DroneActor"]
 
@@ -64,8 +63,8 @@ class DroneActor(StreamActor):
         depths = dict.fromkeys(_streams(robots), MESSAGE_DEPTH)
         depths.update(dict.fromkeys(map(whereabouts_stream, neighbours), 1))
         super().__init__(session, name, depths)
-        self._whereabouts: dict[str, Neighbour] = {}
-        """Where each robot of this actor and of the others was last."""
+        self._whereabouts = Neighbours()
+        """Where each robot of this actor and of the others is."""
         self._neighbours = frozenset(map(whereabouts_stream, neighbours))
         self._specs = robots
         self._controllers: dict[str, VehicleController] = {}
@@ -270,22 +269,24 @@ class DroneActor(StreamActor):
     def _publish_whereabouts(self, now: int) -> None:
         """Tell the other drones' actors where the robots of this one are."""
         if self._neighbours:
-            known = self._whereabouts
-            mine = {name: known[name] for name in self._controllers if name in known}
+            mine = self._whereabouts.of(self._controllers)
             self._publisher.publish(self.publishers[whereabouts_stream(self.name)], mine, now)
+            for name in self._whereabouts.newly_silent(now, self._controllers):
+                self.alert("neighbour_silent", _silent(name))
 
     def _turn(self, controller: VehicleController, now: int) -> None:
-        others = [where for name, where in self._whereabouts.items() if name != controller.id]
-        controller.turn(now, others)
+        separation = controller.mission.limits.separation
+        controller.turn(now, self._whereabouts.around(controller.id, now, separation))
         state = controller.loop.state
         if state is not None:
-            self._whereabouts[controller.id] = _neighbour(state)
+            self._whereabouts.hear(controller.id, Whereabouts.of(state))
         for alert in controller.new_alerts():
             self._publisher.do(partial(self.tell, alert.kind, alert.text, now, dict(alert.values)))
 
     def _take(self, message: Message[Any], now: int) -> None:
         if message.stream in self._neighbours:
-            self._whereabouts.update(message.item or {})
+            for name, where in (message.item or {}).items():
+                self._whereabouts.hear(name, where)
             return
         for controller in self._controllers.values():
             controller.take(message, now)
@@ -353,5 +354,8 @@ def _failed(robot: str, error: Exception) -> str:
     return f"{robot}: {failure_line(error)}"
 
 
-def _neighbour(state: VehicleState) -> Neighbour:
-    return Neighbour(state.odometry.position, state.odometry.velocity)
+def _silent(robot: str) -> str:
+    return (
+        f"{robot} has told nothing of its place for {SILENT:g} s: the others keep away from where "
+        "it was as from what does not give way"
+    )

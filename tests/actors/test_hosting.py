@@ -35,11 +35,11 @@ _SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def _actors(*groups: tuple[str, ...]) -> Iterator[list[DroneByHand]]:
-    """An actor for each group of robots, started at one moment."""
+def _actors(*groups: tuple[str, ...], speed: float = 10.0) -> Iterator[list[DroneByHand]]:
+    """An actor for each group of robots, started at one moment, `speed` times as fast as life."""
     robots = [robot(name, start=start, **_SETTINGS) for name, (start, _) in _ROBOTS.items()]
     environment = EnvironmentConfig.model_validate({**FLAT, "robots": robots})
-    session = Session(environment, 10.0)
+    session = Session(environment, speed)
     configs = {one.id: one for one in environment.robots}
     names = ["+".join(group) for group in groups]
     made = []
@@ -82,7 +82,8 @@ def _is(actor: DroneByHand, robot: str, state: MissionState) -> bool:
 def test_drones_of_different_actors_keep_their_distance() -> None:
     """Sent to each other's place on one line, both are slowed down for the other one."""
     slowed: set[str] = set()
-    with _actors(("west", "north"), ("east",)) as (first, second):
+    # A moment of a busy machine is not to be many metres of flight.
+    with _actors(("west", "north"), ("east",), speed=2.0) as (first, second):
         streams = {setpoint_stream(name): name for name in ("west", "east", "north")}
         reader = Subscriber(first.scope, dict.fromkeys(streams, MESSAGE_DEPTH))
 
@@ -98,6 +99,19 @@ def test_drones_of_different_actors_keep_their_distance() -> None:
         assert float(np.linalg.norm(east - west)) > 1.0
         reader.close()
     assert "north" not in slowed
+
+
+def test_an_actor_that_tells_nothing_any_more_is_told_of() -> None:
+    """Its drones were in the air: the others keep away from them, and their operator knows."""
+    with _actors(("west", "north"), ("east",)) as (first, second):
+        _eventually(lambda: _is(second, "east", MissionState.ENROUTE))
+        second.stop()
+
+        def told() -> list[str]:
+            return [one.text for one in first.report().alerts if one.kind == "neighbour_silent"]
+
+        _eventually(lambda: bool(told()))
+        assert {text.partition(" ")[0] for text in told()} == {"east"}
 
 
 def test_the_failure_of_one_drone_is_no_other_ones(monkeypatch: pytest.MonkeyPatch) -> None:

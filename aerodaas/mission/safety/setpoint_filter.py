@@ -236,7 +236,7 @@ class SetpointFilter:
     def _aircraft_bounds(
         self, aircraft: Neighbour, apart: tuple[float, float], odometry: Odometry
     ) -> list[_Bound]:
-        """Bounds towards an aircraft, which flies on while this drone brakes.
+        """Bounds towards what flies on while this drone brakes.
 
         Distance or height keeps them apart, and that is kept of which there is more.
         """
@@ -253,7 +253,7 @@ class SetpointFilter:
             rooms.append((distance - least - nearer, towards))
         most = max(room for room, _ in rooms)
         return [
-            self._bound("traffic", towards, room, odometry)
+            self._bound(aircraft.limit, towards, room, odometry)
             for room, towards in rooms
             if room == most or most <= 0.0
         ]

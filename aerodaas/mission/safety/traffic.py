@@ -144,4 +144,4 @@ def traffic_neighbours(state: VehicleState, config: TrafficConfig) -> list[Neigh
     if config.action not in DEMANDS:
         return []
     apart = config.distance, config.height
-    return [Neighbour(one.position, one.velocity, apart) for one in state.traffic]
+    return [Neighbour(one.position, one.velocity, apart, "traffic") for one in state.traffic]

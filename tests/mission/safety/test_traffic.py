@@ -213,7 +213,8 @@ def clamped(
 
 def beside(*at: float, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Neighbour:
     """An aircraft, by its way from that place."""
-    return Neighbour(np.array([0.0, 0.0, 60.0]) + np.array(at), np.array(velocity), APART)
+    position = np.array([0.0, 0.0, 60.0]) + np.array(at)
+    return Neighbour(position, np.array(velocity), APART, "traffic")
 
 
 def test_the_speed_towards_an_aircraft_leaves_the_way_to_stop() -> None:
@@ -262,7 +263,7 @@ def test_what_comes_nearer_meanwhile_is_room_that_is_not_there() -> None:
 @given(vectors, velocities, velocities)
 def test_standing_still_is_always_allowed(way: Vector, flies: Vector, asked: Vector) -> None:
     """Whatever flies around: what is sent is finite, and no nearing within the distance."""
-    other = Neighbour(np.array([0.0, 0.0, 60.0]) + way, flies, APART)
+    other = Neighbour(np.array([0.0, 0.0, 60.0]) + way, flies, APART, "traffic")
     assert clamped((0.0, 0.0, 0.0), other)[0] == [0.0, 0.0, 0.0]
     east, north, up = asked
     sent = np.array(clamped((east, north, up), other)[0])
