@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -32,6 +33,12 @@ _SHORTEST = 0.5
 """Metres between two pictures at least."""
 _TURN = 3.0
 """Metres of straight flight that the braking and turning between two strips is worth."""
+_THIN = 0.1
+"""Share of the strips' width up to which what lies between two of them is not worth a line of its
+own."""
+_COMPLETIONS = 4
+"""How often what a way leaves unseen is added to it; mostly once is enough."""
+_Line: TypeAlias = tuple[Place, Place]
 
 
 @dataclass(frozen=True)
@@ -99,21 +106,9 @@ def cover(
     if wanted.is_empty:
         raise SchedulerError("no-fly zones and holes leave nothing of the area to cover")
     flyable = _polygon(outline, "area").difference(forbidden)
-    free = FreeArea(flyable)
-    spacing = width * (1.0 - overlap)
     angles = _angles(outline) if angle is None else [angle]
-    best: tuple[float, float, _Way, int] | None = None
-    for candidate in angles:
-        strips = _strips(wanted, candidate, spacing, width)
-        way = _join(strips, flyable, free, start)
-        if way is None:
-            continue
-        cost = _length(way.places) + _TURN * len(strips)
-        if best is None or cost < best[0] - 1e-9:
-            best = cost, candidate, way, len(strips)
-    if best is None:
-        raise SchedulerError("no-fly zones cut the area in pieces that cannot all be reached")
-    _, chosen, way, sweeps = best
+    spacing = width * (1.0 - overlap)
+    chosen, strips, way = _shortest(wanted, flyable, angles, spacing, width, start)
     spacings = way.spacings(None if camera is None else camera.trigger_distance(height))
     down = -math.pi / 2 if camera is not None and camera.gimbal else None
     waypoints = tuple(
@@ -129,7 +124,41 @@ def cover(
         )
         for number, ((x, y), distance) in enumerate(zip(way.places, spacings, strict=True), start=1)
     )
-    return Coverage(waypoints, chosen, _length(way.places), sweeps)
+    return Coverage(waypoints, chosen, _length(way.places), len(strips))
+
+
+def _shortest(
+    wanted: BaseGeometry,
+    flyable: BaseGeometry,
+    angles: Sequence[float],
+    spacing: float,
+    width: float,
+    start: Place | None,
+) -> tuple[float, list[_Line], _Way]:
+    """Of these angles, that with the shortest way: itself, its strips, and the way that sees all.
+
+    Raises SchedulerError where not all strips can be reached.
+    """
+    free = FreeArea(flyable)
+    best: tuple[float, float, list[_Line], _Way] | None = None
+    for candidate in angles:
+        strips = _strips(wanted, candidate, spacing, width)
+        way = _join(strips, flyable, free, start)
+        if way is None:
+            continue
+        cost = _length(way.places) + _TURN * len(strips)
+        if best is None or cost < best[0] - 1e-9:
+            best = cost, candidate, strips, way
+    if best is None:
+        raise SchedulerError("no-fly zones cut the area in pieces that cannot all be reached")
+    _, chosen, strips, way = best
+    for _ in range(_COMPLETIONS):
+        missed = _missed(wanted, way.places, width)
+        more = _join([*strips, *missed], flyable, free, start) if missed else None
+        if more is None:
+            break
+        strips, way = [*strips, *missed], more
+    return chosen, strips, way
 
 
 @dataclass
@@ -169,9 +198,7 @@ def _angles(outline: Sequence[Place]) -> list[float]:
     return sorted(along | spread)
 
 
-def _strips(
-    wanted: BaseGeometry, angle: float, spacing: float, width: float
-) -> list[tuple[Place, Place]]:
+def _strips(wanted: BaseGeometry, angle: float, spacing: float, width: float) -> list[_Line]:
     """Middle lines of the strips, spread evenly over the area's extent across the sweeps.
 
     Each is drawn out to where the strip, as wide as the camera sees, leaves the area.
@@ -181,7 +208,7 @@ def _strips(
     count = max(1, math.ceil((top - bottom - width) / spacing - 1e-9) + 1)
     spread = np.linspace(bottom + width / 2, top - width / 2, count)
     middles = spread if count > 1 else np.array([(bottom + top) / 2])
-    strips: list[tuple[Place, Place]] = []
+    strips: list[_Line] = []
     for middle in middles:
         band = shapely.box(left - 1.0, middle - width / 2, right + 1.0, middle + width / 2)
         seen = turned.intersection(band)
@@ -191,6 +218,21 @@ def _strips(
             a, b = ((float(x), float(y)) for x, y in flown.coords)
             strips.append((a, b))
     return strips
+
+
+def _missed(wanted: BaseGeometry, places: Sequence[Place], width: float) -> list[_Line]:
+    """Lines over what a drone along `places` does not see, such as corners at slanting ends."""
+    if len(places) < 2:  # noqa: PLR2004 - a single place is no way
+        return []
+    seen = shapely.LineString(places).buffer(width / 2, cap_style="flat")
+    thin = _THIN * width / 2
+    left = wanted.difference(seen).buffer(-thin).buffer(thin, join_style="mitre")
+    lines: list[_Line] = []
+    for part in () if left.is_empty else shapely.get_parts(left):
+        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(part))
+        a, b = max(pairwise(corners[:3]), key=lambda side: math.dist(*side))
+        lines += _strips(part, math.atan2(b[1] - a[1], b[0] - a[0]), width, width)
+    return lines
 
 
 def _merged_extents(seen: BaseGeometry) -> list[tuple[float, float]]:
@@ -210,7 +252,7 @@ def _merged_extents(seen: BaseGeometry) -> list[tuple[float, float]]:
 
 
 def _join(
-    strips: list[tuple[Place, Place]],
+    strips: list[_Line],
     flyable: BaseGeometry,
     free: FreeArea,
     start: Place | None,

@@ -6,7 +6,7 @@ import math
 
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry.base import BaseGeometry
 
@@ -15,6 +15,7 @@ from aerodaas.types.errors import SchedulerError
 
 FIELD = [(0.0, 0.0), (60.0, 0.0), (60.0, 25.0), (0.0, 25.0)]
 L_SHAPE = [(0.0, 0.0), (60.0, 0.0), (60.0, 20.0), (25.0, 20.0), (25.0, 60.0), (0.0, 60.0)]
+TRIANGLE = [(0.0, 0.0), (50.0, 10.0), (20.0, 45.0)]
 ZONE = [(20.0, 8.0), (35.0, 6.0), (33.0, 18.0), (22.0, 16.0)]
 
 
@@ -38,12 +39,33 @@ def test_the_sweeps_follow_the_long_side() -> None:
     assert all(w.z == 5.0 for w in plan.waypoints)
 
 
-@given(angle=st.floats(0, math.pi), width=st.floats(3, 15), overlap=st.floats(0, 0.6))
-@settings(max_examples=25)
-def test_everything_is_seen(angle: float, width: float, overlap: float) -> None:
-    """Whatever the direction, no strip is missed; slanting ends may lack a corner."""
-    plan = cover(L_SHAPE, height=5.0, width=width, overlap=overlap, angle=angle)
-    assert seen(plan, shapely.Polygon(L_SHAPE), width) > 0.95
+@given(
+    shape=st.sampled_from([FIELD, L_SHAPE, TRIANGLE]),
+    angle=st.floats(0, math.pi),
+    width=st.floats(3, 15),
+    overlap=st.floats(0, 0.6),
+)
+@settings(max_examples=40)
+@example(shape=TRIANGLE, angle=3.1, width=6.7, overlap=0.1)
+@example(shape=FIELD, angle=0.76, width=12.6, overlap=0.25)
+def test_everything_is_seen(
+    shape: list[tuple[float, float]], angle: float, width: float, overlap: float
+) -> None:
+    """Whatever the direction: no strip is missed, and no corner at a slanting end."""
+    plan = cover(shape, height=5.0, width=width, overlap=overlap, angle=angle)
+    assert seen(plan, shapely.Polygon(shape), width) > 0.99
+    missed = shapely.Polygon(shape).difference(way(plan).buffer(width / 2, cap_style="flat"))
+    assert missed.buffer(-0.051 * width).is_empty, "nor a place as wide as a tenth of a strip"
+
+
+@given(angle=st.floats(0, math.pi), width=st.floats(4, 12))
+@settings(max_examples=20)
+def test_corners_beside_no_fly_zones_are_seen(angle: float, width: float) -> None:
+    """What lies behind a zone that a strip flies around is seen on a line of its own."""
+    plan = cover(FIELD, height=5.0, width=width, no_fly=[ZONE], clearance=0.7, angle=angle)
+    zone = shapely.Polygon(ZONE)
+    assert way(plan).distance(zone) > 0.69
+    assert seen(plan, shapely.Polygon(FIELD).difference(zone.buffer(0.7)), width) > 0.985
 
 
 def test_no_fly_zones_are_flown_around() -> None:
