@@ -17,6 +17,10 @@ from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
 from missions.catalogue import MISSIONS  # isort: skip - found by tello_evidence
 
 ROOT = Path(__file__).parents[3]
+WORLDS = {"situation_awareness": "campus", "search_and_rescue": "rescue"}
+APPLICATIONS = os.environ.get("AERODAAS_TEST_TELLO", "situation_awareness").split(",")
+"""Those flown: each takes minutes of a whole machine, and the first follows, lands at a hand and
+tells a fall."""
 FLIGHT = 560.0
 """Seconds that an application may take, its start and end included."""
 
@@ -52,24 +56,17 @@ def fly(application: str, tello: EmulatedTello, folder: Path) -> Path:
     return folder / "flight" / "flight.mcap"
 
 
-def judge(application: str, world: str, folder: Path) -> None:
-    """Fly `application` in `world`; what the Tello truly did meets the mission's own criteria."""
+@pytest.mark.parametrize("application", APPLICATIONS)
+def test_what_the_tello_truly_did_meets_the_missions_criteria(
+    application: str, tmp_path: Path
+) -> None:
+    """The shipped models find the person in H.264, and the Tello follows to the mission's end."""
     video = VideoOptions(width=640, height=480, rate=10.0)
-    environment = EnvironmentConfig.load(ROOT / f"apps/environments/{world}.json")
+    environment = EnvironmentConfig.load(ROOT / f"apps/environments/{WORLDS[application]}.json")
     options = TelloOptions(video=video).placed(environment)
     with EmulatedTello(options) as tello, TelloWitness(tello) as witness:
-        recording = fly(application, tello, folder)
+        recording = fly(application, tello, tmp_path)
     evidence = witness.evidence(recording)
     checks = [criterion(evidence) for criterion in MISSIONS[application].criteria]
     told = "\n".join(f"{check.holds:d} {check.what}: {check.found}" for check in checks)
     assert all(check.holds for check in checks), told
-
-
-def test_situation_awareness(tmp_path: Path) -> None:
-    """The shipped models find the person in H.264, the Tello follows, and lands at the hand."""
-    judge("situation_awareness", "campus", tmp_path)
-
-
-def test_search_and_rescue(tmp_path: Path) -> None:
-    """The search ends where the person is seen, who is led to the road."""
-    judge("search_and_rescue", "rescue", tmp_path)
