@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from aerodaas.config.checked import near
 from aerodaas.config.strict import Strict
@@ -48,6 +48,8 @@ class RelayConfig(Strict):
     type: Literal["relay"]
     instance: Annotated[int, Field(ge=0, le=15)] = 0
     """Number of the autopilot's relay, from 0."""
+    rest: Literal["on", "off"] | None = None
+    """Position that it is given once the drone comes home, lands or is given up; none stays."""
 
     @property
     def positions(self) -> tuple[str, ...]:
@@ -64,6 +66,17 @@ class ServoConfig(Strict):
     """The autopilot's output, from 1."""
     positions: Annotated[dict[Identifier, _Pulse], Field(min_length=1, max_length=16)]
     """Length of the pulse by position, microseconds from 500 to 2500."""
+    rest: Identifier | None = None
+    """One of its positions, which it is given once the drone comes home, lands or is given up; none
+    stays."""
+
+    @model_validator(mode="after")
+    def _rests_where_it_can(self) -> ServoConfig:
+        if self.rest is not None and self.rest not in self.positions:
+            raise ValueError(
+                f"no position is called {self.rest!r}{near(self.rest, self.positions)}"
+            )
+        return self
 
 
 class ParachuteConfig(Strict):

@@ -2,14 +2,20 @@
 
 It only asks and looks, and never waits: the setpoint loop goes on while the drone hovers. A command
 that a waypoint has given is withdrawn as soon as the drone no longer stays there for it, so that
-nothing is dropped elsewhere by a late repetition.
+nothing is dropped elsewhere by a late repetition. What has a position of rest is given it once the
+drone comes home, so that nothing goes on spraying on the way.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from aerodaas.config.actuators import actuator_objection, parachute_objection
+from aerodaas.config.actuators import (
+    RelayConfig,
+    ServoConfig,
+    actuator_objection,
+    parachute_objection,
+)
 from aerodaas.config.robot import RobotConfig
 from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
 from aerodaas.mission.log import MissionLog
@@ -67,6 +73,7 @@ class Actuation:
     """What was asked for by command, by the command's number."""
     _release: _Release | None = None
     _failure: str = ""
+    _home: bool = False
 
     def take_failure(self) -> str:
         """What has failed, where the flight is not to go on after it; told once."""
@@ -111,12 +118,40 @@ class Actuation:
             for result in () if actuators is None else actuators.results():
                 self._note(result, now)
             for task in self._tasks.values():
-                left = now - task.attended > _INTERRUPTED
-                if actuators is not None and task.number is not None and left:
-                    actuators.withdraw(task.number)
-                    task.number = task.since = None
+                if actuators is not None and now - task.attended > _INTERRUPTED:
+                    self._withdraw(task, actuators)
         except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight
             self.log.alert(now, _KIND, f"the actuators: {failure_line(error)}")
+
+    def turn(self, now: int, *, home: bool) -> None:
+        """Give its rest to all that has one, if the drone flies by no plan from now on.
+
+        That is what `home` says: it comes home, lands, or the mission is over.
+        """
+        begins, self._home = home and not self._home, home
+        if not begins:
+            return
+        for one in self.robot.actuators:
+            if isinstance(one, RelayConfig | ServoConfig) and one.rest is not None:
+                self._rest(one.id, one.rest, now)
+
+    def _rest(self, name: str, position: str, now: int) -> None:
+        try:
+            # What a stop asked for might be repeated after it.
+            for task in self._tasks.values():
+                self._withdraw(task, self._actuators())
+            answer = self.move(Actuate(name, position))
+            fault = "" if answer.accepted else answer.text
+        except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight
+            fault = failure_line(error)
+        if fault:
+            self.log.alert(now, _KIND, f"{name}: {position}: not done: {fault}")
+
+    @staticmethod
+    def _withdraw(task: _Task, actuators: Actuators) -> None:
+        if task.number is not None:
+            actuators.withdraw(task.number)
+            task.number = task.since = None
 
     def _note(self, result: MoveResult, now: int) -> None:
         release, asked = self._release, self._asked.pop(result.number, None)

@@ -589,3 +589,4 @@ class Mission:
 
     def _to(self, state: MissionState, reason: str = "") -> None:
         self._machine.to(state, self._now, reason)
+        self.actuation.turn(self._now, home=self.finished or state in _LEAVING)

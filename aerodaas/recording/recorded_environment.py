@@ -62,6 +62,7 @@ _ACTUATOR: dict[str, Rule] = {
     "id": _word,
     # Whether a parachute may be fired is the policy of who flies.
     **_fields("type", "instance", "channel"),
+    "rest": _word,
     "positions": {_ANY_KEY: _number},
 }
 _LIMITS: dict[str, Rule] = {

@@ -86,13 +86,18 @@ class Hauler(KinematicVehicle):
         self.actuators = Carried(self, conduct)
 
 
-def prepared(vehicle: KinematicVehicle, *waypoints: Waypoint, **options: Any) -> Flight:  # noqa: ANN401
+def prepared(
+    vehicle: KinematicVehicle,
+    *waypoints: Waypoint,
+    carried: list[ActuatorConfig] = CARRIED,
+    **options: Any,  # noqa: ANN401
+) -> Flight:
     """A flight over `waypoints`."""
     return flight(
         add(*(waypoints or STOPS)),
         vehicle=vehicle,
         options=MissionConfig(actuator_timeout=4.0, **options),
-        actuators=CARRIED,
+        actuators=carried,
     )
 
 
@@ -339,3 +344,72 @@ def test_the_arrival_radius_bounds_the_place() -> None:
     made.run()
     made.expect(MissionState.LANDED)
     assert 0.3 < math.dist(vehicle.actuators.places[0], (0, 5)) <= 2.0
+
+
+SPRAYER: list[ActuatorConfig] = [
+    GripperConfig(id="hook", type="gripper"),
+    RelayConfig(id="pump", type="relay", rest="off"),
+    RelayConfig(id="lamp", type="relay"),
+    ServoConfig(
+        id="hatch",
+        type="servo",
+        channel=9,
+        positions={"open": 1900, "closed": 1100},
+        rest="closed",
+    ),
+]
+SPRAY = Waypoint("spray", 0, 5, 2, actuate={"pump": "on"})
+FAR = Waypoint("far", 0, 300, 2)
+
+
+def test_what_has_a_rest_is_given_it_on_the_way_home() -> None:
+    """Once, whatever the reason; what has none stays as it is."""
+    vehicle = Hauler()
+    made = prepared(vehicle, SPRAY, FAR, carried=SPRAYER)
+    made.run(until=lambda: "spray" in made.status.visited)
+    assert vehicle.actuators.moves == [("pump", "on")]
+    made.tell(ReturnHome("enough"))
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert vehicle.actuators.moves[1:] == [("pump", "off"), ("hatch", "closed")]
+    assert not told(made)
+
+
+def test_what_a_stop_asked_for_is_withdrawn_before_the_rest() -> None:
+    """A pump that has not answered yet might be switched on after it was switched off."""
+    vehicle = Hauler("silent")
+    made = prepared(vehicle, SPRAY, FAR, carried=SPRAYER)
+    made.run(until=lambda: bool(vehicle.actuators.moves))
+    made.tell(ReturnHome("enough"))
+    made.run(until=lambda: len(vehicle.actuators.moves) > 1)
+    assert vehicle.actuators.withdrawn == [1]
+    assert vehicle.actuators.moves[1] == ("pump", "off")
+
+
+def test_it_is_given_its_rest_before_the_mission_is_over() -> None:
+    """Nobody looks after a drone that was given up: its motors have stopped in the air."""
+    vehicle = Hauler()
+    made = prepared(vehicle, SPRAY, FAR, carried=SPRAYER)
+    made.run(until=lambda: "spray" in made.status.visited)
+    vehicle.kill()
+    made.run(until=lambda: made.mission.finished)
+    made.expect(MissionState.ABORTED)
+    assert vehicle.actuators.moves[1:] == [("pump", "off"), ("hatch", "closed")]
+
+
+def test_a_rest_that_is_not_taken_is_told() -> None:
+    """Its refusal, and a vehicle that moves nothing at all; the drone comes home all the same."""
+    for vehicle, reason in ((Hauler("refuse"), "jammed"), (KinematicVehicle(), "no actuators")):
+        made = prepared(vehicle, Waypoint("there", 0, 5, 2), carried=SPRAYER)
+        made.run()
+        made.expect(MissionState.LANDED)
+        pump, hatch = told(made)
+        assert pump.startswith("pump: off: not done: ")
+        assert hatch.startswith("hatch: closed: not done: ")
+        assert reason in pump
+
+
+def test_a_servo_rests_where_it_has_a_position() -> None:
+    """A slip is told with what was perhaps meant."""
+    with pytest.raises(ValueError, match="no position is called 'close'"):
+        ServoConfig(id="x", type="servo", channel=1, positions={"closed": 1000}, rest="close")
