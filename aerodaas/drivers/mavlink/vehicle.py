@@ -30,6 +30,7 @@ from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
+from aerodaas.drivers.mavlink.one_link import check_links, link_of
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
@@ -73,6 +74,8 @@ class MavlinkVehicle:
     """What it can carry."""
     observing: ClassVar[Mapping[str, bool]] = {"observe": True}
     """Settings with which a connection changes nothing at the vehicle, for who only watches it."""
+    link_of = staticmethod(link_of)
+    check_links = staticmethod(check_links)
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`; nothing is sent or opened."""

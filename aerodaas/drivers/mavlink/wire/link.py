@@ -20,8 +20,9 @@ from aerodaas.drivers.mavlink.wire.dialect import EventMessage, decoded, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.senders import Sender, SenderPins
+from aerodaas.drivers.mavlink.wire.sharing import WireShare, share_wire
 from aerodaas.drivers.mavlink.wire.signing import SignedCodec, load_key, sign_with
-from aerodaas.drivers.mavlink.wire.transport import is_exposed, open_transport
+from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
 from aerodaas.drivers.pin import Peer
 
 __all__ = ["LinkCounts", "MavlinkLink", "Message"]
@@ -126,7 +127,8 @@ class MavlinkLink:
         self._key = load_key(settings, name)
         self._mav: Any = SignedCodec(None, settings.sender, settings.own_component)
         if self._key is not None:
-            sign_with(self._mav, self._key)
+            # Vehicles on one radio hear what is signed for each: none may seem another's replay.
+            sign_with(self._mav, self._key, settings.system or 0)
         self._stands = stands
         self._pins = SenderPins(lambda: self._key is not None or stands())
         self._refused_at = -math.inf
@@ -137,12 +139,13 @@ class MavlinkLink:
         self._turn_due = self._heartbeat_due = -math.inf
         self._thread: threading.Thread | None = None
         self._forwarder: Forwarder | None = None
+        self._share: WireShare | None = None
 
     def open(self) -> None:
         """Open the wire and start the thread; raises ConfigError and VehicleError."""
         settings = self._settings
         with contextlib.ExitStack() as opened:
-            self._wire = open_transport(settings.url, self._name)
+            self._wire = self._opened_wire()
             opened.callback(self._wire.close)
             if settings.forward is not None:
                 self._forwarder = Forwarder(settings.forward, self._name, self._stands)
@@ -151,6 +154,28 @@ class MavlinkLink:
             self._resources = opened.pop_all()
         self._warn_if_exposed()
         self._start()
+
+    def _opened_wire(self) -> Transport:
+        """The wire, shared with this process' other vehicles there, if the system id is known."""
+        settings = self._settings
+        if settings.system is None:
+            return open_transport(settings.url, self._name)
+        self._share = share_wire(
+            settings.url,
+            self._name,
+            settings.system,
+            self._pins,
+            open_transport,
+            hears_all=settings.forward is not None,
+        )
+        return self._share
+
+    def _all_pins(self) -> tuple[SenderPins, ...]:
+        """Senders of this vehicle, and of those that share its wire."""
+        return (self._pins, *(self._share.others if self._share is not None else ()))
+
+    def _is_foreign(self, system: int) -> bool:
+        return self._share is not None and self._share.is_foreign(system)
 
     def _warn_if_exposed(self) -> None:
         if self._key is not None:
@@ -240,8 +265,9 @@ class MavlinkLink:
         if self._forwarder is not None:
             strangers = self._forwarder.strangers
             for packet in self._forwarder.receive(now):
+                all_ways = (peer for pins in self._all_pins() for peer in pins.addresses)
                 with self._lock:
-                    self._wire.send(packet, self._pins.addresses)
+                    self._wire.send(packet, tuple(dict.fromkeys(all_ways)))
             self.counts.strangers += self._forwarder.strangers - strangers
         if now >= self._turn_due:
             self._turn_due = now + _TICK
@@ -264,7 +290,9 @@ class MavlinkLink:
                 self._take(message, peer, now)
             if peer is not None:
                 framer.flush()
-            if self._forwarder is not None and self._pins.may_pass(content, peer):
+            if self._forwarder is not None and all(
+                pins.may_pass(content, peer) for pins in self._all_pins()
+            ):
                 self._forwarder.send(content)
         self.counts.damaged = sum(framer.damaged for framer in self._framers.values())
         if self._mav.refused != self.counts.refused:
@@ -275,7 +303,7 @@ class MavlinkLink:
             if len(self._framers) >= _FRAMERS:
                 known = {self._pins.pin.address}
                 self._framers = {one: f for one, f in self._framers.items() if one in known}
-            self._framers[peer] = Framer(_WANTED, self._decode)
+            self._framers[peer] = Framer(_WANTED, self._decode, self._is_foreign)
         return self._framers[peer]
 
     def _decode(self, frame: bytearray) -> Message | None:
