@@ -53,3 +53,7 @@ def _check_pair(one: str, ours: MavlinkSettings, other: str, theirs: MavlinkSett
         raise ConfigError(
             f'{both}: "forward" of one of them passes on what all say there; take it from {other}'
         )
+    if None not in {ours.corrections, theirs.corrections}:
+        raise ConfigError(
+            f'{both}: "corrections" of one of them are passed on to all; take them from {other}'
+        )

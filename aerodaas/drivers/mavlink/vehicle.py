@@ -46,12 +46,7 @@ from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.health import HealthReadings
 from aerodaas.types.payload import Gimbal, PhotoCamera
-from aerodaas.types.vehicle import (
-    Capabilities,
-    Setpoint,
-    VehicleMode,
-    VehicleState,
-)
+from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.types.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
@@ -167,7 +162,7 @@ class MavlinkVehicle:
                 )
                 self._report.departure = self._departure
                 self._commander = commander
-            if found.signs and not link.signs:
+            if found.signs and link.key is None:
                 require_answer(commander, self._name, self._pause)
             self._connection = establish(
                 link,

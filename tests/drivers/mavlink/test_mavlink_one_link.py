@@ -44,6 +44,11 @@ def test_a_link_is_its_address() -> None:
             {"system": 2, "forward": "udpout:127.0.0.1:14550"},
             '"forward" of one of them passes on what all say there; take it from b',
         ),
+        (
+            {"system": 1, "corrections": "tcp:127.0.0.1:2101"},
+            {"system": 2, "corrections": "tcp:127.0.0.1:2102"},
+            '"corrections" of one of them are passed on to all; take them from b',
+        ),
         ({"system": 1}, {"system": 2, "url": "serial:/dev/ttyUSB0:115200"}, "has one speed"),
     ],
 )

@@ -46,6 +46,18 @@ class _Wire:
         self.closed += 1
 
 
+class _Member:
+    """A vehicle's link that says nothing."""
+
+    key = None
+
+    def __init__(self) -> None:
+        self.pins = SenderPins(lambda: True)
+
+    def send(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        raise NotImplementedError
+
+
 class Shared:
     """Shares of a wire by system id."""
 
@@ -61,8 +73,8 @@ class Shared:
     def share(self, system: int, *, hears_all: bool = False) -> WireShare:
         """A share of the vehicle `system`."""
         name = f"robot{system}"
-        pins = SenderPins(lambda: True)
-        return share_wire(f"test:{id(self)}", name, system, pins, self.open, hears_all=hears_all)
+        member = _Member()
+        return share_wire(f"test:{id(self)}", name, system, member, self.open, hears_all=hears_all)
 
     def hear(self, *arrived: tuple[bytes, Peer]) -> list[list[tuple[bytes, Peer]]]:
         """What each share gets of what arrives, all of it."""

@@ -8,6 +8,7 @@ import socket
 import threading
 from collections import deque
 from collections.abc import Callable
+from typing import Any, Protocol
 
 from aerodaas.drivers.mavlink.wire.framing import senders
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
@@ -15,7 +16,7 @@ from aerodaas.drivers.mavlink.wire.transport import Transport
 from aerodaas.drivers.pin import Peer
 from aerodaas.types.errors import VehicleError
 
-__all__ = ["WireShare", "share_wire"]
+__all__ = ["WireMember", "WireShare", "share_wire"]
 
 _TICK = 0.05
 """Longest time between two looks at the wire, seconds: a cut one is opened anew by looking."""
@@ -31,6 +32,22 @@ _wires: dict[str, _SharedWire] = {}
 """Open wires of this process by URL."""
 
 
+class WireMember(Protocol):
+    """A vehicle's link, as those that share its wire know it."""
+
+    pins: SenderPins
+    """Senders of its vehicle."""
+
+    @property
+    def key(self) -> bytes | None:
+        """By which it signs, if it does."""
+        ...
+
+    def send(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Send a message to its vehicle, at once; in any thread."""
+        ...
+
+
 class WireShare:
     """One vehicle's share of a wire, a `Transport`: what comes for it, and the way to it.
 
@@ -38,15 +55,15 @@ class WireShare:
     """
 
     def __init__(
-        self, owner: _SharedWire, name: str, system: int, pins: SenderPins, *, hears_all: bool
+        self, owner: _SharedWire, name: str, system: int, member: WireMember, *, hears_all: bool
     ) -> None:
-        """Share of robot `name`, whose vehicle is `system` and whose senders are in `pins`.
+        """Share of robot `name`, whose vehicle is `system`.
 
         With `hears_all` it is given what is of the other vehicles alone, too.
         """
         self.name = name
         self.system = system
-        self.pins = pins
+        self.member = member
         self.hears_all = hears_all
         self.dropped = 0
         """Pieces for which there was no room."""
@@ -57,9 +74,9 @@ class WireShare:
         self._bell, self._rope = socket.socketpair()
 
     @property
-    def others(self) -> tuple[SenderPins, ...]:
-        """Senders of the other vehicles that share the wire."""
-        return tuple(one.pins for one in self._owner.shares if one is not self)
+    def others(self) -> tuple[WireMember, ...]:
+        """The other vehicles' links that share the wire."""
+        return tuple(one.member for one in self._owner.shares if one is not self)
 
     def is_foreign(self, system: int) -> bool:
         """Whether `system` is another vehicle that shares the wire."""
@@ -117,7 +134,7 @@ class _SharedWire:
         self._thread = threading.Thread(target=self._run, name=f"{url}-wire", daemon=True)
         self._thread.start()
 
-    def join(self, name: str, system: int, pins: SenderPins, *, hears_all: bool) -> WireShare:
+    def join(self, name: str, system: int, member: WireMember, *, hears_all: bool) -> WireShare:
         """A further share; raises VehicleError if `system` has one already."""
         for one in self.shares:
             if one.system == system:
@@ -125,7 +142,7 @@ class _SharedWire:
                     f"{name}: system {system} on {self._url} is {one.name}'s already, which is "
                     "connected by this process"
                 )
-        share = WireShare(self, name, system, pins, hears_all=hears_all)
+        share = WireShare(self, name, system, member, hears_all=hears_all)
         self._use((*self.shares, share))
         return share
 
@@ -173,7 +190,7 @@ def share_wire(
     url: str,
     name: str,
     system: int,
-    pins: SenderPins,
+    member: WireMember,
     open_transport: Callable[[str, str], Transport],
     *,
     hears_all: bool,
@@ -184,7 +201,7 @@ def share_wire(
         url: The wire's address.
         name: The robot's.
         system: Its vehicle's system id.
-        pins: Senders of its vehicle, by which the others know its address.
+        member: Its link.
         open_transport: Opens the wire.
         hears_all: Whether it is given the other vehicles' packets, too, to forward them.
 
@@ -195,4 +212,4 @@ def share_wire(
     with _lock:
         if url not in _wires:
             _wires[url] = _SharedWire(url, open_transport(url, name))
-        return _wires[url].join(name, system, pins, hears_all=hears_all)
+        return _wires[url].join(name, system, member, hears_all=hears_all)
