@@ -100,6 +100,7 @@ def main() -> None:
     controller = VehicleController(spec, session, BackgroundPublisher(lambda _: None))
     scope = f"walk/{uuid.uuid4().hex[:8]}"
     own = {name: Publisher(scope, name) for name in VehicleController.streams(spec)}
+    controller.connect()
     controller.open(own)
     detector, follower = VipDetectionAnalytics(), VipFollowAnalytics(distance=2.0)
     for analysis in (detector, follower):

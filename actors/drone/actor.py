@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -26,6 +27,7 @@ from aerodaas.actors.session import (
     next_due,
 )
 from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
+from aerodaas.drivers.loading import link_of
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
@@ -90,8 +92,14 @@ class DroneActor(StreamActor):
         nice = raise_niceness()
         if nice > 0:
             self._warn_of_niceness(nice)
-        for spec in self._specs:
-            controller = self._controller(spec)
+        controllers = [self._controller(spec) for spec in self._specs]
+        try:
+            _at_once(VehicleController.connect, controllers)
+        except BaseException:
+            # What one has set at its vehicle is put back, though another was not found.
+            _at_once(VehicleController.disconnect, controllers)
+            raise
+        for spec, controller in zip(self._specs, controllers, strict=True):
             streams = (*VehicleController.streams(spec), *map(reply_stream, spec.requesters))
             controller.open({stream: self.publisher(stream) for stream in streams})
             self._controllers[controller.id] = controller
@@ -334,8 +342,24 @@ class DroneActor(StreamActor):
 
     def _close(self) -> None:
         self._calls.close("the drone's actor has been stopped")
-        for controller in self._controllers.values():
-            controller.vehicle.close()
+        _at_once(VehicleController.disconnect, list(self._controllers.values()))
+
+
+def _at_once(
+    deed: Callable[[VehicleController], object], controllers: Sequence[VehicleController]
+) -> None:
+    """Do it for all; those that share a link, and wait for their vehicles, at the same time.
+
+    Raises the first one's error once all are done.
+    """
+    if len(controllers) == 1 or any(link_of(one.spec.robot) is None for one in controllers):
+        for one in controllers:
+            deed(one)
+        return
+    with ThreadPoolExecutor(len(controllers)) as threads:
+        outcomes = [threads.submit(deed, one) for one in controllers]
+    for outcome in outcomes:
+        outcome.result()
 
 
 def _streams(robots: tuple[RobotSpec, ...]) -> list[str]:

@@ -117,10 +117,17 @@ class VehicleController:
         self._stepped: SteppedVehicle | None = None
         self._played: PlayedVehicle | None = None
 
-    def open(self, publishers: dict[str, Publisher]) -> None:
-        """Connect the vehicle and create its mission; `publishers` are by stream."""
-        self._publishers = publishers
+    def connect(self) -> None:
+        """Connect the vehicle; in any thread."""
         self.vehicle.connect()
+
+    def disconnect(self) -> None:
+        """Disconnect it; in any thread."""
+        self.vehicle.close()
+
+    def open(self, publishers: dict[str, Publisher]) -> None:
+        """Create the mission of the connected vehicle; `publishers` are by stream."""
+        self._publishers = publishers
         # Once: to ask a protocol about an instance looks up all its members each time.
         self._stepped = self.vehicle if isinstance(self.vehicle, SteppedVehicle) else None
         self._played = self.vehicle if isinstance(self.vehicle, PlayedVehicle) else None

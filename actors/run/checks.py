@@ -23,7 +23,7 @@ from aerodaas.config.plugins import (
 )
 from aerodaas.config.secrets import SecretUrl, plain, shown_text
 from aerodaas.dataflow.names import snake_case
-from aerodaas.drivers.loading import load_vehicle
+from aerodaas.drivers.loading import check_links, load_vehicle
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.identifiers import find_scoped
 
@@ -65,6 +65,10 @@ def check_environment(config: EnvironmentConfig, place: str) -> None:
         if is_built_in("drivers", robot.driver):
             _check_settings("drivers", robot.driver, robot.settings, f"{place}: robot {robot.id}")
             _check_actuators(robot, f"{place}: robot {robot.id}")
+    try:
+        check_links([one for one in config.robots if is_built_in("drivers", one.driver)])
+    except ConfigError as error:
+        raise ConfigError(f"{place}: {error}") from None
     for sensor in (one for one in config.all_sensors() if one.type == "camera"):
         driver = config.camera_driver(sensor)
         require_plugin("cameras", driver)
@@ -85,12 +89,14 @@ def check_plugins(
     it has one; built-in plug-ins are also constructed, which opens nothing. `here` is True if
     all actors run on this machine: then files to be played must exist on it.
     """
+    robots = list(robots)
     for robot in robots:
         _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
         _check_settings("drivers", robot.driver, robot.settings, f"robot {robot.id}")
         _check_actuators(robot, f"robot {robot.id}")
         if is_built_in("drivers", robot.driver):
             load_vehicle(robot, config)
+    check_links(robots)
     for sensor in cameras:
         driver = config.camera_driver(sensor)
         hint = "" if sensor.driver else f"; its robot's driver was taken: {_OWN_CAMERA}"

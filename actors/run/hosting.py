@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.drone.vehicle_controller import RobotSpec
 from aerodaas.actors.session import Session
+from aerodaas.drivers.loading import link_of
+from aerodaas.types.errors import ConfigError
 
 __all__ = ["MOST_ALONE", "MOST_TOGETHER", "by_actor"]
 
@@ -25,23 +27,40 @@ def by_actor(
     """Distribute robots, each with its place in `edges`, over drone actors.
 
     In lockstep one actor flies all of them. In real time each robot has an actor, and thus a
-    process, of its own; only the simulated ones of a large flight share actors, for the processes
-    of fifty of them, and what these tell each other, would keep a machine busy by themselves.
+    process, of its own, with two exceptions: robots on one link share the process that opens it,
+    and the simulated ones of a large flight share actors, for the processes of fifty of them, and
+    what these tell each other, would keep a machine busy by themselves. Raises ConfigError for a
+    link that robots share from different places.
     """
     if session.speed is None:
         return (tuple(specs),)
-    real: list[RobotSpec] = []
-    simulated: list[RobotSpec] = []
-    for one in specs:
-        (simulated if one.robot.driver == "simulated" else real).append(one)
-    if len(simulated) <= MOST_ALONE:
-        return tuple((one,) for one in specs)
-    groups: list[tuple[RobotSpec, ...]] = [(one,) for one in real]
-    most = max(1, int(MOST_TOGETHER / max(1.0, session.speed)))
     places = dict(zip((one.robot.id for one in specs), edges, strict=True))
+    simulated = [one for one in specs if one.robot.driver == "simulated"]
+    if len(simulated) <= MOST_ALONE:
+        return _by_link(specs, places)
+    groups = [*_by_link([one for one in specs if one not in simulated], places)]
+    most = max(1, int(MOST_TOGETHER / max(1.0, session.speed)))
     for place in dict.fromkeys(places[one.robot.id] for one in simulated):
         here = [one for one in simulated if places[one.robot.id] == place]
         count = math.ceil(len(here) / most)
         ends = [len(here) * number // count for number in range(count + 1)]
         groups += [tuple(here[start:end]) for start, end in pairwise(ends)]
     return tuple(groups)
+
+
+def _by_link(
+    specs: Sequence[RobotSpec], places: Mapping[str, Placement]
+) -> tuple[tuple[RobotSpec, ...], ...]:
+    groups: dict[str, list[RobotSpec]] = {}
+    for one in specs:
+        name = one.robot.id
+        groups.setdefault(link_of(one.robot) or f"robot {name}", []).append(one)
+    for group in groups.values():
+        first, *others = (spec.robot.id for spec in group)
+        for other in others:
+            if places[other] != places[first]:
+                raise ConfigError(
+                    f"robots {first} and {other} share a link, which one process opens: give both "
+                    'the same "edge"'
+                )
+    return tuple(tuple(group) for group in groups.values())

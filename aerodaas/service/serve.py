@@ -9,6 +9,8 @@ from pathlib import Path
 from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.analytics.remote.listening import listen
 from aerodaas.analytics.remote.serving import web_server
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.drivers.loading import link_of
 from aerodaas.service.access import Accounts
 from aerodaas.service.app import build_service
 from aerodaas.service.settings import ServiceSettings
@@ -46,7 +48,7 @@ def serve(
         tell: Tells the provider's people of what they should know.
 
     Raises:
-        ConfigError: If it would listen to the network without TLS.
+        ConfigError: If it would listen to the network without TLS, or two drones share a link.
         SourceError: If the port cannot be had.
         StoreError: If the database cannot be used.
     """
@@ -55,6 +57,7 @@ def serve(
             f"tokens do not go over a network in the clear: to listen on {host}, give "
             "--certificate and --key, or listen on 127.0.0.1 behind a proxy that has them"
         )
+    _require_own_links(settings.config)
     settings.state.mkdir(parents=True, exist_ok=True, mode=0o700)
     settings.state.chmod(0o700)
     listener = _bound(host, port)
@@ -77,6 +80,19 @@ def serve(
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=2,
         ).run(sockets=[listener])
+
+
+def _require_own_links(config: EnvironmentConfig) -> None:
+    """Raise ConfigError for two drones on one link: they may be flown by different tenants."""
+    known: dict[str, str] = {}
+    for robot in config.robots:
+        link = link_of(robot)
+        if link is not None and known.setdefault(link, robot.id) != robot.id:
+            raise ConfigError(
+                f"robots {known[link]} and {robot.id} share a link, which one flight opens for "
+                "itself: a service leases them one by one, so give each a port of its own; a "
+                "MAVLink router does that"
+            )
 
 
 def _bound(host: str, port: int) -> socket.socket:

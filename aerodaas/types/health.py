@@ -31,6 +31,8 @@ class HealthReadings:
     compass."""
     gps_fix: bool | None = None
     """Whether the GPS has a position in space."""
+    gps_rtk: str = ""
+    """How far corrections of a base station have come: "RTK float", "RTK fixed", or none."""
     logs: bool | None = None
     """Whether the vehicle can write its own log."""
     wind: float | None = None

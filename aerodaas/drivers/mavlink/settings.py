@@ -61,6 +61,9 @@ class MavlinkSettings(BaseModel):
     forward: str | None = None
     """Pass everything on to a ground station or another program and back, such as
     `udpout:127.0.0.1:14550`."""
+    corrections: str | None = None
+    """Base station whose RTCM 3 messages are passed on to the vehicle, and to those that share its
+    link: `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
     signing_key: SecretStr | None = None
     """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
     variable AERODAAS_MAVLINK_KEY takes its place."""

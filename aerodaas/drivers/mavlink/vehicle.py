@@ -30,6 +30,7 @@ from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
+from aerodaas.drivers.mavlink.one_link import check_links, link_of
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
@@ -45,12 +46,7 @@ from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.health import HealthReadings
 from aerodaas.types.payload import Gimbal, PhotoCamera
-from aerodaas.types.vehicle import (
-    Capabilities,
-    Setpoint,
-    VehicleMode,
-    VehicleState,
-)
+from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.types.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
@@ -73,6 +69,8 @@ class MavlinkVehicle:
     """What it can carry."""
     observing: ClassVar[Mapping[str, bool]] = {"observe": True}
     """Settings with which a connection changes nothing at the vehicle, for who only watches it."""
+    link_of = staticmethod(link_of)
+    check_links = staticmethod(check_links)
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`; nothing is sent or opened."""
@@ -164,7 +162,7 @@ class MavlinkVehicle:
                 )
                 self._report.departure = self._departure
                 self._commander = commander
-            if found.signs and not link.signs:
+            if found.signs and link.key is None:
                 require_answer(commander, self._name, self._pause)
             self._connection = establish(
                 link,

@@ -157,7 +157,8 @@ class Checklist:
         few = 0 < gps.satellites < policy.satellites
         good = not few and gps.horizontal_sigma <= policy.gps_accuracy
         known = f"{gps.satellites} satellites" if gps.satellites else "a fix"
-        value = f"{known}, within {gps.horizontal_sigma:.1f} m"
+        corrected = f", {told.gps_rtk}" if told.gps_rtk else ""
+        value = f"{known}, within {gps.horizontal_sigma:.1f} m{corrected}"
         return HealthItem("gps", value, bound, _verdict(good=good))
 
     @staticmethod

@@ -78,6 +78,7 @@ def test_vibration_and_fix() -> None:
     for kind, fixed in ((3, True), (6, True), (2, False), (0, False)):
         gps = mavlink.MAVLink_gps_raw_int_message(0, kind, 1, 1, 0, 80, 80, 0, 0, 9)
         assert after(gps).gps_fix is fixed
+        assert after(gps).gps_rtk == ("RTK fixed" if kind == 6 else "")
     nothing = after()
     assert (nothing.vibration, nothing.gps_fix, nothing.cells) == (None, None, None)
 

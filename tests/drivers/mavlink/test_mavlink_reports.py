@@ -70,6 +70,7 @@ def test_what_is_told_in_our_frame() -> None:
         "impostor_packets": 0,
         "refused_packets": 0,
         "silence": 0.0,
+        "gps_fix_type": 0.0,
     }
 
 

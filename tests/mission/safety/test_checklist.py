@@ -120,6 +120,13 @@ def test_each_item_alone(name: str, change: dict[str, Any], word: str) -> None:
     assert name not in listed(vehicle, {name: "ignore"})
 
 
+def test_corrections_are_told_beside_the_satellites() -> None:
+    """They are no condition: whether they are precise enough is a question of accuracy."""
+    item = listed(Measured(replace(WELL, gps_rtk="RTK fixed")), {})["gps"]
+    assert item.value == "12 satellites, within 0.8 m, RTK fixed"
+    assert item.verdict is Verdict.GOOD
+
+
 def test_ill_covers_every_item() -> None:
     """None is left without a test."""
     assert {name for name, *_ in ILL} == set(POLICIES)

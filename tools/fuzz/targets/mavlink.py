@@ -213,7 +213,7 @@ def run(data: bytes) -> None:
 
 def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
     assert rig.link is not None  # noqa: S101 - it is connected
-    if rig.link._pins.pin.address != _OWN:  # noqa: SLF001
+    if rig.link.pins.pin.address != _OWN:
         return  # it was a stranger who was met first
     rig.connected = True
     flight = FuzzedFlight(rig.vehicle, _ROBOT)

@@ -42,6 +42,8 @@ class SitlProcess:
         """What it prints."""
         self.url = "udpin:{}:{}".format(*options.heard_at)
         """Of the vehicle, for the setting `url` of the driver `mavlink`."""
+        self.system = options.system
+        """Its system id, if one was asked for."""
         self._options = options
         self._timeout = timeout
         self._process: subprocess.Popen[bytes] | None = None

@@ -18,6 +18,10 @@ _GAP = 1.0
 """Longest counted gap between two messages in seconds: a longer one is the link's."""
 _FIX = 3
 """GPS fix types from this one on are positions in space."""
+_RTK = {
+    mavlink.GPS_FIX_TYPE_RTK_FLOAT: "RTK float",
+    mavlink.GPS_FIX_TYPE_RTK_FIXED: "RTK fixed",
+}
 _UNSURE = (100, 50, 20, 10, 5)
 """Step in metres in which a slowly growing fault is reported anew."""
 _DOES_NOT_FIT = 0.8
@@ -98,6 +102,8 @@ class Health:
         position, velocity and height (EKF_STATUS_REPORT: and compass)."""
         self.gps_fix: bool | None = None
         """Whether the GPS has a position in space."""
+        self.gps_fix_type = 0
+        """GPS_FIX_TYPE as last told; 0: no GPS."""
         self._charges_told = False
         """Batteries are reported by their own messages."""
         self._takers = {
@@ -132,6 +138,11 @@ class Health:
         return complaint is not None and now - complaint.since >= _STANDS
 
     @property
+    def gps_rtk(self) -> str:
+        """How far its corrections have come; empty without any."""
+        return _RTK.get(self.gps_fix_type, "")
+
+    @property
     def sure_of_position(self) -> bool:
         """Whether the estimator and the GPS have no complaint about where it is."""
         return not any(name in self._complaints for name in ("fix", "unsure", "lost", "glitch"))
@@ -147,6 +158,7 @@ class Health:
     def _gps(self, message: Any, now: float) -> None:  # noqa: ANN401
         self._gps_silence = 0.0
         self.gps_fix = bool(message.fix_type >= _FIX)
+        self.gps_fix_type = int(message.fix_type)
         if message.fix_type >= _FIX:
             self._fixed_at = now
         # A vehicle that never had a fix flies without GPS, or reports the reason itself.

@@ -13,6 +13,8 @@ __all__ = ["Framer", "senders", "signed"]
 _V1, _V2 = 0xFE, 0xFD
 _MARKS = (bytes([_V1]), bytes([_V2]))
 _HEADER = {_V1: 6, _V2: 10}
+_SYSTEM = {_V1: 3, _V2: 5}
+"""Where the system id is; the component id follows."""
 _CHECKSUM = 2
 _SIGNATURE = 13
 _SIGNED = 0x01
@@ -32,7 +34,7 @@ def senders(content: bytes) -> set[tuple[int, int]] | None:
         length = _length(rest) if rest[0] in _HEADER else None
         if length is None or len(rest) < length:
             return None
-        ids = 3 if rest[0] == _V1 else 5
+        ids = _SYSTEM[rest[0]]
         found.add((rest[ids], rest[ids + 1]))
         del rest[:length]
     return found
@@ -42,12 +44,19 @@ class Framer:
     """Extractor of packets from bytes.
 
     `decode` turns a packet whose message id is among `wanted` into a message, or returns None if
-    it is none after all, in which case the search goes on behind its first byte.
+    it is none after all, in which case the search goes on behind its first byte. Packets of
+    systems that are `foreign` are of no interest.
     """
 
-    def __init__(self, wanted: frozenset[int], decode: Callable[[bytearray], object]) -> None:
+    def __init__(
+        self,
+        wanted: frozenset[int],
+        decode: Callable[[bytearray], object],
+        foreign: Callable[[int], bool] = lambda _: False,
+    ) -> None:
         self._wanted = wanted
         self._decode = decode
+        self._foreign = foreign
         self._buffer = bytearray()
         self.damaged = 0
         """Discarded bytes and packets."""
@@ -63,7 +72,7 @@ class Framer:
             length = _length(buffer)
             if length is None or len(buffer) < length:
                 break
-            if _message_id(buffer) not in self._wanted:
+            if _message_id(buffer) not in self._wanted or self._foreign(_system(buffer)):
                 # Only a packet is followed by a packet: a sufficient test without decoding.
                 whole = len(buffer) == length or buffer[length] in _HEADER
                 self.damaged += not whole
@@ -95,6 +104,10 @@ def _length(buffer: bytearray) -> int | None:
         return None
     tail = _SIGNATURE if version == _V2 and buffer[2] & _SIGNED else 0
     return header + buffer[1] + _CHECKSUM + tail
+
+
+def _system(buffer: bytearray) -> int:
+    return buffer[_SYSTEM[buffer[0]]]
 
 
 def _message_id(buffer: bytearray) -> int:

@@ -16,12 +16,14 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.wire.corrections import Corrections
 from aerodaas.drivers.mavlink.wire.dialect import EventMessage, decoded, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.senders import Sender, SenderPins
+from aerodaas.drivers.mavlink.wire.sharing import WireMember, WireShare, share_wire
 from aerodaas.drivers.mavlink.wire.signing import SignedCodec, load_key, sign_with
-from aerodaas.drivers.mavlink.wire.transport import is_exposed, open_transport
+from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
 from aerodaas.drivers.pin import Peer
 
 __all__ = ["LinkCounts", "MavlinkLink", "Message"]
@@ -123,12 +125,14 @@ class MavlinkLink:
         self._on_turn = on_turn
         self._on_component = on_component
         self._healthy = healthy
-        self._key = load_key(settings, name)
+        self.key = load_key(settings, name)
+        """By which is signed what is sent; None: nothing is."""
         self._mav: Any = SignedCodec(None, settings.sender, settings.own_component)
-        if self._key is not None:
-            sign_with(self._mav, self._key)
+        if self.key is not None:
+            # Vehicles on one radio hear what is signed for each: none may seem another's replay.
+            sign_with(self._mav, self.key, settings.system or 0)
         self._stands = stands
-        self._pins = SenderPins(lambda: self._key is not None or stands())
+        self.pins = SenderPins(lambda: self.key is not None or stands())
         self._refused_at = -math.inf
         self._framers: dict[Peer, Framer] = {}
         self._lock = threading.Lock()
@@ -137,23 +141,51 @@ class MavlinkLink:
         self._turn_due = self._heartbeat_due = -math.inf
         self._thread: threading.Thread | None = None
         self._forwarder: Forwarder | None = None
+        self._share: WireShare | None = None
+        self.corrections: Corrections | None = None
+        """Of a base station, passed on while it is open."""
 
     def open(self) -> None:
         """Open the wire and start the thread; raises ConfigError and VehicleError."""
         settings = self._settings
         with contextlib.ExitStack() as opened:
-            self._wire = open_transport(settings.url, self._name)
+            self._wire = self._opened_wire()
             opened.callback(self._wire.close)
             if settings.forward is not None:
                 self._forwarder = Forwarder(settings.forward, self._name, self._stands)
                 opened.callback(self._forwarder.close)
+            if settings.corrections is not None and not settings.observe:
+                self.corrections = Corrections(settings.corrections, self._name, self._correct)
+                opened.callback(self.corrections.close)
             self._bell, self._rope = map(opened.enter_context, socket.socketpair())
             self._resources = opened.pop_all()
         self._warn_if_exposed()
         self._start()
 
+    def _opened_wire(self) -> Transport:
+        """The wire, shared with this process' other vehicles there, if the system id is known."""
+        settings = self._settings
+        if settings.system is None:
+            return open_transport(settings.url, self._name)
+        self._share = share_wire(
+            settings.url,
+            self._name,
+            settings.system,
+            self,
+            open_transport,
+            hears_all=settings.forward is not None,
+        )
+        return self._share
+
+    def _all_links(self) -> tuple[WireMember, ...]:
+        """This vehicle's link, and those that share its wire."""
+        return (self, *(self._share.others if self._share is not None else ()))
+
+    def _is_foreign(self, system: int) -> bool:
+        return self._share is not None and self._share.is_foreign(system)
+
     def _warn_if_exposed(self) -> None:
-        if self._key is not None:
+        if self.key is not None:
             return
         for url in filter(None, (self._settings.url, self._settings.forward)):
             if is_exposed(url):
@@ -170,26 +202,23 @@ class MavlinkLink:
         self._thread.start()
 
     @property
-    def signs(self) -> bool:
-        """Whether there is a key, by which what is sent is signed."""
-        return self._key is not None
-
-    @property
     def target(self) -> Sender:
         """System and component of the vehicle, which must be known by now."""
-        target = self._pins.target
+        target = self.pins.target
         assert target is not None  # noqa: S101 - nobody asks before it was adopted
         return target
 
     def adopt(self, target: Sender, peer: Peer, now: float) -> None:
         """Accept only this system's component as the vehicle, and only from the address `peer`."""
-        self._pins.adopt(target, peer, now)
+        self.pins.adopt(target, peer, now)
 
     def reports(self, now: float) -> list[str]:
         """What the operator must know about strangers on the link, one sentence each."""
-        said = self._pins.pin.reports(now)
+        said = self.pins.pin.reports(now)
         if self._forwarder is not None:
             said += self._forwarder.pin.reports(now)
+        if self.corrections is not None:
+            said += self.corrections.reports(now)
         if now - self._refused_at <= _TOLD:
             said.append("link: packets that are unsigned, wrongly signed or replayed are dropped")
         return said
@@ -224,10 +253,19 @@ class MavlinkLink:
             self._thread.join(timeout=2.0)
         self._resources.close()
 
+    def _correct(self, message: Message) -> None:
+        """Pass corrections on to each vehicle on the wire: once where one packet reaches several.
+
+        Called by the thread of the corrections.
+        """
+        links = [link for link in self._all_links() if link.pins.target is not None]
+        for link in {(link.pins.pin.address, link.key): link for link in links}.values():
+            link.send(message)
+
     def _addressees(self) -> tuple[Peer, ...]:
-        if self._pins.target is not None:
-            return (self._pins.pin.address,)
-        return self._pins.addresses
+        if self.pins.target is not None:
+            return (self.pins.pin.address,)
+        return self.pins.addresses
 
     def _run(self) -> None:
         while not self._closing.is_set():
@@ -240,8 +278,9 @@ class MavlinkLink:
         if self._forwarder is not None:
             strangers = self._forwarder.strangers
             for packet in self._forwarder.receive(now):
+                all_ways = (peer for link in self._all_links() for peer in link.pins.addresses)
                 with self._lock:
-                    self._wire.send(packet, self._pins.addresses)
+                    self._wire.send(packet, tuple(dict.fromkeys(all_ways)))
             self.counts.strangers += self._forwarder.strangers - strangers
         if now >= self._turn_due:
             self._turn_due = now + _TICK
@@ -264,7 +303,9 @@ class MavlinkLink:
                 self._take(message, peer, now)
             if peer is not None:
                 framer.flush()
-            if self._forwarder is not None and self._pins.may_pass(content, peer):
+            if self._forwarder is not None and all(
+                link.pins.may_pass(content, peer) for link in self._all_links()
+            ):
                 self._forwarder.send(content)
         self.counts.damaged = sum(framer.damaged for framer in self._framers.values())
         if self._mav.refused != self.counts.refused:
@@ -273,9 +314,9 @@ class MavlinkLink:
     def _framer(self, peer: Peer) -> Framer:
         if peer not in self._framers:
             if len(self._framers) >= _FRAMERS:
-                known = {self._pins.pin.address}
+                known = {self.pins.pin.address}
                 self._framers = {one: f for one, f in self._framers.items() if one in known}
-            self._framers[peer] = Framer(_WANTED, self._decode)
+            self._framers[peer] = Framer(_WANTED, self._decode, self._is_foreign)
         return self._framers[peer]
 
     def _decode(self, frame: bytearray) -> Message | None:
@@ -284,11 +325,11 @@ class MavlinkLink:
 
     def _take(self, message: Message, peer: Peer, now: float) -> None:
         sender: Sender = (message.get_srcSystem(), message.get_srcComponent())
-        target = self._pins.target
+        target = self.pins.target
         if sender != target:
-            self._pins.meet(sender, peer)
+            self.pins.meet(sender, peer)
         if target is not None:
-            if self._pins.carries(sender, peer):
+            if self.pins.carries(sender, peer):
                 self._on_component(message, now)
                 return
             if sender != target:
@@ -298,7 +339,7 @@ class MavlinkLink:
                     self.counts.strangers += 1
                 return
             beats = message.get_type() == "HEARTBEAT"
-            if not self._pins.pin.admits(peer, now, may_lead=beats):
+            if not self.pins.pin.admits(peer, now, may_lead=beats):
                 self.counts.impostors += 1
                 return
         self.counts.received += 1
@@ -310,7 +351,7 @@ class MavlinkLink:
     def _is_aboard(self, message: Message, sender: Sender, target: Sender, peer: Peer) -> bool:
         """Whether it is a word of the vehicle's own equipment, by the vehicle's own address."""
         aboard = sender[0] == target[0] and sender[1] in _ABOARD.get(message.get_type(), ())
-        return aboard and peer == self._pins.pin.address
+        return aboard and peer == self.pins.pin.address
 
     def _heartbeat(self) -> Message:
         station = self._settings.heard_as_station

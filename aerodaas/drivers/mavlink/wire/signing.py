@@ -58,14 +58,14 @@ def _key(content: bytes, place: str) -> bytes:
     return key
 
 
-def sign_with(mav: Any, key: bytes) -> None:  # noqa: ANN401 - pymavlink has no types
-    """Make `mav` sign its packets and refuse unsigned ones."""
+def sign_with(mav: Any, key: bytes, vehicle: int = 0) -> None:  # noqa: ANN401 - pymavlink has no types
+    """Make `mav` sign its packets to the system `vehicle`, and refuse unsigned ones."""
     signing = mav.signing
     signing.secret_key = key
     signing.sign_outgoing = True
     signing.timestamp = int((time.time() - _EPOCH) * _TICKS)
     # Another run within the same clock tick would be rejected as a replay.
-    signing.link_id = os.getpid() % 256
+    signing.link_id = (os.getpid() + vehicle) % 256
     signing.allow_unsigned_callback = _let_through
 
 

@@ -1,0 +1,124 @@
+"""Corrections of a base station for RTK, read by a thread of its own and passed on at once."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import select
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from aerodaas.drivers.mavlink.wire.rtcm import LARGEST, RtcmFramer, fragments
+from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
+from aerodaas.types.errors import ConfigError, VehicleError
+
+__all__ = ["Corrections"]
+
+_log = logging.getLogger(__name__)
+
+_STALE = 10.0
+"""Seconds without a message after which it is told: receivers leave RTK after some 30."""
+_RETRY = 1.0
+"""Seconds between attempts to open the source."""
+_TICK = 0.2
+"""Longest time between two looks at it, seconds."""
+_RATE = 5000.0
+"""Bytes a second that are passed on: a base station with four constellations sends 1500."""
+_TOLD = 10.0
+"""Seconds for which it is reported that some were left out."""
+
+
+class Corrections:
+    """Source of RTCM 3 messages, which are passed on as GPS_RTCM_DATA.
+
+    Nothing waits: what comes faster than a vehicle's link should carry is left out.
+    """
+
+    def __init__(self, url: str, name: str, deliver: Callable[[Any], None]) -> None:
+        """Read `url` for robot `name`; `deliver` is called by its thread for each fragment.
+
+        A source that is not there yet is tried again. Raises ConfigError for an invalid address.
+        """
+        self.passed = 0
+        """Messages that were passed on."""
+        self.left_out = 0
+        """Messages that came too fast, or are larger than MAVLink carries."""
+        self._url = url
+        self._name = name
+        self._deliver = deliver
+        self._framer = RtcmFramer()
+        self._heard_at = time.monotonic()
+        self._left_out_at = -math.inf
+        self._room, self._filled_at = _RATE, self._heard_at
+        self._closing = threading.Event()
+        self._wire = self._opened()
+        if is_exposed(url):
+            _log.warning(
+                "%s: corrections come from %s over a network, and nothing signs them: who can "
+                "forge them there moves the position by metres",
+                name,
+                url,
+            )
+        self._thread = threading.Thread(target=self._run, name=f"{name}-rtcm", daemon=True)
+        self._thread.start()
+
+    @property
+    def skipped(self) -> int:
+        """Bytes that belong to no message."""
+        return self._framer.skipped
+
+    def _opened(self) -> Transport | None:
+        if self._url.partition(":")[0] not in {"tcp", "serial"}:
+            raise ConfigError(
+                f"{self._name}: corrections come from tcp:HOST:PORT or serial:DEVICE:BAUD, not "
+                f"{self._url!r}"
+            )
+        try:
+            return open_transport(self._url, f"{self._name}, corrections")
+        except VehicleError:
+            return None
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            if self._wire is None:
+                self._closing.wait(_RETRY)
+                self._wire = self._opened()
+                continue
+            wires = [number for number in (self._wire.fileno(),) if number >= 0]
+            with contextlib.suppress(OSError, ValueError):
+                select.select(wires, [], [], _TICK)
+            for content, _ in self._wire.receive():
+                for message in self._framer.feed(content):
+                    self._pass(message, time.monotonic())
+        if self._wire is not None:
+            self._wire.close()
+
+    def _pass(self, message: bytes, now: float) -> None:
+        self._heard_at = now
+        self._room = min(_RATE, self._room + (now - self._filled_at) * _RATE)
+        self._filled_at = now
+        if len(message) > min(LARGEST, self._room):
+            self.left_out += 1
+            self._left_out_at = now
+            return
+        self._room -= len(message)
+        for part in fragments(message, self.passed):
+            self._deliver(part)
+        self.passed += 1
+
+    def reports(self, now: float) -> list[str]:
+        """What the operator must know at `now`, one sentence each."""
+        said = []
+        if now - self._heard_at > _STALE:
+            said.append(f"corrections: none from {self._url}")
+        if now - self._left_out_at <= _TOLD:
+            said.append(f"corrections: more from {self._url} than is passed on")
+        return said
+
+    def close(self) -> None:
+        """End the thread and close the source."""
+        self._closing.set()
+        self._thread.join(timeout=2.0)
