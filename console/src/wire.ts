@@ -13,6 +13,10 @@ export type Scope = "fly" | "sense" | "compute";
  */
 export type LinkState = "unwatched" | "connecting" | "connected" | "mission" | "lost";
 /**
+ * What an item means for a take-off.
+ */
+export type Verdict = "good" | "warning" | "refused" | "unknown";
+/**
  * State of a submitted mission at the service; its drones have states of their own.
  */
 export type MissionPhase =
@@ -39,6 +43,7 @@ export interface Wire {
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
   PlaybackOut: PlaybackOut;
+  PreflightOut: PreflightOut;
   RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
   SteerIn: SteerIn;
@@ -107,6 +112,7 @@ export interface RobotOut {
   mode: string | null;
   objection: string;
   position: [number, number, number] | null;
+  preflight: Verdict | null;
   sensors: string[];
   shared: string[];
   since: number | null;
@@ -323,6 +329,25 @@ export interface PlaceOut {
    */
   place: [number, number, number];
   since: number;
+}
+/**
+ * The list before take-off of one robot, as it was when it was gone through last.
+ */
+export interface PreflightOut {
+  age: number | null;
+  items: HealthItem[];
+  robot: string;
+  verdict: Verdict | null;
+}
+/**
+ * One item of the list before take-off.
+ */
+export interface HealthItem {
+  bound: string;
+  name: string;
+  remedy: string;
+  value: string;
+  verdict: Verdict;
 }
 /**
  * Change of the coming waypoints of one robot: one command, carried out whole.

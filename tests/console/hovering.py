@@ -15,6 +15,7 @@ from aerodaas.dataflow.graph import Graph
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.types.data import Alert, Battery, GpsFix, Odometry
 from aerodaas.types.errors import MissionError
+from aerodaas.types.health import HealthReport
 from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
@@ -39,6 +40,7 @@ class Run:
         self.commands: list[Command] = []
         self.notes: list[str] = []
         self.alerts: list[Alert] = []
+        self.health: HealthReport | None = None
 
     def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """Enroute to a waypoint."""
@@ -52,7 +54,7 @@ class Run:
         status = MissionStatus(
             10**9, MissionState.ENROUTE, "flying to wp1", target, outlook=outlook
         )
-        robots = {"drone": SimpleNamespace(status=status, state=vehicle)}
+        robots = {"drone": SimpleNamespace(status=status, state=vehicle, health=self.health)}
         return SimpleNamespace(robots=robots, alerts=list(self.alerts), reports={})
 
     def command(self, robot: str, command: Command) -> Answer:

@@ -14,7 +14,9 @@ from hovering import console
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
+from aerodaas.types.health import HealthItem, HealthReport, Verdict
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
@@ -178,6 +180,34 @@ def test_it_fits(browser: Browser, width: int, height: int) -> None:
         assert page.complaints() == []
         asked = browser.open(server.address().partition("#")[0])
         asked.until("document.querySelector('input[name=token]')")
+
+
+def test_what_refuses_a_take_off_stands_first(browser: Browser) -> None:
+    """Each item with a sign and a word beside its colour; what is old is shown so."""
+    good = HealthItem("gps", "12 satellites", "6 satellites", Verdict.GOOD)
+    bad = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.REFUSED, "wait for less wind")
+    with console() as (server, run):
+        page = browser.open(server.address())
+        until_state(page, "enroute")
+        page.until("document.querySelector('.preflight:not([open]) .empty')")
+        # In the air it is folded; whoever looks unfolds it.
+        page.run("document.querySelector('.preflight summary').click()")
+        run.health = HealthReport(NANOSECONDS // 2, (good, bad))
+        page.until("document.querySelectorAll('.preflight li').length === 2")
+        assert "refused: 1" in page.text("[data-testid=preflight]")
+        said = page.text(".preflight ul").split("\n")
+        assert said[:4] == [
+            "✕",
+            "wind 12.0 m/s, should be at most 10",
+            "wait for less wind",
+            "refuses",
+        ]
+        assert said[4:] == ["✓", "GPS 12 satellites", "ok"]
+        run.health = HealthReport(-60 * NANOSECONDS, (good,))
+        page.until("document.querySelector('.preflight ul.old')")
+        assert "s ago" in page.text(".preflight summary")
+        assert "ready" in page.text("[data-testid=preflight]")
+        assert page.complaints() == []
 
 
 def test_battery_and_alerts_are_told_ahead(browser: Browser) -> None:
