@@ -129,6 +129,8 @@ class StreamKind(str, enum.Enum):
 
     PICTURES = "pictures"
     DETECTIONS = "detections"
+    NAVIGATION = "navigation"
+    """Commands, of which the target of one that follows something is drawn."""
 
 
 class PictureForm(str, enum.Enum):

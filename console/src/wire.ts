@@ -32,7 +32,7 @@ export type MissionPhase =
 /**
  * What a page can draw of a stream.
  */
-export type StreamKind = "pictures" | "detections";
+export type StreamKind = "pictures" | "detections" | "navigation";
 
 export interface Wire {
   AccountOut: AccountOut;
