@@ -192,6 +192,7 @@ export interface StatusOut {
   state: string;
   target: string | null;
   time: number;
+  traffic: TrafficOut[];
   velocity: (number | null)[] | null;
   visited: string[];
   waypoints_known: number;
@@ -205,6 +206,24 @@ export interface OutlookOut {
   hover: number;
   plan: number;
   returns_at: number;
+}
+/**
+ * Another aircraft that the vehicle hears of, where it is at the moment of its state.
+ */
+export interface TrafficOut {
+  address: number;
+  age: number;
+  callsign: string;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  position: [number, number, number | null];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  velocity: [number, number, number];
 }
 /**
  * Result of the rehearsal in simulation.
@@ -308,6 +327,7 @@ export interface TrackOut {
   position: [number | null, number | null, number | null][];
   statuses: StatusOut[];
   time: number[];
+  traffic: HeardOut[];
   velocity: [number | null, number | null, number | null][];
   yaw: (number | null)[];
 }
@@ -328,6 +348,13 @@ export interface PlaceOut {
    * @maxItems 3
    */
   place: [number, number, number];
+  since: number;
+}
+/**
+ * The other aircraft that a robot heard of from a time on.
+ */
+export interface HeardOut {
+  aircraft: TrafficOut[];
   since: number;
 }
 /**

@@ -17,6 +17,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.health import HealthItem, HealthReport, Verdict
+from aerodaas.types.traffic import Traffic
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
@@ -207,6 +208,34 @@ def test_what_refuses_a_take_off_stands_first(browser: Browser) -> None:
         page.until("document.querySelector('.preflight ul.old')")
         assert "s ago" in page.text(".preflight summary")
         assert "ready" in page.text("[data-testid=preflight]")
+        assert page.complaints() == []
+
+
+def test_other_aircraft_are_on_the_map_until_they_are_gone(browser: Browser) -> None:
+    """With callsign, height above the drone and heading; dimmed when old, and read out."""
+    there = np.array([3.0, 5.0, 123.0])
+    east = np.array([20.0, 0.0, 0.0])
+    with console() as (server, run):
+        page = browser.open(server.address())
+        until_state(page, "enroute")
+        assert page.run("document.querySelector('[data-aircraft], .legend .aircraft')") is None
+        unknown = np.array([-2.0, 1.0, np.nan])
+        run.traffic = (
+            Traffic(1, "DLH4", there, east, 0.5),
+            Traffic(2, "0000B2", unknown, np.zeros(3), 6.0),
+        )
+        page.until("document.querySelectorAll('[data-aircraft]').length === 2")
+        assert page.run("document.querySelector('[data-aircraft=DLH4] text').textContent") == (
+            "DLH4 120 m above, 090°"
+        )
+        assert page.run("document.querySelector('.traffic.stale text').textContent") == (
+            "0000B2 height unknown, 6 s old"
+        )
+        assert page.run("document.querySelectorAll('.traffic.stale').length") == 1
+        said = page.run("document.querySelector('.legend .aircraft').textContent")
+        assert said == ("aircraft: DLH4 120 m above, 090°; 0000B2 height unknown, heading unknown")
+        run.traffic = ()
+        page.until("document.querySelector('[data-aircraft]') === null")
         assert page.complaints() == []
 
 
