@@ -579,7 +579,8 @@ def test_each_command_names_the_box_that_it_was_made_from(monkeypatch: pytest.Mo
     identity.certainty = Certainty.CONTESTED
     target, found = told()
     assert target is not None
-    assert (target.state, target.box) == (TargetState.LIKELY, pytest.approx(found[0].box))
+    assert target.state is TargetState.LIKELY
+    assert target.box == pytest.approx(found[0].box)
     assert told(seen=False)[0] == FollowedTarget(TargetState.UNSEEN)
     identity.certainty = Certainty.UNCERTAIN
     assert told()[0] == FollowedTarget(TargetState.UNCERTAIN)

@@ -235,7 +235,7 @@ def test_the_list_before_take_off_is_told_to_whoever_watches() -> None:
     windy = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.WARNING, "wait")
     with console() as (server, run):
         watcher = server.address(viewer=True)
-        nothing = {"robot": "drone", "verdict": None, "age": None, "items": []}
+        nothing: dict[str, Any] = {"robot": "drone", "verdict": None, "age": None, "items": []}
         assert ask(watcher, "/v1/robots/drone/preflight")[2] == nothing
         run.health = HealthReport(NANOSECONDS // 2, (windy,))
         until = time.monotonic() + 20.0

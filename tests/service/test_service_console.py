@@ -57,7 +57,7 @@ def test_the_list_before_take_off_is_told_between_missions_and_in_them(provider:
     """To every account, as the drone's charge is; with a client's method, too."""
     viewer = provider.user("list", "others", "viewer")
     client = ProviderClient(provider.url, viewer)
-    provider.until(lambda: client.preflight("one").items)
+    provider.until(lambda: bool(client.preflight("one").items))
     told = client.preflight("one")
     assert told.verdict is Verdict.GOOD
     assert {one.name for one in told.items} >= {"vehicle", "battery", "fence", "wind", "link"}
