@@ -25,6 +25,7 @@ from aerodaas.protocol.schemas import (
     MissionPhase,
     RobotOut,
 )
+from aerodaas.types.health import Verdict
 
 TOKEN = "t0k3n"  # noqa: S105 - of these tests alone
 MISSION = "3f1a6c0d9b2e"
@@ -163,7 +164,9 @@ class Stub:
         return answer
 
     def _fleet(self) -> FleetOut:
-        robots = [RobotOut(id="drone", sensors=["drone/odom"], battery=0.75)]
+        robots = [
+            RobotOut(id="drone", sensors=["drone/odom"], battery=0.75, preflight=Verdict.REFUSED)
+        ]
         return FleetOut(name="campus", robots=robots, environment=CATALOGUE)
 
     def _has_model(self, sha256: str) -> Response:

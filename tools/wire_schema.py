@@ -16,6 +16,7 @@ from pydantic.json_schema import JsonSchemaMode, models_json_schema
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -35,6 +36,7 @@ _OUT: tuple[type[BaseModel], ...] = (
     FleetOut,
     MissionOut,
     PlaybackOut,
+    PreflightOut,
     RefusalOut,
     SurveyOut,
 )

@@ -197,7 +197,7 @@ class DroneActor(StreamActor):
     def _publish_reports(self) -> None:
         """Replace the robots' reports; in the loop's thread only."""
         self._reports = {
-            name: RobotReport(controller.status, controller.state, ())
+            name: RobotReport(controller.status, controller.state, (), controller.loop.health)
             for name, controller in self._controllers.items()
         }
         self._changes.note((self.alerts.sent, *map(_notable, self._reports.values())))

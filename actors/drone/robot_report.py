@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from dataclasses import dataclass
 
+from aerodaas.types.health import HealthReport
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
 
@@ -22,6 +23,8 @@ class RobotReport:
     state: VehicleState | None
     latencies: tuple[float, ...]
     """Milliseconds from capture to command, newest last."""
+    health: HealthReport | None = None
+    """The list before take-off as it was gone through last."""
 
 
 class Latencies:

@@ -20,7 +20,7 @@ import numpy as np
 
 from aerodaas.config.annotations import is_subclass
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types import data, geometry, status, vehicle, waypoints
+from aerodaas.types import data, geometry, status, target, vehicle, waypoints
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.guest_item import GuestItem
 
@@ -40,6 +40,7 @@ _CLASSES: dict[str, type] = {
         geometry.CameraModel,
         status.Decision,
         status.MissionStatus,
+        target.FollowedTarget,
         vehicle.VehicleState,
         waypoints.VelocityCommand,
         waypoints.Waypoint,

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["cancel", "fetch", "fleet", "grant", "login", "missions", "submit", "watch"]
 
 _LOOK_SECONDS = 0.5
+_READY = {"good": "ready", "warning": "warned", "refused": "refused"}
+"""What the list before take-off says, by the gravest of its items."""
 MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
 
 
@@ -63,6 +65,9 @@ def login(
 def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
     """Show a provider's drones: free or leased, their charge, where they are, and their health.
 
+    A `refused` take-off, or the warnings, are explained by the console, or by
+    `GET /v1/robots/ROBOT/preflight`.
+
     aerodaas fleet --at https://provider.example
     aerodaas fleet --json | jq '.robots[] | select(.lease == null) | .id'
     """
@@ -76,12 +81,15 @@ def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
             _use(one.enabled, one.lease, one.mission, one.tenant),
             "-" if one.battery is None else f"{one.battery:.0%}",
             _place(one.position),
+            "-" if one.preflight is None else _READY[one.preflight.value],
             _health(one),
             ", ".join(sensor.rpartition("/")[2] for sensor in one.sensors),
         )
         for one in found.robots
     ]
-    print_table(found.name, ("robot", "use", "battery", "where", "health", "sensors"), rows)
+    print_table(
+        found.name, ("robot", "use", "battery", "where", "take-off", "health", "sensors"), rows
+    )
 
 
 def submit(

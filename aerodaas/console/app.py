@@ -23,6 +23,7 @@ from aerodaas.console.page import page_routes
 from aerodaas.console.surveys import SurveyPlanner
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -102,6 +103,7 @@ class _Routes:
         router = APIRouter(prefix="/v1")
         router.add_api_route("/me", account_of)
         router.add_api_route("/fleet", self.fleet)
+        router.add_api_route("/robots/{robot}/preflight", self.preflight)
         router.add_api_route("/missions", self.missions)
         router.add_api_route("/missions/{mission}", self.mission)
         router.add_api_route("/missions/{mission}/commands", self.command, methods=["POST"])
@@ -115,6 +117,13 @@ class _Routes:
     def fleet(self) -> FleetOut:
         """The drones, and what may be known of where they fly."""
         return self._fleet
+
+    def preflight(self, robot: str) -> PreflightOut:
+        """A robot's list before take-off."""
+        found = self._flight.preflight(robot)
+        if found is None:
+            raise HTTPException(404, f"there is no robot {robot}")
+        return found
 
     def missions(self) -> list[MissionOut]:
         """The one flight."""

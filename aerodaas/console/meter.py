@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.clock import seconds
 from aerodaas.types.status import MissionState
@@ -31,6 +32,8 @@ class FlightMeter:
     def __init__(self) -> None:
         self.status: dict[str, StatusOut] = {}
         """By robot; replaced and never changed, because other threads read it."""
+        self.preflight: dict[str, PreflightOut] = {}
+        """The list before take-off by robot; replaced as the status is."""
         self.alerts: list[str] = []
         self.analytics: AnalyticsOut | None = None
         """What the analytics scheduler has done; None before its first outcome."""
@@ -52,6 +55,10 @@ class FlightMeter:
                 self._flown[name] += max(0.0, now - before.time)
         self.status = {
             name: self._remembering(name, StatusOut.of(report.status, report.state))
+            for name, report in state.robots.items()
+        }
+        self.preflight = {
+            name: PreflightOut.of_flight(name, report.health, report.status.stamp)
             for name, report in state.robots.items()
         }
         for name, status in self.status.items():

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.mission.commands import Answer, Command
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import MissionOut, MissionPhase, PictureForm
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
@@ -107,6 +108,13 @@ class OwnFlight:
             analytics=self._meter.analytics,
             streams={} if self.over else drawn_streams(self._run.graph),
         )
+
+    def preflight(self, robot: str) -> PreflightOut | None:
+        """A robot's list before take-off; None if there is no such robot."""
+        self._asked = time.monotonic()
+        if robot not in {one.id for one in self._run.config.robots}:
+            return None
+        return self._meter.preflight.get(robot, PreflightOut(robot=robot))
 
     def version(self, mission: str) -> int:
         """A number that grows with each change; -1 once the flight is over."""

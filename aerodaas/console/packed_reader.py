@@ -7,10 +7,11 @@ from typing import Any
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.dataflow.graph import Graph
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.protocol.schemas import PictureForm, StreamKind
 from aerodaas.recording.h264 import H264Encoder, is_key_frame
-from aerodaas.recording.playback.page_items import packed_depth, packed_picture
-from aerodaas.types.data import Detections, Frame
+from aerodaas.recording.playback.page_items import packed_depth, packed_picture, packed_target
+from aerodaas.types.data import Detections, Frame, Header
 from aerodaas.types.status import Message
 
 __all__ = ["PackedReader", "drawn_streams"]
@@ -49,7 +50,7 @@ class PackedReader:
             message = read(timeout)
         except (TimeoutError, StopIteration):
             return None
-        found = self._formed(message.item)
+        found = self._formed(message.item, message.header)
         if found is None:
             return None
         item, blob, more = found
@@ -57,8 +58,11 @@ class PackedReader:
         stamps = {"stamp": message.stamp, "captured": message.captured}
         return {**head, **stamps, "item": item, "blob": bool(blob)}, blob
 
-    def _formed(self, item: object) -> tuple[Any, bytes, dict[str, Any]] | None:
-        """An item with its blob, and further words of its message; None for what has no depth."""
+    def _formed(self, item: object, header: Header) -> tuple[Any, bytes, dict[str, Any]] | None:
+        """An item made from `header`, its blob, and further words; None for what is not drawn."""
+        if isinstance(item, AeroNavigation) and self._form is not PictureForm.WHOLE:
+            target = next((one.target for one in item.commands if one.target), None)
+            return None if target is None else (packed_target(header, target), b"", {})
         if not isinstance(item, Frame) or self._form is PictureForm.WHOLE:
             return None if self._form is PictureForm.DEPTH else (*pack(item), {})
         if self._form is PictureForm.DEPTH:
@@ -83,13 +87,17 @@ class PackedReader:
 
 
 def drawn_streams(graph: Graph) -> dict[str, StreamKind]:
-    """The streams that a page can draw, by name: pictures, and what was found in them.
+    """The streams that a page can draw, by name: pictures, what was found in them, and navigation.
 
     None before they can be read.
     """
     if graph.reader is None:
         return {}
-    kinds = ((Frame, StreamKind.PICTURES), (Detections, StreamKind.DETECTIONS))
+    kinds = (
+        (Frame, StreamKind.PICTURES),
+        (Detections, StreamKind.DETECTIONS),
+        (AeroNavigation, StreamKind.NAVIGATION),
+    )
     return {
         node.id: kind
         for node in list(graph.nodes.values())

@@ -17,6 +17,7 @@ from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Header
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import is_close
+from aerodaas.types.health import HealthItem, HealthReport
 from aerodaas.types.status import MissionState, SetpointRecord
 from aerodaas.types.vehicle import (
     PositionSetpoint,
@@ -31,6 +32,9 @@ __all__ = ["SetpointLoop"]
 
 _REPEAT = NANOSECONDS
 """Nanoseconds after which an action without effect is requested again."""
+
+_EXAMINED_ANEW = NANOSECONDS
+"""Nanoseconds between two looks at the health of a drone whose mission has not been started."""
 
 _PERIOD = 0.05
 """Seconds assumed between turns, for the first one."""
@@ -59,6 +63,8 @@ class SetpointLoop:
         )
         self.state: VehicleState | None = None
         """The newest vehicle state read."""
+        self.health: HealthReport | None = None
+        """The list before take-off as it was gone through last; None before the first turn."""
         self._before: int | None = None
         self._last_action: type[Action] | None = None
         self._asked_at = 0
@@ -70,8 +76,7 @@ class SetpointLoop:
         has never given a state.
         """
         state = self._read()
-        checking = self.mission.state is MissionState.PREFLIGHT
-        items = self._checklist.examine(state) if checking else []
+        items = self._examined(state, now)
         action = self.mission.update(state, now, refusals(items))
         if isinstance(action, TakeOff):
             for text in concerns(items):
@@ -84,6 +89,15 @@ class SetpointLoop:
         finally:
             self._last_action = type(action)
             self._before = now
+
+    def _examined(self, state: VehicleState, now: int) -> tuple[HealthItem, ...]:
+        """The list as it counts for this turn: in preflight alone, and gone through anew then."""
+        before = self.mission.state
+        known = self.health is not None and now - self.health.stamp < _EXAMINED_ANEW
+        if before is MissionState.PREFLIGHT or (before is MissionState.IDLE and not known):
+            self.health = HealthReport(now, tuple(self._checklist.examine(state)))
+            return self.health.items if before is MissionState.PREFLIGHT else ()
+        return ()
 
     def _read(self) -> VehicleState:
         try:

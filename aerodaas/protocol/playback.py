@@ -10,11 +10,19 @@ from typing import Any
 
 from pydantic import Field
 
-from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut
+from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut, TrafficOut
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
-__all__ = ["AlertOut", "GpsOut", "PlaceOut", "PlaybackOut", "RecordedOut", "TrackOut"]
+__all__ = [
+    "AlertOut",
+    "GpsOut",
+    "HeardOut",
+    "PlaceOut",
+    "PlaybackOut",
+    "RecordedOut",
+    "TrackOut",
+]
 
 
 class PlaceOut(AnswerModel):
@@ -44,6 +52,14 @@ class GpsOut(AnswerModel):
     """Standard deviation of the place along the ground, metres."""
 
 
+class HeardOut(AnswerModel):
+    """The other aircraft that a robot heard of from a time on."""
+
+    since: float
+    """Mission seconds, for which the places hold."""
+    aircraft: list[TrafficOut]
+
+
 class TrackOut(AnswerModel):
     """One robot's flight.
 
@@ -67,6 +83,8 @@ class TrackOut(AnswerModel):
     """One for each change of anything but figures and places, which they do not have."""
     places: list[PlaceOut]
     """Waypoints as they became known; a later one of the same id takes the place of an earlier."""
+    traffic: list[HeardOut] = Field(default_factory=list)
+    """Other aircraft, at most once a second; an empty one where the last of them was gone."""
 
 
 class RecordedOut(AnswerModel):

@@ -16,6 +16,7 @@ from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
+from aerodaas.types.health import Verdict
 from aerodaas.types.identifiers import ScopedWord, Word
 
 __all__ = [
@@ -128,6 +129,8 @@ class StreamKind(str, enum.Enum):
 
     PICTURES = "pictures"
     DETECTIONS = "detections"
+    NAVIGATION = "navigation"
+    """Commands, of which the target of one that follows something is drawn."""
 
 
 class PictureForm(str, enum.Enum):
@@ -198,6 +201,9 @@ class RobotOut(AnswerModel):
     """What the vehicle complains of."""
     objection: str = ""
     """Why it can be neither leased nor flown now; empty if it can, or is in flight."""
+    preflight: Verdict | None = None
+    """The gravest of the list before take-off; None in flight, and while nobody is
+    connected."""
 
 
 class FleetOut(AnswerModel):

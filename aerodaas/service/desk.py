@@ -490,7 +490,7 @@ class MissionDesk:
         # After a restart: a flight whose order was written may not have begun.
         one.take_off()
         link = one.follow()
-        self._garage.note(link.news.status)
+        self._garage.note(link.news.status, link.news.preflight)
         if one.attached_to is not None:
             self._attachments.watch(one)
         try:

@@ -7,7 +7,7 @@ from typing import Any
 
 from aerodaas.config.actuators import permitted
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.protocol.schemas import FleetOut, RobotOut
+from aerodaas.protocol.schemas import FleetOut, LinkState, RobotOut
 from aerodaas.service.access import Principal, sees
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
@@ -59,7 +59,7 @@ class FleetView:
 
     def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
         lease = self._bookings.holder(robot.id)
-        news = self._garage.news(robot.id)
+        news, ready = self._garage.news(robot.id), self._garage.preflight(robot.id)
         flying, shared = self._desk.shared(robot.id, principal.tenant)
         mine = lease is not None and sees(principal, lease.tenant)
         # Only of a lease that this account sees.
@@ -81,4 +81,5 @@ class FleetView:
             mode=news.mode or None,
             faults=list(news.faults),
             objection="" if flying is not None else self._garage.objection(robot.id),
+            preflight=ready.verdict if news.link is LinkState.CONNECTED else None,
         )

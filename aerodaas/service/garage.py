@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.monitor.news import VehicleNews
@@ -62,13 +63,28 @@ class Garage:
         with self._lock:
             return self._news[robot]
 
-    def note(self, status: Mapping[str, StatusOut], *, ended: float | None = None) -> None:
+    def preflight(self, robot: str) -> PreflightOut:
+        """The list before take-off of a robot; raises RefusedError if there is none such."""
+        if robot not in self._news:
+            raise RefusedError(404, f"there is no robot {robot}")
+        news = self.news(robot)
+        age = None if news.examined is None else max(0.0, time.time() - news.examined)
+        return PreflightOut.of(robot, news.health, age)
+
+    def note(
+        self,
+        status: Mapping[str, StatusOut],
+        preflight: Mapping[str, PreflightOut] | None = None,
+        *,
+        ended: float | None = None,
+    ) -> None:
         """Take over what a mission tells of its drones.
 
         The same status again is no news: who told it may hang, and with it what keeps the drone.
 
         Args:
             status: Newest status by robot.
+            preflight: The list before take-off by robot.
             ended: Unix seconds of the end of its flight, of which this is the last status, to be
                 written down at once; None while it goes on.
         """
@@ -83,6 +99,7 @@ class Garage:
             lost = silent or one.mode == VehicleMode.LOST.value
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.news(name)
+            health = (preflight or {}).get(name, PreflightOut(robot=name))
             faults = (f"its mission has told nothing since {_moment(told)}",)
             news = VehicleNews(
                 link=link,
@@ -92,6 +109,8 @@ class Garage:
                 position=_known(one.position),
                 mode=one.mode or "",
                 faults=faults if silent else tuple(one.faults),
+                health=tuple(health.items),
+                examined=None if health.age is None else told - health.age,
             )
             least = _WRITE_SECONDS if ended is None else 0.0
             self._take(name, news, heard=news.heard, least=least)

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from aerodaas.types.vehicle import Vehicle
 
-__all__ = ["OWN_CHECKS", "HealthItem", "HealthReadings", "MeasuredVehicle", "Verdict"]
+__all__ = [
+    "OWN_CHECKS",
+    "HealthItem",
+    "HealthReadings",
+    "HealthReport",
+    "MeasuredVehicle",
+    "Verdict",
+    "gravest",
+]
 
 OWN_CHECKS = "vehicle"
 """Name of the item of the vehicle's own objections (`Vehicle.preflight`)."""
@@ -89,3 +98,19 @@ class HealthItem:
             return self.value
         should = f", should be {self.bound}" if self.bound else ""
         return f"{self.name}: {self.value}{should}"
+
+
+@dataclass(frozen=True, slots=True)
+class HealthReport:
+    """The whole list, and when it was gone through."""
+
+    stamp: int
+    """Mission clock, nanoseconds."""
+    items: tuple[HealthItem, ...]
+
+
+def gravest(items: Iterable[HealthItem]) -> Verdict:
+    """What the items mean together: `REFUSED`, `WARNING`, or else `GOOD`."""
+    found = {one.verdict for one in items}
+    grave = (one for one in (Verdict.REFUSED, Verdict.WARNING) if one in found)
+    return next(grave, Verdict.GOOD)

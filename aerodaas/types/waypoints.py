@@ -14,6 +14,7 @@ from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
 from aerodaas.types.payload import GimbalTarget
 from aerodaas.types.records import fast_pickle, shared_pickle
+from aerodaas.types.target import FollowedTarget
 
 __all__ = [
     "DEFAULT_PRIORITY",
@@ -370,6 +371,8 @@ class VelocityCommand:
     evasive: bool = False
     """Whether it gives way to a person: it takes effect at once, without a ramp of the setpoints.
     All boundaries hold."""
+    target: FollowedTarget | None = None
+    """What it follows; for people who look on, not for the drone."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that are not finite and a validity that is not positive."""

@@ -10,10 +10,11 @@ import { FlightMap } from "./map";
 import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
 import { type LeasedArea, type Place, type Point, areasOf, placeOf } from "./place";
 import { Playback } from "./playback";
+import { Garage, PreflightPanel } from "./preflight";
 import { Recorded } from "./recorded";
 import { LiveSource } from "./source";
 import { Timeline, momentOfLink } from "./timeline";
-import type { AccountOut, FleetOut, MissionOut, RecordedOut } from "./wire";
+import type { AccountOut, FleetOut, MissionOut, RecordedOut, RobotOut } from "./wire";
 import { Video } from "./video";
 import { HandPanel } from "./hand_panel";
 import { useFlight } from "./use_flight";
@@ -21,10 +22,14 @@ import { Plan } from "./plan";
 import { SurveyPanel, useSurvey } from "./survey";
 import "./console.css";
 import "./piloting.css";
+import "./preflight.css";
 
 const THEMES = ["auto", "light", "dark"] as const;
 type Theme = (typeof THEMES)[number];
 const LOOK = 2000;
+/** Tenant of a flight of one's own. */
+const OWN = "own";
+const GROUND = new Set(["idle", "preflight", "landed", "aborted"]);
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 interface Known {
@@ -37,7 +42,8 @@ function App() {
   const [token, setToken] = useState(takeToken);
   const [known, setKnown] = useState<Known | null>(null);
   const [missions, setMissions] = useState<MissionOut[]>([]);
-  const [areas, setAreas] = useState<LeasedArea[]>([]);
+  const [robots, setRobots] = useState<RobotOut[]>([]);
+  const areas = useMemo(() => areasOf(robots), [robots]);
   const [chosen, setChosen] = useState<string | null>(() => readFragment("mission"));
   /** The mission that was seen flying: its end is shown before its recording. */
   const [seen, setSeen] = useState<string | null>(null);
@@ -60,7 +66,7 @@ function App() {
         if (gone) return;
         setKnown((before) => before ?? { account, place: placeOf(fleet), name: fleet.name });
         setMissions(all);
-        setAreas(areasOf(fleet.robots));
+        setRobots(fleet.robots);
         setProblem("");
       } catch (error) {
         if (gone) return;
@@ -93,6 +99,7 @@ function App() {
   }, [mission?.id, mission?.phase, seen]);
   const choose = (id: string) => {
     setSeen(null);
+    // An empty one is none: the fleet is shown, whatever flies.
     setChosen(id);
     setBeside(null);
     writeFragment({ mission: id, t: null, beside: null });
@@ -151,6 +158,7 @@ function App() {
       <h1>AeroDaaS console</h1>
       {problem && <p class="banner bad">{problem}</p>}
       {known ? <Missions missions={missions} onMission={choose} /> : <p>connecting…</p>}
+      {known && <Garage robots={robots} token={token} />}
       {themes}
     </main>
   );
@@ -239,17 +247,21 @@ function Console(props: ConsoleProps) {
   const may = !recorded && known.account.role !== "viewer" && known.account.scopes.includes("fly");
   const sees = known.account.scopes.includes("sense");
   const fence = place.fences.find((one) => one.robot === robot);
+  /** Whether this is a provider's page, with a fleet and other missions than one's own. */
+  const provided = first.tenant !== OWN;
+  const grounded = GROUND.has(flight.status(robot)?.state ?? "idle");
   const others = missions.filter((one) => one.recording && one.id !== first.id);
   return (
     <div class={`page ${recorded ? "played" : ""}`}>
       <header class="top">
         <h1>AeroDaaS</h1>
-        {missions.length > 1 ? (
+        {missions.length > 1 || provided ? (
           <select
             aria-label="Mission"
             value={first.id}
             onChange={(event) => onMission(event.currentTarget.value)}
           >
+            {provided && <option value="">the fleet</option>}
             {missions.map((one) => (
               <option key={one.id} value={one.id}>
                 {one.name} · {one.phase.replaceAll("_", " ")}
@@ -345,6 +357,9 @@ function Console(props: ConsoleProps) {
         )}
         {sees && <Video flight={flight} />}
         <StatePanel flight={flight} robot={robot} />
+        {!recorded && (
+          <PreflightPanel robot={robot} token={token} live={!flight.over} open={grounded} />
+        )}
         {!recorded && <Commands flight={flight} robot={robot} mayFly={may} />}
         <Plan key={`plan ${robot}`} flight={flight} robot={robot} mayFly={may} />
         {!recorded && (

@@ -4,6 +4,7 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Flight, aheadOf } from "./flight";
 import type { LeasedArea, Place, Point } from "./place";
 import { type Drawn, SurveyLayer } from "./survey_map";
+import { TrafficLayer, heightOf, headingOf, trafficOf } from "./traffic";
 import type { StatusOut } from "./wire";
 import "./map.css";
 
@@ -70,6 +71,9 @@ export function FlightMap(props: MapProps) {
     setFollow(false);
     setView({ ...shown, east: shown.east - dx / shown.scale, north: shown.north + dy / shown.scale });
   };
+
+  const own = props.flight.status(props.robot)?.position?.[2] ?? null;
+  const traffic = trafficOf(props.flight.mission.status, props.robot);
 
   const keys: Record<string, () => void> = {
     "+": () => zoom(ZOOM),
@@ -171,6 +175,7 @@ export function FlightMap(props: MapProps) {
               </g>
             );
           })}
+          <TrafficLayer traffic={traffic} own={own} stale={props.flight.stale} x={x} y={y} />
           {drawing && (
             <SurveyLayer drawn={drawing} x={x} y={y} line={line} metres={metres} box={box} />
           )}
@@ -235,6 +240,17 @@ export function FlightMap(props: MapProps) {
         <li class="coming">coming</li>
         <li class="fenced">fence</li>
         <li class="forbidden">no-fly</li>
+        {traffic.length > 0 && (
+          <li class="aircraft">
+            aircraft
+            <span class="unseen">
+              :{" "}
+              {traffic
+                .map((one) => `${one.callsign} ${heightOf(one, own)}, ${headingOf(one)}`)
+                .join("; ")}
+            </span>
+          </li>
+        )}
         {props.areas.length > 0 && (
           <li class="leased">
             lease<span class="unseen">: {props.areas.map((one) => one.title).join("; ")}</span>

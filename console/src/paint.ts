@@ -1,6 +1,6 @@
 // What was found in a picture, drawn on it: depth, boxes, labels and the skeletons of bodies.
 
-import type { Detection, Picture } from "./pictures";
+import type { Detection, Picture, Target } from "./pictures";
 
 const COLOURS = ["#ffb000", "#00c2a8", "#ff5d8f", "#6aa8ff", "#c6e03a", "#d58bff"];
 const SHADOW = "#10151c";
@@ -40,8 +40,57 @@ export function paint(canvas: HTMLCanvasElement, picture: Picture): Painted {
   // Labels lie over all bodies.
   for (const one of all) painted.points += drawBody(pen, one, width);
   for (const one of all) drawBox(pen, one, width);
+  if (picture.target?.box) drawTarget(pen, picture.target, picture.target.box, width, height);
   painted.boxes = all.length;
   return painted;
+}
+
+const MARKS: Record<Target["state"], string> = {
+  sure: "followed",
+  likely: "followed?",
+  uncertain: "",
+  unseen: "",
+};
+
+/** Draw corners around what is followed, dashed where that is not sure, and the word below it. */
+function drawTarget(
+  pen: CanvasRenderingContext2D,
+  { state }: Target,
+  box: Detection["box"],
+  width: number,
+  height: number,
+): void {
+  const thick = Math.max(3, width / 200);
+  const gap = 1.5 * thick;
+  const [left, right] = [Math.max(thick, box[0] - gap), Math.min(width - thick, box[2] + gap)];
+  const [top, bottom] = [Math.max(thick, box[1] - gap), Math.min(height - thick, box[3] + gap)];
+  const arm = Math.max(3 * thick, 0.25 * Math.min(right - left, bottom - top));
+  const corners = new Path2D();
+  for (const [x, inwards] of [[left, arm], [right, -arm]] as const) {
+    for (const [y, down] of [[top, arm], [bottom, -arm]] as const) {
+      corners.moveTo(x + inwards, y);
+      corners.lineTo(x, y);
+      corners.lineTo(x, y + down);
+    }
+  }
+  pen.save();
+  for (const [colour, wide] of [[SHADOW, 2 * thick], ["#ffffff", thick]] as const) {
+    pen.strokeStyle = colour;
+    pen.lineWidth = wide;
+    if (state === "likely") pen.setLineDash([1.2 * thick, 1.2 * thick]);
+    pen.stroke(corners);
+  }
+  pen.restore();
+  const size = Math.max(11, Math.round(width / 45));
+  pen.font = `700 ${size}px system-ui, sans-serif`;
+  const text = `◎ ${MARKS[state]}`;
+  const wide = pen.measureText(text).width + 8;
+  const below = Math.min(bottom + 1.5 * thick, height - size - 6);
+  const from = Math.max(0, Math.min((left + right - wide) / 2, width - wide));
+  pen.fillStyle = SHADOW;
+  pen.fillRect(from, below, wide, size + 6);
+  pen.fillStyle = "#ffffff";
+  pen.fillText(text, from + 4, below + size + 1);
 }
 
 function colourOf(one: Detection): string {

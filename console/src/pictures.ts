@@ -19,6 +19,13 @@ export interface Detection {
   points: [number, number, number][];
 }
 
+/** What a drone follows, of the frame that its command was made from. */
+export interface Target {
+  state: "sure" | "likely" | "uncertain" | "unseen";
+  /** Left, top, right, bottom; null where it is not known. */
+  box: Detection["box"] | null;
+}
+
 export interface Picture {
   bitmap: ImageBitmap;
   source: string;
@@ -26,6 +33,7 @@ export interface Picture {
   captured: number;
   camera: string;
   found: Map<string, Detection[]>;
+  target: Target | undefined;
   /** Whether the camera measured depth with it. */
   measured: boolean;
   depth: Depth | undefined;
@@ -39,6 +47,7 @@ interface Header {
 /** What came before its picture. */
 interface Early {
   found: Map<string, Detection[]>;
+  target: Target | undefined;
   depth: Depth | undefined;
 }
 
@@ -107,10 +116,10 @@ export class Pictures {
         : await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
     if (!bitmap) return;
     // The same frame comes again where a recording's moments share it.
-    const { found, depth } = this.of(header);
+    const { found, target, depth } = this.of(header);
     this.early.delete(nameOf(header));
     this.kept.push({
-      ...{ bitmap, found, depth, source: header.source, stamp: header.stamp },
+      ...{ bitmap, found, target, depth, source: header.source, stamp: header.stamp },
       measured: item.depth === true,
       captured: message["captured"] as number,
       camera: message["stream"] as string,
@@ -120,7 +129,17 @@ export class Pictures {
     while (this.kept.length > this.most) this.kept.shift()?.bitmap.close();
   }
 
-  detections(message: Record<string, unknown>): void {
+  /** Take what was found, or what is followed, in a picture. */
+  found(message: Record<string, unknown>): void {
+    const item = message["item"] as { is?: string; header?: unknown } & Target;
+    if (item.is !== "Target") this.detections(message);
+    else {
+      const { state, box } = item;
+      this.of(fields<Header>(item.header)).target = { state, box };
+    }
+  }
+
+  private detections(message: Record<string, unknown>): void {
     const item = fields<{ header: unknown; items: unknown }>(message["item"]);
     const found = list(item.items).map((one) => {
       const { box, label, score, track_id, keypoints } = fields<
@@ -139,7 +158,8 @@ export class Pictures {
   newest(camera: string): Picture | undefined {
     const own = this.kept.filter((one) => one.camera === camera);
     const last = own[own.length - 1];
-    const known = ({ found, depth }: Picture) => found.size + (this.deep && depth ? 1 : 0);
+    const known = ({ found, target, depth }: Picture) =>
+      found.size + (target ? 1 : 0) + (this.deep && depth ? 1 : 0);
     const analysed = own.filter((one) => known(one) > 0);
     const newest = analysed[analysed.length - 1];
     let best = newest && last && last.stamp - newest.stamp < BEHIND ? newest : last;
@@ -156,7 +176,7 @@ export class Pictures {
     const key = nameOf(header);
     const picture = this.kept.find((one) => nameOf(one) === key);
     if (picture) return picture;
-    const waiting = this.early.get(key) ?? { found: new Map(), depth: undefined };
+    const waiting = this.early.get(key) ?? { found: new Map(), target: undefined, depth: undefined };
     this.early.set(key, waiting);
     for (const old of [...this.early.keys()].slice(0, -KEPT)) this.early.delete(old);
     return waiting;

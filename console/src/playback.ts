@@ -4,7 +4,7 @@ import { answered } from "./connection";
 import { type Alert, type Sample, shifted, speedOf } from "./flight";
 import type { Point } from "./place";
 import type { FlightEars, ItemEars, Past, Source, Wanted } from "./source";
-import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut } from "./wire";
+import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
 
 /** Milliseconds between two moments shown while it plays, and between two pictures asked for. */
 const STEP = 50;
@@ -12,6 +12,8 @@ const TRAIL = 3000;
 const LONGEST_STEP = 0.25;
 const NEWLINE = 10;
 const MOST_ALERTS = 100;
+/** Seconds after which another aircraft is forgotten, as a vehicle forgets it. */
+const FORGOTTEN = 10;
 
 /** Place of the last of some times at or before `time`; -1 for none. */
 export function lastBefore<T>(items: readonly T[], time: number, of: (item: T) => number): number {
@@ -238,6 +240,20 @@ class Track {
     return this.way.slice(0, until + 1).map((one) => one.point);
   }
 
+  /** Other aircraft at a time: where the last word put them, and on from there. */
+  private heard(time: number): TrafficOut[] {
+    const last = this.track.traffic[lastBefore(this.track.traffic, time, (one) => one.since)];
+    const later = time - (last?.since ?? 0);
+    // Where the recording has no states any more, nothing is heard either.
+    return (last?.aircraft ?? [])
+      .map(({ position: [east, north, up], velocity, age, ...one }): TrafficOut => {
+        const [ve, vn, vu] = velocity;
+        const high = up === null ? null : up + later * vu;
+        return { ...one, velocity, position: [east + later * ve, north + later * vn, high], age: age + later };
+      })
+      .filter((one) => one.age <= FORGOTTEN);
+  }
+
   at(time: number): StatusOut | undefined {
     const { statuses, places } = this.track;
     const status = statuses[lastBefore(statuses, time, (one) => one.time)];
@@ -258,6 +274,7 @@ class Track {
       satellites: this.track.gps[row]?.satellites ?? null,
       position_sigma: this.track.gps[row]?.position_sigma ?? null,
       places: Object.fromEntries(known),
+      traffic: this.heard(time),
     };
   }
 }

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { drawScale } from "./depth";
 import type { ClockOffset, Flight } from "./flight";
 import { type Painted, paint } from "./paint";
-import { KEPT, Pictures } from "./pictures";
+import { KEPT, Pictures, type Target } from "./pictures";
 
 const STALE = 1500;
 
@@ -13,9 +13,18 @@ interface Seen extends Painted {
   stamp: number;
   captured: number;
   measured: boolean;
+  target: Target["state"] | null;
   /** Metres at which the depth's colours end, where it is shown. */
   range: number | null;
 }
+
+/** What is said of the target in the picture that is shown. */
+const TARGETS: Record<Target["state"], { text: string; tone: string }> = {
+  sure: { text: "◎ follows", tone: "good" },
+  likely: { text: "◎ follows the likelier one", tone: "warn" },
+  uncertain: { text: "target uncertain: holds", tone: "warn" },
+  unseen: { text: "target not in sight", tone: "warn" },
+};
 
 export function Video({ flight }: { flight: Flight }) {
   const streams = flight.mission.streams;
@@ -26,7 +35,7 @@ export function Video({ flight }: { flight: Flight }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const [seen, setSeen] = useState<Seen | null>(null);
   const [deep, setDeep] = useState(false);
-  const finders = names.filter((name) => streams[name] === "detections").join(",");
+  const finders = names.filter((name) => streams[name] !== "pictures").join(",");
 
   useEffect(() => {
     if (!camera) return;
@@ -39,7 +48,8 @@ export function Video({ flight }: { flight: Flight }) {
       if (!picture || !canvas.current) return;
       const { stamp, captured, measured } = picture;
       const range = picture.depth?.range ?? null;
-      setSeen({ stamp, captured, measured, range, ...paint(canvas.current, picture) });
+      const target = picture.target?.state ?? null;
+      setSeen({ stamp, captured, measured, target, range, ...paint(canvas.current, picture) });
     };
     const later = () => {
       if (!asked) requestAnimationFrame(draw);
@@ -48,7 +58,7 @@ export function Video({ flight }: { flight: Flight }) {
     const wanted = { camera, finders: finders.split(","), depth: deep };
     const leave = flight.source.watch(wanted, {
       found: (message) => {
-        pictures.detections(message);
+        pictures.found(message);
         later();
       },
       picture: (message, data) => pictures.take(message, data).then(later),
@@ -86,6 +96,10 @@ export function Video({ flight }: { flight: Flight }) {
             Depth
           </button>
         )}
+        {/* Always there: what comes into it is read out. */}
+        <span role="status" data-testid="target">
+          {seen?.target && <span class={`badge ${TARGETS[seen.target].tone}`}>{TARGETS[seen.target].text}</span>}
+        </span>
         {seen && !flight.recorded && <Age clock={flight.clock} captured={seen.captured} over={flight.over} />}
       </header>
       <div class="screen">

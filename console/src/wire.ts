@@ -13,6 +13,10 @@ export type Scope = "fly" | "sense" | "compute";
  */
 export type LinkState = "unwatched" | "connecting" | "connected" | "mission" | "lost";
 /**
+ * What an item means for a take-off.
+ */
+export type Verdict = "good" | "warning" | "refused" | "unknown";
+/**
  * State of a submitted mission at the service; its drones have states of their own.
  */
 export type MissionPhase =
@@ -28,7 +32,7 @@ export type MissionPhase =
 /**
  * What a page can draw of a stream.
  */
-export type StreamKind = "pictures" | "detections";
+export type StreamKind = "pictures" | "detections" | "navigation";
 
 export interface Wire {
   AccountOut: AccountOut;
@@ -39,6 +43,7 @@ export interface Wire {
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
   PlaybackOut: PlaybackOut;
+  PreflightOut: PreflightOut;
   RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
   SteerIn: SteerIn;
@@ -107,6 +112,7 @@ export interface RobotOut {
   mode: string | null;
   objection: string;
   position: [number, number, number] | null;
+  preflight: Verdict | null;
   sensors: string[];
   shared: string[];
   since: number | null;
@@ -186,6 +192,7 @@ export interface StatusOut {
   state: string;
   target: string | null;
   time: number;
+  traffic: TrafficOut[];
   velocity: (number | null)[] | null;
   visited: string[];
   waypoints_known: number;
@@ -199,6 +206,24 @@ export interface OutlookOut {
   hover: number;
   plan: number;
   returns_at: number;
+}
+/**
+ * Another aircraft that the vehicle hears of, where it is at the moment of its state.
+ */
+export interface TrafficOut {
+  address: number;
+  age: number;
+  callsign: string;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  position: [number, number, number | null];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  velocity: [number, number, number];
 }
 /**
  * Result of the rehearsal in simulation.
@@ -302,6 +327,7 @@ export interface TrackOut {
   position: [number | null, number | null, number | null][];
   statuses: StatusOut[];
   time: number[];
+  traffic: HeardOut[];
   velocity: [number | null, number | null, number | null][];
   yaw: (number | null)[];
 }
@@ -323,6 +349,32 @@ export interface PlaceOut {
    */
   place: [number, number, number];
   since: number;
+}
+/**
+ * The other aircraft that a robot heard of from a time on.
+ */
+export interface HeardOut {
+  aircraft: TrafficOut[];
+  since: number;
+}
+/**
+ * The list before take-off of one robot, as it was when it was gone through last.
+ */
+export interface PreflightOut {
+  age: number | null;
+  items: HealthItem[];
+  robot: string;
+  verdict: Verdict | null;
+}
+/**
+ * One item of the list before take-off.
+ */
+export interface HealthItem {
+  bound: string;
+  name: string;
+  remedy: string;
+  value: string;
+  verdict: Verdict;
 }
 /**
  * Change of the coming waypoints of one robot: one command, carried out whole.

@@ -19,6 +19,7 @@ from aerodaas.analytics.follow.followers import (
     PersonFollowAnalytics,
     VipFollowAnalytics,
 )
+from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.following.relative_target import sight
@@ -26,6 +27,8 @@ from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.geometry import CameraModel
+from aerodaas.types.target import FollowedTarget, TargetState
+from aerodaas.types.waypoints import VelocityCommand
 
 
 def circle(speed: float, radius: float = 6.0) -> Path:
@@ -547,3 +550,37 @@ def test_a_car_whose_box_flickers_does_not_fall() -> None:
     distances = world.run(CarFollowAnalytics(), 60)
     assert world.alerts == []
     assert np.abs(np.array(distances[-450:]) - 6.0).max() < 1.0
+
+
+def test_each_command_names_the_box_that_it_was_made_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the pixels of its own frame; none in a frame without it, nor where nobody is known."""
+    follow = VipFollowAnalytics()
+    world = vest_world(lambda _: (3.0, 0.0), 10.0)
+    random = np.random.default_rng(0)
+
+    def told(*, seen: bool = True) -> tuple[FollowedTarget | None, Detections]:
+        found = world.look(random)
+        found = found if seen else replace(found, items=())
+        result = follow.process(found, world.snapshot())
+        command = result.commands[0] if result is not None else None
+        world.commands.append(command)
+        world.fly(VelocityCommand())
+        return None if command is None else command.target, found
+
+    for _ in range(20):
+        target, found = told()
+    assert target is not None
+    assert (target.state, target.track_id) == (TargetState.SURE, follow.target)
+    assert target.box == pytest.approx(found[0].box)
+    identity = follow._identity
+    monkeypatch.setattr(TargetIdentity, "watch", lambda *_: None)
+    monkeypatch.setattr(TargetIdentity, "compare", lambda *_: {})
+    monkeypatch.setattr(TargetIdentity, "doubt", lambda *_: False)
+    identity.certainty = Certainty.CONTESTED
+    target, found = told()
+    assert target is not None
+    assert target.state is TargetState.LIKELY
+    assert target.box == pytest.approx(found[0].box)
+    assert told(seen=False)[0] == FollowedTarget(TargetState.UNSEEN)
+    identity.certainty = Certainty.UNCERTAIN
+    assert told()[0] == FollowedTarget(TargetState.UNCERTAIN)

@@ -66,9 +66,9 @@ def aerodaas(
 
 
 def test_the_fleet_is_a_table_or_json(aerodaas: Command) -> None:
-    """Free or leased, charge, sensors."""
+    """Free or leased, charge, whether it would take off, sensors."""
     shown = aerodaas("fleet").out
-    assert all(word in shown for word in ("campus", "drone", "free", "75%", "odom"))
+    assert all(word in shown for word in ("campus", "drone", "free", "75%", "refused", "odom"))
     assert json.loads(aerodaas("fleet", "--json").out)["robots"][0]["battery"] == 0.75
 
 

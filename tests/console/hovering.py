@@ -15,7 +15,9 @@ from aerodaas.dataflow.graph import Graph
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.types.data import Alert, Battery, GpsFix, Odometry
 from aerodaas.types.errors import MissionError
+from aerodaas.types.health import HealthReport
 from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -39,6 +41,8 @@ class Run:
         self.commands: list[Command] = []
         self.notes: list[str] = []
         self.alerts: list[Alert] = []
+        self.health: HealthReport | None = None
+        self.traffic: tuple[Traffic, ...] = ()
 
     def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """Enroute to a waypoint."""
@@ -47,12 +51,20 @@ class Run:
         still = np.zeros(3)
         odometry = Odometry(np.array([1.0, 2.0, 3.0]), still, 0.0)
         fix = GpsFix(50.0, 8.0, 120.0, horizontal_sigma=1.24, satellites=14)
-        vehicle = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True, gps=fix)
+        vehicle = VehicleState(
+            1,
+            odometry,
+            Battery(0.5),
+            VehicleMode.GUIDED,
+            armed=True,
+            gps=fix,
+            traffic=self.traffic,
+        )
         outlook = BatteryOutlook(plan=0.61, returns_at=0.27, hover=207.0)
         status = MissionStatus(
             10**9, MissionState.ENROUTE, "flying to wp1", target, outlook=outlook
         )
-        robots = {"drone": SimpleNamespace(status=status, state=vehicle)}
+        robots = {"drone": SimpleNamespace(status=status, state=vehicle, health=self.health)}
         return SimpleNamespace(robots=robots, alerts=list(self.alerts), reports={})
 
     def command(self, robot: str, command: Command) -> Answer:

@@ -13,12 +13,15 @@ import pytest
 from hovering import console
 
 from aerodaas.console.server import ConsoleServer
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Detection, Detections, Frame, Header
 from aerodaas.types.status import Message
+from aerodaas.types.target import FollowedTarget, TargetState
+from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
-__all__ = ["SHOWN", "camera_console", "require_own_frames"]
+__all__ = ["SHOWN", "Reader", "camera_console", "require_own_frames"]
 
-CAMERA, FINDER = "drone/cam", "drone/pose"
+CAMERA, FINDER, FOLLOWER = "drone/cam", "drone/pose", "drone/follow"
 RATE = 10
 WIDTH, HEIGHT = 320, 180
 TURN = 20
@@ -44,6 +47,9 @@ SHOWN = """new Promise(done => {
 class Reader:
     """Items of the clock's numbers: a frame each tenth of a second, a body found in each."""
 
+    targets: TargetState | None = None
+    """How sure the follower is of the body, of every frame; None where there is no follower."""
+
     def __init__(self, stream: str) -> None:
         self._stream = stream
         self._last = 0
@@ -51,7 +57,7 @@ class Reader:
     def next_message(self, timeout: float) -> Message[Any]:
         """The next one that there is; a body is found a while after its frame."""
         del timeout
-        late = 0.06 if self._stream == FINDER else 0.0
+        late = {FINDER: 0.06, FOLLOWER: 0.09}.get(self._stream, 0.0)
         while (number := int((time.monotonic() - late) * RATE)) <= self._last:
             time.sleep(0.005)
         self._last = number
@@ -62,8 +68,18 @@ class Reader:
         depth[:, WIDTH // 2 :] = 0
         frame = Frame(header, image, depth=depth)
         found = Detections.of(frame, [body(20.0 + 10 * turn)])
-        item = found if self._stream == FINDER else frame
+        items: dict[str, Any] = {FINDER: found, FOLLOWER: followed(found[0], Reader.targets)}
+        item = items.get(self._stream, frame)
         return Message(self._stream, number, header.stamp, header, 0, (), item)
+
+
+def followed(one: Detection, state: TargetState | None) -> AeroNavigation:
+    """The command of a follower of this body, which is not seen where that has no box."""
+    seen = state in {TargetState.SURE, TargetState.LIKELY}
+    left, top, right, bottom = map(float, one.box)
+    box = (left, top, right, bottom) if seen else None
+    target = None if state is None else FollowedTarget(state, box)
+    return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(target=target)])
 
 
 def body(left: float) -> Detection:
@@ -79,7 +95,7 @@ def camera_console() -> Iterator[ConsoleServer]:
     """The console of this flight."""
     nodes = {
         name: SimpleNamespace(id=name, item=kind, dormant=False)
-        for name, kind in ((CAMERA, Frame), (FINDER, Detections))
+        for name, kind in ((CAMERA, Frame), (FINDER, Detections), (FOLLOWER, AeroNavigation))
     }
     with console() as (server, run):
         run.graph = SimpleNamespace(nodes=nodes, reader=Reader)  # type: ignore[assignment]

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 from required import needs_peer
-from scripted_camera import SHOWN, camera_console, require_own_frames
+from scripted_camera import SHOWN, Reader, camera_console, require_own_frames
 
+from aerodaas.types.target import TargetState
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
@@ -64,4 +65,45 @@ def test_bodies_and_depth_are_drawn_on_their_own_frame(
         assert max(unmeasured[:3]) - min(unmeasured[:3]) <= 6
         page.press(".video [aria-pressed]")
         page.until("document.querySelector('[data-testid=scale]') === null")
+        assert page.complaints() == []
+
+
+CORNERS = """new Promise(done => {
+  const screen = document.querySelector('[data-testid=video]');
+  const found = [];
+  new MutationObserver((_, watch) => {
+    const turn = Math.round(screen.dataset.stamp / 1e8) % 20;
+    const pen = screen.getContext('2d');
+    found.push([...pen.getImageData(20 + 10 * turn - 5, 28, 1, 1).data].slice(0, 3));
+    if (found.length < 12) return;
+    watch.disconnect();
+    done(found);
+  }).observe(screen, { attributeFilter: ['data-stamp'] });
+})"""
+"""Of a dozen pictures: a pixel outside the box of the very frame, where a corner's mark is."""
+
+
+def test_what_is_followed_is_told_apart_on_its_own_frame(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By corners around its box and a word; where no box is known, by the word alone."""
+    word = "document.querySelector('[data-testid=target]')"
+    with camera_console() as server:
+        page = opened(browser, server.address(), "jpeg", "")
+        assert page.run(f"{word}.getAttribute('role')") == "status"
+        assert page.run(f"{word}.innerText") == ""
+        assert not any(max(one) == 255 for one in page.run(CORNERS))
+        for state, said in (
+            (TargetState.SURE, "◎ follows"),
+            (TargetState.UNCERTAIN, "target uncertain: holds"),
+            (TargetState.LIKELY, "◎ follows the likelier one"),
+            (TargetState.UNSEEN, "target not in sight"),
+        ):
+            monkeypatch.setattr(Reader, "targets", state)
+            page.until(f"{word}.innerText === '{said}'")
+            marks = [min(one) > 230 for one in page.run(CORNERS)]
+            if state is TargetState.SURE:
+                assert all(marks)
+            elif state is not TargetState.LIKELY:
+                assert not any(marks[2:])
         assert page.complaints() == []

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -18,7 +20,9 @@ from websockets.typing import Subprotocol
 from aerodaas.console.access import bearer
 from aerodaas.console.server import ConsoleServer
 from aerodaas.mission.commands import AddNavigation, Pause
+from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.health import HealthItem, HealthReport, Verdict
 from aerodaas.types.waypoints import Waypoint
 
 HOVER = {"robot": "drone", "command": "pause"}
@@ -224,3 +228,22 @@ def test_an_address_in_use_is_named() -> None:
         taken = server.address().partition("//")[2].partition("/")[0]
         with pytest.raises(ConfigError, match="--console-address"):
             ConsoleServer(taken)
+
+
+def test_the_list_before_take_off_is_told_to_whoever_watches() -> None:
+    """With the gravest verdict, and its age by the mission's clock; of known robots alone."""
+    windy = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.WARNING, "wait")
+    with console() as (server, run):
+        watcher = server.address(viewer=True)
+        nothing: dict[str, Any] = {"robot": "drone", "verdict": None, "age": None, "items": []}
+        assert ask(watcher, "/v1/robots/drone/preflight")[2] == nothing
+        run.health = HealthReport(NANOSECONDS // 2, (windy,))
+        until = time.monotonic() + 20.0
+        while not (found := ask(watcher, "/v1/robots/drone/preflight")[2])["items"]:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        assert (found["verdict"], found["age"]) == ("warning", 0.5)
+        assert found["items"] == [{**asdict(windy), "verdict": "warning"}]
+        status, _, answer = ask(watcher, "/v1/robots/other/preflight")
+        assert (status, answer["text"]) == (404, "there is no robot other")
+        assert ask(watcher, "/v1/robots/drone/preflight", token="")[0] == 401

@@ -14,7 +14,10 @@ from hovering import console
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
+from aerodaas.types.health import HealthItem, HealthReport, Verdict
+from aerodaas.types.traffic import Traffic
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
@@ -178,6 +181,62 @@ def test_it_fits(browser: Browser, width: int, height: int) -> None:
         assert page.complaints() == []
         asked = browser.open(server.address().partition("#")[0])
         asked.until("document.querySelector('input[name=token]')")
+
+
+def test_what_refuses_a_take_off_stands_first(browser: Browser) -> None:
+    """Each item with a sign and a word beside its colour; what is old is shown so."""
+    good = HealthItem("gps", "12 satellites", "6 satellites", Verdict.GOOD)
+    bad = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.REFUSED, "wait for less wind")
+    with console() as (server, run):
+        page = browser.open(server.address())
+        until_state(page, "enroute")
+        page.until("document.querySelector('.preflight:not([open]) .empty')")
+        # In the air it is folded; whoever looks unfolds it.
+        page.run("document.querySelector('.preflight summary').click()")
+        run.health = HealthReport(NANOSECONDS // 2, (good, bad))
+        page.until("document.querySelectorAll('.preflight li').length === 2")
+        assert "refused: 1" in page.text("[data-testid=preflight]")
+        said = page.text(".preflight ul").split("\n")
+        assert said[:4] == [
+            "✕",
+            "wind 12.0 m/s, should be at most 10",
+            "wait for less wind",
+            "refuses",
+        ]
+        assert said[4:] == ["✓", "GPS 12 satellites", "ok"]
+        run.health = HealthReport(-60 * NANOSECONDS, (good,))
+        page.until("document.querySelector('.preflight ul.old')")
+        assert "s ago" in page.text(".preflight summary")
+        assert "ready" in page.text("[data-testid=preflight]")
+        assert page.complaints() == []
+
+
+def test_other_aircraft_are_on_the_map_until_they_are_gone(browser: Browser) -> None:
+    """With callsign, height above the drone and heading; dimmed when old, and read out."""
+    there = np.array([3.0, 5.0, 123.0])
+    east = np.array([20.0, 0.0, 0.0])
+    with console() as (server, run):
+        page = browser.open(server.address())
+        until_state(page, "enroute")
+        assert page.run("document.querySelector('[data-aircraft], .legend .aircraft')") is None
+        unknown = np.array([-2.0, 1.0, np.nan])
+        run.traffic = (
+            Traffic(1, "DLH4", there, east, 0.5),
+            Traffic(2, "0000B2", unknown, np.zeros(3), 6.0),
+        )
+        page.until("document.querySelectorAll('[data-aircraft]').length === 2")
+        assert page.run("document.querySelector('[data-aircraft=DLH4] text').textContent") == (
+            "DLH4 120 m above, 090°"
+        )
+        assert page.run("document.querySelector('.traffic.stale text').textContent") == (
+            "0000B2 height unknown, 6 s old"
+        )
+        assert page.run("document.querySelectorAll('.traffic.stale').length") == 1
+        said = page.run("document.querySelector('.legend .aircraft').textContent")
+        assert said == ("aircraft: DLH4 120 m above, 090°; 0000B2 height unknown, heading unknown")
+        run.traffic = ()
+        page.until("document.querySelector('[data-aircraft]') === null")
+        assert page.complaints() == []
 
 
 def test_battery_and_alerts_are_told_ahead(browser: Browser) -> None:

@@ -19,7 +19,7 @@ def flying_to(target: int, *pending: int) -> FlightState:
     """A state of one drone on its way to the waypoint `target`, as numbers name them."""
     ahead = [Waypoint(f"wp{one}", one, 2, 3, waypoint_type="local") for one in (target, *pending)]
     status = MissionStatus(10**9, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
-    robots = {"drone": SimpleNamespace(status=status, state=None)}
+    robots = {"drone": SimpleNamespace(status=status, state=None, health=None)}
     return cast("FlightState", SimpleNamespace(robots=robots, alerts=[], reports={}))
 
 

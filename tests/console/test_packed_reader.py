@@ -13,9 +13,12 @@ from av.video.frame import VideoFrame
 
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.console.packed_reader import PackedReader
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.data import Detection, Detections, Frame, Header
 from aerodaas.types.status import Message
+from aerodaas.types.target import FollowedTarget, TargetState
+from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
 SOURCE = "drone/cam"
 SECOND = 10**9
@@ -104,3 +107,39 @@ def test_depth_is_sent_alone_and_only_where_it_was_measured() -> None:
     assert message["item"]["header"]["of"]["stamp"] == 5
     assert message["item"]["range"] == 3.0
     assert message["item"]["bytes"] == [len(blob)]
+
+
+def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands() -> None:
+    """With the header of the frame that the command was made from; programs get the command."""
+    made = Header(7, 5, SOURCE)
+    target = FollowedTarget(TargetState.SURE, (1.0, 2.0, 3.0, 4.0), 9)
+    commands = [
+        AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(0.2, target=one)])
+        for one in (None, target)
+    ]
+
+    class Commands:
+        """As they come."""
+
+        def __init__(self) -> None:
+            self._left = iter(commands)
+
+        def next_message(self, timeout: float) -> Message[Any]:
+            """The next one."""
+            del timeout
+            return Message("follower", 1, 6, made, 0, (), next(self._left))
+
+    for form in (PictureForm.JPEG, PictureForm.H264):
+        reader = PackedReader(Commands(), "follower", form)
+        assert reader.next_packed(0.1) is None
+        found = reader.next_packed(0.1)
+        assert found is not None
+        item = found[0]["item"]
+        assert item["header"]["of"] == {"id": 7, "stamp": 5, "source": SOURCE}
+        assert (item["is"], item["state"], item["box"]) == ("Target", "sure", [1.0, 2.0, 3.0, 4.0])
+    reader = PackedReader(Commands(), "follower", PictureForm.WHOLE)
+    whole = [reader.next_packed(0.1) for _ in commands]
+    assert [unpack(one[0]["item"], one[1]).commands[0] for one in whole if one] == [
+        one.commands[0] for one in commands
+    ]
+    assert PackedReader(Commands(), "follower", PictureForm.DEPTH).next_packed(0.1) is None

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.provenance import Provenance
@@ -22,11 +23,14 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.types.data import Detection, Detections, Frame, Header
 from aerodaas.types.status import Message
+from aerodaas.types.target import FollowedTarget, TargetState
+from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
 COUNT = 200
 SOURCE = "tello/camera"
 STREAM = "tello/camera"
 FOUND = "tello/detector"
+FOLLOWER = "tello/follower"
 RNG = np.random.default_rng(3)
 CAPTURED = np.cumsum(RNG.integers(1, 60, COUNT)) * 1_000_000
 """Captured at uneven times; each is published 5 to 250 ms later, so not always in order."""
@@ -50,6 +54,14 @@ def entries(*, ordered: bool) -> Iterator[Message[Any]]:
             found = Detections.of(frame, [Detection((number, 1.0, number + 2, 4.0), "sheep", 0.9)])
             later = int(published[number]) + 30_000_000
             yield Message(FOUND, number, later, Header(number, later, FOUND), 0, (), found)
+        if number % 4 == 0:
+            box = (number, 1.0, number + 2, 4.0)
+            target = FollowedTarget(TargetState.LIKELY, box, 7)
+            command = AeroNavigation(
+                NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(0.1, target=target)]
+            )
+            later = int(published[number]) + 40_000_000
+            yield Message(FOLLOWER, number, later, header, 0, (), command)
 
 
 def record(path: Path, images: str) -> Path:
@@ -89,15 +101,22 @@ def test_any_time_gives_the_last_picture_captured(film: Film, times: list[int]) 
         if number < 0:
             assert items == []
             continue
-        *found, (message, data) = items
+        *more, (message, data) = items
+        found = [one for one in more if one[0]["stream"] == FOUND]
+        followed = [one["item"] for one, _ in more if one["stream"] == FOLLOWER]
+        assert len(found) + len(followed) == len(more)
         assert message["captured"] == CAPTURED[number]
         assert message["item"]["bytes"] == [len(data)]
         assert not message["item"]["depth"]
         assert abs(shown(data) - number) <= 1
         boxes = [one["item"]["of"]["items"] for one, _ in found]
         assert len(boxes) == (number % 3 == 0)
+        assert len(followed) == (number % 4 == 0)
+        for target in followed:
+            assert target["header"]["of"]["stamp"] == CAPTURED[number]
+            assert (target["is"], target["state"]) == ("Target", "likely")
+            assert target["box"] == [number, 1.0, number + 2, 4.0]
         for one, _ in found:
-            assert one["stream"] == FOUND
             assert one["item"]["of"]["header"]["of"]["stamp"] == CAPTURED[number]
 
 

@@ -108,7 +108,11 @@ def test_what_it_was_flown_in_and_what_happened(path: Path) -> None:
     assert [(one.kind, one.text) for one in flight.alerts] == [
         ("battery_low", "the battery is at 20 %")
     ]
-    assert flight.streams == {"tello/camera": "pictures", "tello/detector": "detections"}
+    assert flight.streams == {
+        "tello/camera": "pictures",
+        "tello/detector": "detections",
+        "tello/follow": "navigation",
+    }
 
 
 def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path) -> None:

@@ -13,8 +13,11 @@ import pytest
 from desks import PILOT, Provider
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service import garage as garages
+from aerodaas.service.errors import RefusedError
+from aerodaas.types.health import HealthItem, Verdict
 
 T0 = 1_800_000_000.0
 """Unix seconds."""
@@ -147,3 +150,42 @@ def test_a_leases_area_is_shown_to_who_sees_the_lease(provider: Provider) -> Non
         assert robots["one"].area == shown
         assert robots["one"].lease is not None
         assert robots["two"].area is None
+
+
+WINDY = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.REFUSED, "wait for less wind")
+
+
+def test_the_list_before_take_off_is_told_with_its_age(provider: Provider, clock: Clock) -> None:
+    """In one word with the fleet, while somebody is connected with the drone on the ground."""
+    assert provider.garage.preflight("one").model_dump() == {
+        "robot": "one",
+        "verdict": None,
+        "age": None,
+        "items": [],
+    }
+    provider.monitor.see("one", health=(WINDY,), examined=T0)
+    clock.now = T0 + 2.0
+    told = provider.garage.preflight("one")
+    assert (told.verdict, told.age, told.items) == (Verdict.REFUSED, 2.0, [WINDY])
+    assert seen(provider).preflight is Verdict.REFUSED
+    provider.monitor.see("one", health=(WINDY,), examined=T0, link=LinkState.LOST, since=T0)
+    clock.now = T0 + 60.0
+    assert provider.garage.preflight("one").age == 60.0
+    assert seen(provider).preflight is None
+    with pytest.raises(RefusedError, match="there is no robot three"):
+        provider.garage.preflight("three")
+
+
+def test_a_missions_drone_has_the_list_that_its_flight_went_through(
+    provider: Provider, clock: Clock
+) -> None:
+    """As old as the flight says, and older with each second in which it says nothing."""
+    provider.monitor.see("one", health=(WINDY,), examined=T0)
+    provider.garage.hand(["one"], LinkState.MISSION)
+    assert provider.garage.preflight("one").items == []
+    well = HealthItem("wind", "2.0 m/s", "at most 10", Verdict.GOOD)
+    provider.garage.note(status(10.0), {"one": PreflightOut.of("one", [well], 4.0)})
+    clock.now = T0 + 1.0
+    told = provider.garage.preflight("one")
+    assert (told.verdict, told.age) == (Verdict.GOOD, 5.0)
+    assert seen(provider).preflight is None

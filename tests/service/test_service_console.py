@@ -12,6 +12,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.types.health import Verdict
 from tools.browser import Browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
@@ -51,6 +53,17 @@ def test_the_page_is_there_for_anybody_and_nothing_else_is(provider: Served) -> 
     assert provider.send("POST", "/", b"{}", token="")[0] == 405
 
 
+def test_the_list_before_take_off_is_told_between_missions_and_in_them(provider: Served) -> None:
+    """To every account, as the drone's charge is; with a client's method, too."""
+    viewer = provider.user("list", "others", "viewer")
+    client = ProviderClient(provider.url, viewer)
+    provider.until(lambda: bool(client.preflight("one").items))
+    told = client.preflight("one")
+    assert told.verdict is Verdict.GOOD
+    assert {one.name for one in told.items} >= {"vehicle", "battery", "fence", "wind", "link"}
+    assert client.fleet().robots[0].preflight is Verdict.GOOD
+
+
 def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission: str) -> None:
     """With the account's token; places of waypoints are told."""
     url = f"{provider.url.replace('http', 'ws')}/v1/missions/{mission}/live"
@@ -60,6 +73,9 @@ def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission
         # Offered by the client: it would be done anew for each watcher.
         assert socket.protocol.extensions == []
         status = json.loads(socket.recv(20))["mission"]["status"]["one"]
+    # It flies: the list is the one of its take-off.
+    provider.until(lambda: provider.ask("GET", "/v1/robots/one/preflight")["items"])
+    assert provider.ask("GET", "/v1/fleet")["robots"][0]["preflight"] is None
     assert status["places"]["wp1"] == [20, 20, 2]
     wrong = [Subprotocol("aerodaas"), Subprotocol("bearer.aerodaas_wrong")]
     with pytest.raises(InvalidStatus) as refused, connect(url, subprotocols=wrong):

@@ -25,6 +25,7 @@ from aerodaas.following.relative_target import RelativeTarget, TargetSize, ends_
 from aerodaas.following.target_motion import TargetMotion, place_of
 from aerodaas.types.data import Alert, Detection, Detections
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.target import FollowedTarget, TargetState
 from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType
 
 __all__ = ["FollowAnalytics"]
@@ -178,7 +179,19 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._tell_who_comes(item, context)
         if command is None:
             return None
+        command = replace(command, target=self._followed(detection))
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+
+    def _followed(self, detection: Detection | None) -> FollowedTarget:
+        """What this frame's command goes by, whose box is `detection`."""
+        if self._identity.certainty is Certainty.UNCERTAIN:
+            return FollowedTarget(TargetState.UNCERTAIN)
+        if detection is None:
+            return FollowedTarget(TargetState.UNSEEN)
+        sure = self._identity.certainty is Certainty.CERTAIN
+        state = TargetState.SURE if sure else TargetState.LIKELY
+        left, top, right, bottom = map(float, detection.box)
+        return FollowedTarget(state, (left, top, right, bottom), detection.track_id)
 
     def _possible(self, item: Detections) -> Detections:
         """Remove boxes that cannot be the target, so that no track is matched to them."""

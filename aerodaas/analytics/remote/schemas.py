@@ -13,6 +13,7 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import Answer
 from aerodaas.types.clock import seconds
 from aerodaas.types.status import MissionStatus
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
@@ -81,6 +82,33 @@ class OutlookOut(BaseModel):
     """Seconds until then, if it stays where it is."""
 
 
+class TrafficOut(BaseModel):
+    """Another aircraft that the vehicle hears of, where it is at the moment of its state."""
+
+    address: int
+    """24-bit ICAO address."""
+    callsign: str
+    position: tuple[float, float, float | None]
+    """Metres east, north and up of home; `up` is null where its height is not known."""
+    velocity: tuple[float, float, float]
+    """m/s east, north and up; zeros where it is not known."""
+    age: float
+    """Seconds since it was last heard."""
+
+    @classmethod
+    def of(cls, aircraft: Traffic) -> TrafficOut:
+        """Convert one of a vehicle's state."""
+        east, north, up = map(float, aircraft.position)
+        eastward, northward, upward = map(float, aircraft.velocity)
+        return cls(
+            address=aircraft.address,
+            callsign=aircraft.callsign,
+            position=(east, north, _known(up)),
+            velocity=(eastward, northward, upward),
+            age=aircraft.age,
+        )
+
+
 class StatusOut(BaseModel):
     """Status of mission and vehicle at one time; unknown values are null."""
 
@@ -127,6 +155,8 @@ class StatusOut(BaseModel):
     """Metres, one standard deviation of latitude and longitude; null if unknown."""
     satellites: int | None = None
     """Satellites behind the global position; null if unknown."""
+    traffic: list[TrafficOut] = Field(default_factory=list)
+    """Other aircraft, the nearest first."""
 
     @classmethod
     def of(cls, status: MissionStatus, vehicle: VehicleState | None) -> StatusOut:
@@ -163,6 +193,7 @@ class StatusOut(BaseModel):
                 "altitude": _known(fix.altitude) if fix else None,
                 "position_sigma": (_known(fix.horizontal_sigma) or None) if fix else None,
                 "satellites": (fix.satellites or None) if fix else None,
+                "traffic": [TrafficOut.of(one) for one in vehicle.traffic],
             }
         )
 

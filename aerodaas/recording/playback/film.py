@@ -12,7 +12,8 @@ from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.recording.pictures import Shot, detections, shots
-from aerodaas.recording.playback.page_items import packed_depth, packed_picture
+from aerodaas.recording.playback.page_items import packed_depth, packed_picture, packed_target
+from aerodaas.recording.playback.target import target_of
 from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import SourceError
@@ -76,6 +77,7 @@ class Film:
         recording: Recording,
         pictures: Mapping[str, tuple[str, Captures]],
         found: Mapping[str, tuple[str, Captures]],
+        navigation: Mapping[str, tuple[str, Captures]],
     ) -> None:
         """Show an open recording.
 
@@ -83,10 +85,12 @@ class Film:
             recording: The recording, which stays open.
             pictures: Topic and captures of each stream of pictures.
             found: The same of detections.
+            navigation: The same of navigation.
         """
         self._recording = recording
         self._pictures = pictures
         self._found = found
+        self._navigation = navigation
         self._schemas = {name: one.schema for name, one in recording.topics.items()}
         self._reels: dict[str, _Reel] = {}
 
@@ -99,9 +103,9 @@ class Film:
             depth: Whether the depth measured with it is wanted, too.
 
         Returns:
-            What was found in the picture, by each analysis, then its depth if wanted and there,
-            then the picture itself; nothing before the first one. In place of a broken picture
-            comes the last whole one before it.
+            What was found in the picture, by each analysis, then what was followed in it, then its
+            depth if wanted and there, then the picture itself; nothing before the first one. In
+            place of a broken picture comes the last whole one before it.
         """
         topic, captures = self._pictures[stream]
         last = captures.last(time)
@@ -110,7 +114,8 @@ class Film:
             packed = None if shot is None else _packed(stream, shot)
             if shot is not None and packed is not None:
                 measured = list(_measured(stream, shot)) if depth else []
-                return [*self._detections(shot.header), *measured, packed]
+                known = [*self._detections(shot.header), *self._targets(shot.header)]
+                return [*known, *measured, packed]
         return []
 
     def _shot(self, topic: str, captures: Captures, place: int) -> Shot | None:
@@ -166,6 +171,15 @@ class Film:
                     if (found.header.stamp, found.header.source) == (header.stamp, header.source):
                         message = _message(stream, header.stamp, header.stamp)
                         yield {**message, "item": pack(found)[0], "blob": False}, b""
+
+    def _targets(self, header: Header) -> Iterator[Packed]:
+        for stream, (topic, captures) in self._navigation.items():
+            for time in sorted({captures.recorded[place] for place in captures.at(header.stamp)}):
+                for record in self._recording.records(topics=[topic], since=time, until=time):
+                    target = target_of(record.value, header)
+                    if target is not None:
+                        message = _message(stream, header.stamp, header.stamp)
+                        yield {**message, "item": packed_target(header, target), "blob": False}, b""
 
 
 def _message(stream: str, stamp: int, captured: int) -> dict[str, Any]:

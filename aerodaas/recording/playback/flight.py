@@ -13,6 +13,7 @@ from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, picture_topics
 from aerodaas.recording.playback.decisions import DecisionSums
 from aerodaas.recording.playback.film import Captures, Film
+from aerodaas.recording.playback.target import NAVIGATION_SCHEMA
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
@@ -50,9 +51,11 @@ class _Reading:
         known = recording.topics
         pictures = picture_topics(recording)[:MAX_KEYS]
         found = sorted(n for n, one in known.items() if one.schema == DETECTIONS_SCHEMA)[:MAX_KEYS]
-        self._captures = {name: Captures() for name in (*pictures, *found)}
+        flown = sorted(n for n, one in known.items() if one.schema == NAVIGATION_SCHEMA)[:MAX_KEYS]
+        self._captures = {name: Captures() for name in (*pictures, *found, *flown)}
         self._pictures = _streams(pictures, "/image")
         self._found = _streams(found, "/detections")
+        self._flown = _streams(flown, "/navigation")
         self._told = [name for name, one in known.items() if one.schema in _SCHEMAS]
         self._span = [0, 0]
 
@@ -75,7 +78,7 @@ class _Reading:
                 self._take(record)
         for captures in self._captures.values():
             captures.sort()
-        film = Film(recording, self._named(self._pictures), self._named(self._found))
+        film = Film(recording, *map(self._named, (self._pictures, self._found, self._flown)))
         return self._told_of(first or 0, last), film
 
     def _named(self, streams: dict[str, str]) -> dict[str, tuple[str, Captures]]:
@@ -121,6 +124,7 @@ class _Reading:
             streams={
                 **dict.fromkeys(self._pictures, StreamKind.PICTURES),
                 **dict.fromkeys(self._found, StreamKind.DETECTIONS),
+                **dict.fromkeys(self._flown, StreamKind.NAVIGATION),
             },
         )
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut
-from aerodaas.protocol.playback import GpsOut, PlaceOut, TrackOut
+from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut, TrafficOut
+from aerodaas.protocol.playback import GpsOut, HeardOut, PlaceOut, TrackOut
 from aerodaas.types.clock import seconds
 
 __all__ = ["ROW_SECONDS", "Room", "TrackBuilder"]
@@ -18,6 +18,10 @@ _MOST_NAMES = 1_000_000
 """Names in all statuses and places of a recording."""
 _MOST_BEHIND = 64
 """Visited and refused waypoints that a status names, as `StatusOut` has it."""
+_HEARD_SECONDS = 1.0
+"""Mission seconds between two words on other aircraft; between them they fly on."""
+_MOST_AIRCRAFT = 32
+"""As many as a vehicle's state has."""
 _NOTHING = StatusOut(
     time=0.0,
     state="idle",
@@ -79,6 +83,7 @@ class TrackBuilder:
         self._change(now, {"mode": value["mode"]})
         if track.time and now < track.time[-1] + self._interval:
             return
+        self._hear(now, value.get("traffic"))
         odometry = value["odometry"]
         track.time.append(now)
         track.position.append(_vector(odometry["position"]))
@@ -93,6 +98,15 @@ class TrackBuilder:
             for rows in (track.time, track.position, track.velocity, track.yaw, track.battery,
                          track.distance, track.outlook, track.gps):  # fmt: skip
                 del rows[1::2]
+
+    def _hear(self, now: float, told: object) -> None:
+        """Take the other aircraft of a state, once a second and when the last one is gone."""
+        heard = self._track.traffic
+        aircraft = _traffic(told)
+        due = not heard or now >= heard[-1].since + _HEARD_SECONDS or not aircraft
+        changed = bool(aircraft or (heard and heard[-1].aircraft))
+        if changed and due and self._room.take(1 + len(aircraft)):
+            heard.append(HeardOut(since=now, aircraft=aircraft))
 
     def mission(self, value: dict[str, Any]) -> None:
         """Take a mission's status."""
@@ -154,6 +168,20 @@ class TrackBuilder:
 def _outlook(value: dict[str, Any] | None) -> OutlookOut | None:
     """A recorded outlook, if all of it is known."""
     return None if value is None or None in value.values() else OutlookOut(**value)
+
+
+def _traffic(told: object) -> list[TrafficOut]:
+    """The recorded aircraft whose place is known; none of what is malformed."""
+    found = map(_aircraft, told[:_MOST_AIRCRAFT] if isinstance(told, list) else [])
+    return [one for one in found if one is not None]
+
+
+def _aircraft(told: Any) -> TrafficOut | None:  # noqa: ANN401 - of a stranger's recording
+    try:
+        place, velocity = (_vector(told[name]) for name in ("position", "velocity"))
+        return TrafficOut(**{**told, "position": place, "velocity": velocity})
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def _gps(value: dict[str, Any] | None) -> GpsOut | None:

@@ -23,6 +23,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
@@ -72,6 +73,10 @@ class Flown(Protocol):
 
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""
+        ...
+
+    def preflight(self) -> dict[str, PreflightOut]:
+        """The list before take-off by robot."""
         ...
 
     def analytics(self) -> AnalyticsOut | None:
@@ -191,6 +196,10 @@ class ControlServer:
                 "alerts": alerts,
                 "analytics": None if sums is None else sums.model_dump(),
                 "streams": streams,
+                "preflight": {
+                    name: one.model_dump(mode="json")
+                    for name, one in self._flown.preflight().items()
+                },
                 "over": over,
             }
             channel.send(message, timeout=_SEND_SECONDS)

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.types.errors import ConfigError, MissionError
@@ -35,6 +36,8 @@ class FlightNews:
     alerts: list[str] = field(default_factory=list)
     analytics: AnalyticsOut | None = None
     streams: dict[str, StreamKind] = field(default_factory=dict)
+    preflight: dict[str, PreflightOut] = field(default_factory=dict)
+    """The list before take-off by robot."""
 
 
 class FlightLink:
@@ -131,6 +134,7 @@ class FlightLink:
     def _take(self, message: dict[str, Any]) -> None:
         robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
         streams = {name: StreamKind(kind) for name, kind in message.get("streams", {}).items()}
+        lists = message.get("preflight", {})
         sums = message.get("analytics")
         self.news = FlightNews(
             self.news.number + 1,
@@ -138,5 +142,6 @@ class FlightLink:
             message["alerts"],
             None if sums is None else AnalyticsOut(**sums),
             streams,
+            {name: PreflightOut.model_validate(one) for name, one in lists.items()},
         )
         self._told()

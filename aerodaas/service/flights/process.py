@@ -28,6 +28,7 @@ from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import Answer, Command, ReturnHome
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
@@ -206,6 +207,10 @@ class Flying:
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""
         return self._meter.status, self._meter.alerts
+
+    def preflight(self) -> dict[str, PreflightOut]:
+        """The list before take-off by robot."""
+        return self._meter.preflight
 
     def analytics(self) -> AnalyticsOut | None:
         """What the analytics scheduler has done so far; None without one."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.protocol.schemas import LinkState
+from aerodaas.types.health import HealthItem
 
 __all__ = ["MonitorNews", "VehicleNews", "Wanted"]
 
@@ -43,6 +44,10 @@ class VehicleNews(_Line):
     """What the vehicle complains of."""
     objections: tuple[str, ...] = ()
     """Why the vehicle itself would refuse to take off now."""
+    health: tuple[HealthItem, ...] = ()
+    """The list before take-off."""
+    examined: float | None = None
+    """Unix seconds of that list."""
 
 
 class MonitorNews(_Line):

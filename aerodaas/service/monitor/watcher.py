@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.types.errors import AeroDaaSError, failure_line
@@ -29,8 +30,8 @@ _PAUSE, _LONGEST_PAUSE = 1.0, 10.0
 class VehicleWatcher:
     """Holds one vehicle while it is wanted, in a thread of its own.
 
-    It calls `connect`, `read`, `preflight` and `close` of the driver and nothing else, with the
-    settings by which the driver changes nothing at the vehicle (`observing`, if it has any). A
+    It calls `connect`, `read`, `preflight`, `health` and `close` of the driver and no more, with
+    the settings by which the driver changes nothing at the vehicle (`observing`, if it has any). A
     driver lands what it has flown when it is closed, and some land what is in the air, whoever
     flies it: so a vehicle that is armed is not closed before it has been disarmed.
     """
@@ -112,9 +113,12 @@ class VehicleWatcher:
     def _watch(self, vehicle: Vehicle) -> str:
         """Read until it is wanted no more, or silent; returns why it is lost."""
         armed = False
+        checklist = Checklist(vehicle, self._robot.limits, self._robot.preflight)
         while True:
             try:
                 state, objections = vehicle.read(), vehicle.preflight()
+                # The list before take-off: of one in the air, it stays as it was then.
+                items = None if state.armed else checklist.examine(state)
             except Exception as error:
                 if not armed:
                     raise
@@ -126,6 +130,8 @@ class VehicleWatcher:
                 self._lose("; ".join(state.faults) or "it is silent")
             else:
                 self._see(state, objections, now)
+                if items is not None:
+                    self._tell(health=tuple(items), examined=now)
             if not state.armed and self._silence(now) > _ANEW_SECONDS:
                 return self._news.reason
             with self._lock:

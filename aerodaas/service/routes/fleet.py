@@ -7,6 +7,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict
 
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, Role, Scope
 from aerodaas.service.access import Accounts, Audit
 from aerodaas.service.errors import RefusedError
@@ -53,6 +54,7 @@ class FleetRoutes:
         router.add_api_route("/me", self.me)
         router.add_api_route("/fleet", self.fleet)
         router.add_api_route("/robots/{robot}", self.enable, methods=["PATCH"], **none)
+        router.add_api_route("/robots/{robot}/preflight", self.preflight)
         router.add_api_route("/models/{sha256}", self.has_model, methods=["HEAD"], **none)
         router.add_api_route("/models/{sha256}", self.put_model, methods=["PUT"], **none)
         return router
@@ -65,6 +67,11 @@ class FleetRoutes:
     def fleet(self, request: Request) -> FleetOut:
         """The drones, and the environment that applications are built against."""
         return self._fleet.seen_by(self._admission.require(request, Role.VIEWER))
+
+    def preflight(self, robot: str, request: Request) -> PreflightOut:
+        """A drone's health before take-off, to whoever sees its charge and place."""
+        self._admission.require(request, Role.VIEWER)
+        return self._garage.preflight(robot)
 
     def enable(self, robot: str, body: RobotIn, request: Request) -> Response:
         """Put a drone into service, or take it out."""

@@ -21,7 +21,7 @@ from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, GpsFix
 from aerodaas.types.errors import VehicleError
-from aerodaas.types.health import HealthItem, HealthReadings, Verdict
+from aerodaas.types.health import HealthItem, HealthReadings, Verdict, gravest
 from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import VehicleState
 
@@ -243,7 +243,7 @@ class Flown:
             preflight=PreflightConfig(**policy),
         )
         self.mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=np.zeros(3))
-        loop = SetpointLoop(vehicle, self.mission)
+        loop = self.loop = SetpointLoop(vehicle, self.mission)
         for command in (add(*square()), Start()):
             self.mission.handle(command, 0)
         now = 0
@@ -292,3 +292,45 @@ def test_what_gets_better_in_time_does_not_refuse() -> None:
             return replace(WELL, estimator=2.0 if Settling.looks < 10 else 0.1)
 
     assert Flown(Settling(), estimator="refuse").mission.state is MissionState.TAKING_OFF
+
+
+def test_the_list_is_kept_as_it_was_before_take_off() -> None:
+    """For those who look on; what the air brings later is no matter of it."""
+    vehicle = Measured(replace(WELL, wind=12.0))
+    flown = Flown(vehicle)
+    kept = flown.loop.health
+    assert kept is not None
+    assert gravest(kept.items) is Verdict.WARNING
+    vehicle.told = WELL
+    flown.loop.turn(kept.stamp + 5 * NANOSECONDS)
+    assert flown.loop.health is kept
+
+
+def test_a_mission_that_has_not_begun_goes_through_the_list_each_second() -> None:
+    """And is held up by nothing in it yet."""
+    vehicle = Measured(replace(WELL, wind=12.0))
+    robot = RobotConfig(id="drone", preflight=PreflightConfig(wind="refuse"))
+    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=np.zeros(3))
+    loop = SetpointLoop(vehicle, mission)
+    seen = []
+    for turn in range(41):
+        loop.turn(turn * NANOSECONDS // 20)
+        assert loop.health is not None
+        seen.append(loop.health.stamp)
+    assert sorted(set(seen)) == [0, NANOSECONDS, 2 * NANOSECONDS]
+    assert mission.state is MissionState.IDLE
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "worst"),
+    [
+        ("good unknown", "good"),
+        ("good warning unknown", "warning"),
+        ("warning refused good", "refused"),
+        ("", "good"),
+    ],
+)
+def test_the_gravest_item_speaks_for_the_list(verdicts: str, worst: str) -> None:
+    """What is not known and was not required to be keeps nobody on the ground."""
+    items = [HealthItem("one", "", "", Verdict(word)) for word in verdicts.split()]
+    assert gravest(items) is Verdict(worst)

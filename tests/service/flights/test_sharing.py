@@ -15,6 +15,7 @@ import pytest
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
@@ -25,6 +26,7 @@ from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import ConfigError, MissionError, SourceError
+from aerodaas.types.health import HealthItem, Verdict
 
 FLEET = {
     "name": "campus",
@@ -41,6 +43,8 @@ FLEET = {
         {"id": "two"},
     ],
 }
+
+WINDY = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.REFUSED, "wait for less wind")
 
 
 class Pictures:
@@ -92,6 +96,10 @@ class Flight:
     def analytics(self) -> None:
         """None."""
 
+    def preflight(self) -> dict[str, PreflightOut]:
+        """A list that was gone through three seconds ago."""
+        return {"one": PreflightOut.of("one", [WINDY], 3.0)}
+
     def streams(self) -> dict[str, Any]:
         """None."""
         return {}
@@ -135,6 +143,15 @@ def test_a_live_views_pictures_are_made_in_the_form_that_it_asks_for(
     assert message["item"]["is"] == "Frame"
     assert blob
     assert flight.form is form
+
+
+def test_the_list_before_take_off_goes_to_the_service(flight: Flight) -> None:
+    """Whole, with its age."""
+    until = time.monotonic() + 20.0
+    while not flight.link.news.preflight:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    assert flight.link.news.preflight == flight.preflight()
 
 
 def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight) -> None:

@@ -46,9 +46,15 @@ class ScriptedVehicle:
         SCRIPT.settings = dict(robot.settings)
 
     def __getattribute__(self, name: str) -> Any:  # noqa: ANN401
-        if not name.startswith("_"):
+        found = super().__getattribute__(name)
+        if name.startswith("_") or not callable(found):
+            return found
+
+        def noted(*given: Any) -> Any:  # noqa: ANN401
             SCRIPT.asked.append(name)
-        return super().__getattribute__(name)
+            return found(*given)
+
+        return noted
 
     def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002
         """Connect if it is there."""

@@ -15,6 +15,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor import watcher as watchers
 from aerodaas.service.monitor.watcher import VehicleWatcher
+from aerodaas.types.health import Verdict
 from aerodaas.types.vehicle import VehicleMode
 
 READING = {"connect", "read", "preflight", "close"}
@@ -60,6 +61,9 @@ def test_it_reads_and_commands_nothing(watcher: VehicleWatcher, script: Script) 
     news = watcher.news
     assert (news.battery, news.position, news.mode) == (0.8, (0.0, 0.0, 0.0), "grounded")
     assert (news.objections, news.held) == (("no fix",), True)
+    until(lambda: watcher.news.examined is not None)
+    own = watcher.news.health[0]
+    assert (own.name, own.value, own.verdict) == ("vehicle", "no fix", Verdict.REFUSED)
     watcher.want(wanted=False)
     until(lambda: not watcher.news.held)
     assert watcher.news.link is LinkState.UNWATCHED
@@ -159,3 +163,19 @@ def test_one_whose_driver_hangs_is_not_connected(
     stuck.set()
     until(lambda: watcher.news.link is LinkState.CONNECTED)
     assert watcher.news.reason == ""
+
+
+def test_the_list_of_one_in_the_air_stays_as_it_was_on_the_ground(
+    watcher: VehicleWatcher, script: Script
+) -> None:
+    """It is the list before take-off; its age says of when it is."""
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.examined is not None)
+    script.armed, script.battery = True, 0.1
+    until(lambda: watcher.news.battery == 0.1)
+    examined = watcher.news.examined
+    heard = watcher.news.heard
+    until(lambda: watcher.news.heard != heard)
+    assert watcher.news.examined == examined
+    charge = next(one for one in watcher.news.health if one.name == "battery")
+    assert (charge.value, charge.verdict) == ("80%", Verdict.GOOD)

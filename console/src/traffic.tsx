@@ -1,0 +1,76 @@
+// Other aircraft on the map: where they are, their heading, and how much higher than the drone.
+
+import type { Frame } from "./map";
+import type { StatusOut, TrafficOut } from "./wire";
+
+/** Seconds without a word after which an aircraft is shown as old; after 10 it is gone. */
+const OLD = 3;
+/** m/s below which it has no heading. */
+const SLOW = 0.5;
+
+/** The aircraft that the drones of a flight hear of, each once: as the chosen drone hears it. */
+export function trafficOf(statuses: Record<string, StatusOut>, chosen: string): TrafficOut[] {
+  const found = new Map<number, TrafficOut>();
+  for (const status of [statuses[chosen], ...Object.values(statuses)]) {
+    for (const one of status?.traffic ?? []) {
+      if (!found.has(one.address)) found.set(one.address, one);
+    }
+  }
+  return [...found.values()];
+}
+
+/** How much higher than the drone it is, which is `own` metres up. */
+export function heightOf({ position: [, , up] }: TrafficOut, own: number | null): string {
+  if (up === null) return "height unknown";
+  if (own === null) return `${up.toFixed(0)} m up`;
+  const above = Math.round(up - own);
+  return above === 0 ? "same height" : `${Math.abs(above)} m ${above > 0 ? "above" : "below"}`;
+}
+
+/** Degrees clockwise from north, in three digits. */
+export function headingOf({ velocity: [east, north] }: TrafficOut): string {
+  if (Math.hypot(east, north) < SLOW) return "heading unknown";
+  const degrees = Math.round((Math.atan2(east, north) * 180) / Math.PI + 360) % 360;
+  return `${String(degrees).padStart(3, "0")}°`;
+}
+
+export function TrafficLayer(
+  props: Frame & { traffic: TrafficOut[]; own: number | null; stale: boolean },
+) {
+  return (
+    <g>
+      {props.traffic.map((one) => {
+        const [east, north] = one.position;
+        const [ve, vn] = one.velocity;
+        const turn = (Math.atan2(ve, vn) * 180) / Math.PI;
+        const moves = Math.hypot(ve, vn) >= SLOW;
+        const old = props.stale || one.age > OLD;
+        return (
+          <g
+            key={one.address}
+            class={`traffic ${old ? "stale" : ""}`}
+            transform={`translate(${props.x(east)} ${props.y(north)})`}
+            data-aircraft={one.callsign}
+          >
+            {moves ? (
+              <path
+                d="M0-13V12M-12 2L0-4L12 2M-5 11L0 8L5 11"
+                transform={`rotate(${turn.toFixed(0)})`}
+              />
+            ) : (
+              <path d="M0-9L9 0L0 9L-9 0Z" />
+            )}
+            <text y="-34">
+              {one.callsign}{" "}
+              <tspan class="small" x="0" dy="15">
+                {heightOf(one, props.own)}
+                {moves && `, ${headingOf(one)}`}
+                {one.age > OLD && `, ${one.age.toFixed(0)} s old`}
+              </tspan>
+            </text>
+          </g>
+        );
+      })}
+    </g>
+  );
+}
