@@ -44,39 +44,42 @@ class Case:
     cloud_slots: int = Resources().cloud_slots
 
 
+_PUBLISHED_TIMES = "lognormal:0.15@0.95"
+"""The table's times as 95th percentiles, which published ones are, so that plans by them hold."""
+
 CASES = (
     Case("light", "Two drones, four models: the edge nearly holds them.", "2D-P"),
     Case(
         "usual",
-        "Three drones, six models; executions vary around their table by 15 %.",
+        "Three drones, six models; executions vary by 15 %, and few take longer than the table says.",
         "3D-A",
-        times="lognormal:0.15",
+        times=_PUBLISHED_TIMES,
     ),
     Case(
         "crowded",
         "Four drones, six models: most has to go to the cloud, or be left.",
         "4D-A",
-        times="lognormal:0.15",
+        times=_PUBLISHED_TIMES,
     ),
     Case(
         "slow network",
         "The link's latency rises by 400 ms, stays, and falls again.",
         "3D-A",
         network="trapezium",
-        times="lognormal:0.15",
+        times=_PUBLISHED_TIMES,
     ),
     Case(
         "outages",
         "No link to the cloud for a tenth of the time, and later for a twentieth.",
         "3D-A",
         network="outage",
-        times="lognormal:0.15",
+        times=_PUBLISHED_TIMES,
     ),
     Case(
         "few slots",
-        "The cloud runs four tasks at once; the bound does not count them, so none comes near it.",
+        "The cloud runs four tasks at once, which the bound does not count.",
         "4D-P",
-        times="lognormal:0.15",
+        times=_PUBLISHED_TIMES,
         cloud_slots=4,
     ),
     Case(

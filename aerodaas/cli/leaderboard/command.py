@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -56,7 +57,7 @@ def leaderboard(
     spread, wanted = spread_of(address, names)
     # A folder that cannot be written to is told now, not after minutes.
     _writing(out, lambda: out.mkdir(parents=True, exist_ok=True))
-    began = perf_counter()
+    began, origin = perf_counter(), Origin.here()
     with show_progress() as progress:
         bar = progress.add_task("sample paths", total=None)
         board = run_leaderboard(
@@ -66,7 +67,7 @@ def leaderboard(
             spread=spread,
             progress=lambda done, total: progress.update(bar, completed=done, total=total),
         )
-    origin = Origin.here(perf_counter() - began)
+    origin = replace(origin, took=round(perf_counter() - began, 1))
     _show(board)
     files: dict[str, Callable[[Path], Any]] = {
         "leaderboard.html": lambda path: path.write_text(

@@ -22,20 +22,19 @@ class Origin:
 
     made: str
     """Day, ISO 8601, UTC."""
-    took: float
-    """Seconds by the wall clock."""
     revision: str
     """Git commit, with `+` if the tree differs from it; empty for an installed package."""
     processor: str
     cores: int
     versions: dict[str, str]
+    took: float = 0.0
+    """Seconds by the wall clock."""
 
     @classmethod
-    def here(cls, took: float) -> Self:
-        """That of this process, which took so many seconds."""
+    def here(cls) -> Self:
+        """That of this process, at its beginning."""
         return cls(
             datetime.now(timezone.utc).date().isoformat(),
-            round(took, 1),
             revision_of(Path(aerodaas.__file__).parent),
             processor_name(),
             os.cpu_count() or 1,
