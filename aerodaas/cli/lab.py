@@ -77,6 +77,7 @@ def run(
             "-w",
             help="Comma-separated, or given several times: `3D-A` is 3 drones with all six models "
             "on one edge, `4D-P` four models, `80D-A/7` 80 drones over 7 edges; or a JSON file; "
+            "or `trace:FILE`, arrivals in a CSV; "
             f"`six` for all of the published ones. Default: {_WORKLOAD}.",
         ),
     ] = None,
@@ -94,7 +95,8 @@ def run(
         str,
         typer.Option(
             help="`steady`, `trapezium[:MS]` (latency rises and falls), `outage[:30-45,80-81]` "
-            "(seconds), `trace:FILE` (CSV of seconds, Mbit/s); joined by `+`.",
+            "(seconds), `trace:FILE` (measured bandwidth: Mahimahi, Pensieve, Ghent's and Cork's "
+            "logs, or a CSV of seconds, Mbit/s); joined by `+`.",
         ),
     ] = "steady",
     times: Annotated[

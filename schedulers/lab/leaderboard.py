@@ -45,13 +45,14 @@ class Case:
 
 
 _PUBLISHED_TIMES = "lognormal:0.15@0.95"
-"""The table's times as 95th percentiles, which published ones are, so that plans by them hold."""
+"""The table's times as 95th percentiles, as published ones often are: few take longer."""
 
 CASES = (
     Case("light", "Two drones, four models: the edge nearly holds them.", "2D-P"),
     Case(
         "usual",
-        "Three drones, six models; executions vary by 15 %, and few take longer than the table says.",
+        "Three drones, six models; executions vary by 15 %, and few take longer than the table "
+        "says.",
         "3D-A",
         times=_PUBLISHED_TIMES,
     ),
