@@ -20,6 +20,8 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
+from aerodaas.recording.provenance import processor_name
+
 __all__ = ["Report", "machine_line", "plain"]
 
 _WIDEST = 400
@@ -110,7 +112,7 @@ def plain(value: float) -> float | None:
 
 def _machine() -> dict[str, Any]:
     return {
-        "cpu": _processor(),
+        "cpu": processor_name(),
         "cores": len(os.sched_getaffinity(0)),
         "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
         "system": platform.platform(),
@@ -120,13 +122,6 @@ def _machine() -> dict[str, Any]:
 def machine_line() -> str:
     machine = _machine()
     return f"{machine['cpu']}, {machine['cores']} cores, {machine['memory_gib']} GiB"
-
-
-def _processor() -> str:
-    """Name of the processor; on ARM boards the kernel gives the architecture only."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.machine())
 
 
 def _revision() -> str:

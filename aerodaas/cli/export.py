@@ -36,6 +36,13 @@ def export(
             help="Pictures, at least so far apart, and what was detected, as a COCO dataset.",
         ),
     ] = None,
+    lerobot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TASK",
+            help="Pictures, states and commands as a LeRobot dataset; the task in words.",
+        ),
+    ] = None,
     ros2: Annotated[
         Literal["mcap", "sqlite3"] | None,
         typer.Option(help="States, pictures and detections as a ROS 2 bag in this storage."),
@@ -44,17 +51,19 @@ def export(
         Path | None, typer.Option(help="Folder for the files. Default: the recording's own.")
     ] = None,
 ) -> None:
-    """Write parts of a recording as CSV, Parquet, MP4, GPX, KML, a COCO dataset or a ROS 2 bag.
+    """Write parts of a recording as CSV, Parquet, MP4, GPX, KML, COCO, LeRobot or a ROS 2 bag.
 
     Without any of these, list the recording's channels.
 
         aerodaas export flight.mcap --csv /tello/state --csv /decisions/decision
         aerodaas export flight.mcap --mp4 --kml --out for_the_web
         aerodaas export flight.mcap --coco 0.5
+        aerodaas export flight.mcap --lerobot "survey the field"
         aerodaas export flight.mcap --ros2 mcap
     """
     from aerodaas.recording.export import tabular, track, video  # noqa: PLC0415 - slow to load
     from aerodaas.recording.export.coco import write_coco  # noqa: PLC0415
+    from aerodaas.recording.export.lerobot import write_lerobot  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
     from aerodaas.recording.ros import bag_writer  # noqa: PLC0415
 
@@ -66,6 +75,7 @@ def export(
         files += [track.write_gpx(opened, folder)] if gpx else []
         files += [track.write_kml(opened, folder)] if kml else []
         files += [] if coco is None else [write_coco(opened, folder, interval=coco)]
+        files += [] if lerobot is None else write_lerobot(opened, folder, task=lerobot)
         files += [bag_writer.write_bag(opened, folder, ros2)] if ros2 else []
         lines = [str(path) for path in files] or _channels(opened)
         if opened.damaged:

@@ -77,6 +77,7 @@ def run(
             "-w",
             help="Comma-separated, or given several times: `3D-A` is 3 drones with all six models "
             "on one edge, `4D-P` four models, `80D-A/7` 80 drones over 7 edges; or a JSON file; "
+            "or `trace:FILE`, arrivals in a CSV; "
             f"`six` for all of the published ones. Default: {_WORKLOAD}.",
         ),
     ] = None,
@@ -94,7 +95,8 @@ def run(
         str,
         typer.Option(
             help="`steady`, `trapezium[:MS]` (latency rises and falls), `outage[:30-45,80-81]` "
-            "(seconds), `trace:FILE` (CSV of seconds, Mbit/s); joined by `+`.",
+            "(seconds), `trace:FILE` (measured bandwidth: Mahimahi, Pensieve, Ghent's and Cork's "
+            "logs, or a CSV of seconds, Mbit/s); joined by `+`.",
         ),
     ] = "steady",
     times: Annotated[
@@ -235,6 +237,47 @@ def sweep(
             address=address,
             out=out,
         )
+
+
+@app.command()
+def leaderboard(
+    *,
+    scheduler: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--scheduler",
+            "-s",
+            help="Your own, beside all registered ones: `file.py:Class` or `module:Class`, "
+            "comma-separated, or given several times.",
+        ),
+    ] = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="Rank those of --scheduler alone, which is faster.")
+    ] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="30 seeds of 300 s instead of 10 seeds of 60 s.")
+    ] = False,
+    jobs: Jobs = None,
+    address: Address = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the page.")] = Path(
+        "leaderboard"
+    ),
+) -> None:
+    """Rank all schedulers, and yours, on one fixed set of workloads, networks and seeds.
+
+    By utility, as a share of what a clairvoyant could reach at most, and by tasks in time; with
+    95 % intervals and a test against the first. Writes a page, `leaderboard.html`, and the same
+    as Markdown, CSV and JSON.
+
+        aerodaas lab leaderboard
+        aerodaas lab leaderboard -s mine.py:Mine -o board
+        aerodaas lab leaderboard -s dems,margin,mine.py:Mine --only --full
+    """
+    from aerodaas.cli.leaderboard.command import leaderboard as rank  # noqa: PLC0415 - as above
+
+    with _errors_told():
+        names = [name.strip() for name in ",".join(scheduler or []).split(",") if name.strip()]
+        rank(names, full=full, only=only, jobs=jobs, address=address, out=out)
 
 
 @app.command("list")

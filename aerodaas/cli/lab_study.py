@@ -22,8 +22,10 @@ from aerodaas.schedulers.lab import (
     Network,
     Workload,
     load_workload,
+    read_arrivals,
     run_lab,
 )
+from aerodaas.schedulers.lab.arrival_trace import TRACE
 from aerodaas.schedulers.lab.metrics import Score, score
 from aerodaas.schedulers.lab.spreading import Spread
 from aerodaas.schedulers.lab.workload import SIX
@@ -149,11 +151,15 @@ def _show(result: LabResult) -> None:
 
 
 def workload_of(name: str, duration: float | None, edges: int | None) -> Workload:
-    """The workload of a name or a JSON file; raises UnknownIdError, SchedulerError."""
-    found = load_workload(name) if name.endswith(".json") else Workload.named(name)
+    """The workload of a name, a JSON file or a trace; raises UnknownIdError, SchedulerError."""
+    lasts = None if duration is None else round(duration * NANOSECONDS)
+    if name.startswith(TRACE):
+        found = read_arrivals(name.removeprefix(TRACE), lasts)
+    else:
+        found = load_workload(name) if name.endswith(".json") else Workload.named(name)
     if edges is not None:
         found = found.on_edges(edges)
-    return found if duration is None else found.lasting(round(duration * NANOSECONDS))
+    return found if lasts is None else found.lasting(lasts)
 
 
 def spread_of(

@@ -16,7 +16,7 @@ from typing_extensions import Self
 from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["Provenance", "package_versions"]
+__all__ = ["Provenance", "package_versions", "processor_name", "revision_of"]
 
 _PACKAGES = ("aerodaas", "ray", "numpy", "opencv-python-headless", "onnxruntime", "panda3d")
 
@@ -80,7 +80,7 @@ class Provenance:
             app_sha256=hashlib.sha256(content).hexdigest() if app else "",
             document=document,
             app_source=content.decode("utf-8", "replace") if source else "",
-            revision=_revision(app.parent if app else Path.cwd()),
+            revision=revision_of(app.parent if app else Path.cwd()),
             versions=package_versions(),
         )
 
@@ -111,7 +111,18 @@ def _version(package: str) -> str:
         return ""
 
 
-def _revision(folder: Path) -> str:
+def processor_name() -> str:
+    """Name of the processor; on ARM boards the kernel gives the architecture only."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.machine())
+
+
+def revision_of(folder: Path) -> str:
+    """Git commit of the repository that holds `folder`, with `+` if it has changes; or empty."""
     # Never a tag's name, and the commit's in full.
     command = ["git", "describe", "--always", "--exclude=*", "--abbrev=40", "--dirty=+"]
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from aerodaas.schedulers.lab.arrival_trace import read_arrivals
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.run import LabResult, run_lab
 from aerodaas.schedulers.lab.sweep import SweepResult, run_sweep
@@ -16,6 +17,7 @@ __all__ = [
     "SweepResult",
     "Workload",
     "load_workload",
+    "read_arrivals",
     "run_lab",
     "run_sweep",
 ]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from bisect import bisect_right
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 from aerodaas.schedulers.analytics.base import MILLISECOND
+from aerodaas.schedulers.lab.network_trace import read_bandwidth
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import SchedulerError, UnknownIdError
 
@@ -45,8 +44,9 @@ class Network:
 
         `steady`; `trapezium` or `trapezium:MS` (rises from 0 to +400 ms over the second fifth of
         the duration, falls back over the fourth); `outage` (10 % of the duration from 30 % on
-        and 5 % from 70 % on) or `outage:30-45,80-81` (seconds); `trace:FILE` (CSV of seconds and
-        Mbit/s). Raises UnknownIdError or SchedulerError.
+        and 5 % from 70 % on) or `outage:30-45,80-81` (seconds); `trace:FILE` (a measured
+        bandwidth: `aerodaas.schedulers.lab.network_trace` has the formats). Raises
+        UnknownIdError or SchedulerError.
         """
         network = cls(wanted)
         for part in wanted.split("+"):
@@ -57,7 +57,7 @@ class Network:
             elif kind == "outage":
                 outages = _outages(setting, duration, wanted)
             elif kind == "trace" and setting:
-                bandwidth = _trace(Path(setting))
+                bandwidth = read_bandwidth(Path(setting), duration)
             elif kind != "steady":
                 known = ["steady", "trapezium[:MS]", "outage[:FROM-TO,...]", "trace:FILE"]
                 raise UnknownIdError("network", wanted, known)
@@ -89,7 +89,10 @@ class Network:
         if self.latency:
             taken += int(_linear(self.latency, start))
         if self.bandwidth:
-            taken += self._transfer(start) - int(self.upload / self.nominal * NANOSECONDS)
+            transfer = self._transfer(start)
+            if transfer is None:
+                return None
+            taken += transfer - int(self.upload / self.nominal * NANOSECONDS)
             taken = max(taken, 1)
         for begin, end in self.outages:
             if start < end and start + taken > begin:
@@ -105,19 +108,21 @@ class Network:
         ]
         return min(ends, default=None)
 
-    def _transfer(self, start: int) -> int:
+    def _transfer(self, start: int) -> int | None:
+        """Nanoseconds to send the upload; None if the trace ends without bandwidth before it is."""
         left = float(self.upload)
-        stamps = [stamp for stamp, _ in self.bandwidth]
-        index = max(bisect_right(stamps, start) - 1, 0)
+        index = max(bisect_right(self.bandwidth, (start, float("inf"))) - 1, 0)
         now = start
-        while index + 1 < len(stamps):
-            room = (stamps[index + 1] - now) / NANOSECONDS * self.bandwidth[index][1]
+        while index + 1 < len(self.bandwidth):
+            change = self.bandwidth[index + 1][0]
+            room = (change - now) / NANOSECONDS * self.bandwidth[index][1]
             if room >= left:
                 break
             left -= room
             index += 1
-            now = stamps[index]
-        return now - start + int(left / self.bandwidth[index][1] * NANOSECONDS)
+            now = change
+        rate = self.bandwidth[index][1]
+        return now - start + int(left / rate * NANOSECONDS) if rate else None
 
 
 def _linear(curve: Curve, at: int) -> float:
@@ -150,28 +155,6 @@ def _outages(setting: str, duration: int, wanted: str) -> tuple[tuple[int, int],
         if spans[-1][0] >= spans[-1][1]:
             raise SchedulerError(f"network {wanted!r}: the outage {span!r} ends before it begins")
     return tuple(spans)
-
-
-def _trace(path: Path) -> Curve:
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows: Sequence[list[str]] = [row for row in csv.reader(file) if row]
-    except OSError as error:
-        raise SchedulerError(f"cannot read the bandwidth trace {path}: {error.strerror}") from None
-    name = f"trace:{path}"
-    if rows and not rows[0][0].strip().replace(".", "").isdigit():
-        rows = rows[1:]
-    try:
-        points = tuple(
-            (int(_number(row[0], name) * NANOSECONDS), _number(row[1], name) * 125_000)
-            for row in rows
-        )
-    except IndexError:
-        raise SchedulerError(f"{path}: each line holds seconds and Mbit/s") from None
-    stamps = [stamp for stamp, _ in points]
-    if not points or stamps != sorted(set(stamps)) or min(rate for _, rate in points) <= 0:
-        raise SchedulerError(f"{path}: seconds must ascend and each Mbit/s be positive")
-    return points
 
 
 def _number(text: str, wanted: str) -> float:

@@ -220,7 +220,7 @@ def _prepared(
 ) -> tuple[Workload, Network, ExecutionTimes, Resources]:
     """What `run_lab` is given for one case."""
     changes: Row = {name: case[name] for name in ("drones", "edges") if name in case}
-    if base.arrivals and (changes or "models" in case):
+    if base.is_listed and (changes or "models" in case):
         raise SchedulerError(f"{base.name} lists its tasks: drones, edges and models are its own")
     if "models" in case:
         if case["models"] not in _MODELS:

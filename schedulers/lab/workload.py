@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import count
 
 from aerodaas.schedulers.analytics.base import Profile, Task
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import SchedulerError, UnknownIdError
 
-__all__ = ["SIX", "Arrival", "Workload"]
+__all__ = ["SIX", "Arrival", "Segments", "Workload"]
 
 SIX: tuple[str, ...] = ("2D-P", "3D-P", "4D-P", "2D-A", "3D-A", "4D-A")
 """The published workloads: drones on one edge, with four (P) or six (A) models."""
@@ -37,11 +39,34 @@ class Arrival:
 
 
 @dataclass(frozen=True, slots=True)
+class Segments:
+    """Segments of video that a trace counts: so many from `at` on, at times drawn from the seed.
+
+    Those of a `length` of 0 come at `at`.
+    """
+
+    at: int
+    """Nanoseconds from the start."""
+    length: int = 0
+    """Nanoseconds over which they come."""
+    count: int = 1
+    source: str = ""
+    edge: int = 0
+
+    def times(self, draw: random.Random) -> list[int]:
+        """When each comes."""
+        if not self.length:
+            return [self.at] * self.count
+        return [self.at + draw.randrange(self.length) for _ in range(self.count)]
+
+
+@dataclass(frozen=True, slots=True)
 class Workload:
     """Drones that send a segment of video per period to an edge; each makes a task per model.
 
     Drones are dealt to the edges in turn, each with a phase of its own drawn from the seed;
-    models come in random order within a segment. `arrivals`, where given, replaces all of that.
+    models come in random order within a segment. `segments`, where given, take the drones' place,
+    up to `duration`; `arrivals`, where given, replaces all of that.
     """
 
     name: str
@@ -51,6 +76,7 @@ class Workload:
     duration: int = 300 * NANOSECONDS
     period: int = NANOSECONDS
     arrivals: tuple[Arrival, ...] = field(default=())
+    segments: tuple[Segments, ...] = field(default=())
 
     def __post_init__(self) -> None:
         """Refuse a workload of nothing."""
@@ -83,10 +109,15 @@ class Workload:
 
         Raises SchedulerError for a workload that lists its tasks, which are its edges' own.
         """
-        if self.arrivals:
+        if self.is_listed:
             raise SchedulerError(f"{self.name} lists its tasks, so its edges are its own")
         name = f"{self.name} on {edges} edges"
         return replace(self, name=name, drones=self.drones * edges // self.edges, edges=edges)
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether tasks or segments are listed, so that drones and edges cannot be changed."""
+        return bool(self.arrivals or self.segments)
 
     def lasting(self, duration: int) -> Workload:
         """The same for another duration."""
@@ -106,15 +137,7 @@ class Workload:
                 )
                 for number, a in enumerate(self.arrivals_at(edge))
             ]
-        phases = {
-            f"drone{drone}": draw.randrange(self.period)
-            for drone in range(edge, self.drones, self.edges)
-        }
-        segments = sorted(
-            (start, name, start // self.period)
-            for name, phase in phases.items()
-            for start in range(phase, self.duration, self.period)
-        )
+        segments = self._traced(edge, draw) if self.segments else self._flown(edge, draw)
         profiles = list(self.models.values())
         tasks: list[Task] = []
         for at, name, segment in segments:
@@ -124,6 +147,30 @@ class Workload:
                 for number, profile in enumerate(profiles, len(tasks))
             ]
         return tasks
+
+    def _flown(self, edge: int, draw: random.Random) -> list[tuple[int, str, int]]:
+        """When each segment comes, its source, and its number there; in order."""
+        phases = {
+            f"drone{drone}": draw.randrange(self.period)
+            for drone in range(edge, self.drones, self.edges)
+        }
+        return sorted(
+            (start, name, start // self.period)
+            for name, phase in phases.items()
+            for start in range(phase, self.duration, self.period)
+        )
+
+    def _traced(self, edge: int, draw: random.Random) -> list[tuple[int, str, int]]:
+        """The same of a trace."""
+        times = sorted(
+            (at, one.source)
+            for one in self.segments
+            if one.edge == edge
+            for at in one.times(draw)
+            if at < self.duration
+        )
+        numbers = defaultdict[str, Iterator[int]](count)
+        return [(at, source, next(numbers[source])) for at, source in times]
 
     def arrivals_at(self, edge: int) -> list[Arrival]:
         """The listed tasks of one edge, in the order in which `tasks` numbers them."""

@@ -45,14 +45,14 @@ class TracePlayer:
     def apply(self, seconds: float) -> None:
         """Give the links the shape that they have `seconds` into the trace."""
         stamp = round(seconds % self._duration * NANOSECONDS)
-        out = self._network.out_at(stamp)
         rate = self._network.bandwidth_at(stamp)
+        out = self._network.out_at(stamp) or rate == 0
         latency = self._network.latency_at(stamp) / NANOSECONDS
         for name, plain in self._plain.items():
             shape = replace(
                 plain,
                 rtt=plain.rtt + latency,
-                bandwidth=plain.bandwidth if rate is None else rate * 8,
+                bandwidth=rate * 8 if rate else plain.bandwidth,
             )
             if shape != self._cluster.far[name].shape:
                 self._cluster.shape(name, shape)

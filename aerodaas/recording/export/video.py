@@ -19,7 +19,7 @@ from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Frame
 from aerodaas.types.errors import RecordingError
 
-__all__ = ["write_videos"]
+__all__ = ["VideoFile", "write_videos"]
 
 _TICKS = 90_000
 """Units of the video's clock per second, as in MPEG."""
@@ -42,7 +42,7 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
     Raises:
         RecordingError: If the recording has no images, or a file exists or cannot be created.
     """
-    writers: dict[str, _Video] = {}
+    writers: dict[str, VideoFile] = {}
     found = detections_by_frame(recording) if overlays else {}
     flight = RecordedFlight.read(recording)
     try:
@@ -50,7 +50,7 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
             source = frame.header.source
             if source not in writers:
                 path = new_file(folder / f"{file_name(source) or 'camera'}.mp4")
-                writers[source] = _Video(path, frame)
+                writers[source] = VideoFile(path, frame)
             image = frame.image
             if overlays:
                 image = image.copy()
@@ -74,7 +74,7 @@ def _caption(flight: RecordedFlight, frame: Frame) -> str:
     return f"{now:.1f} s  {state}"
 
 
-class _Video:
+class VideoFile:
     """Writer of one MP4 file."""
 
     def __init__(self, path: Path, first: Frame) -> None:
@@ -86,9 +86,10 @@ class _Video:
         self._frame = av.VideoFrame
         self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
         # H.264 halves the colours' resolution, hence sizes must be even.
-        self._size = first.width // 2 * 2, first.height // 2 * 2
+        self.size = first.width // 2 * 2, first.height // 2 * 2
+        """Width and height in pixels."""
         stream = self._container.add_stream("libx264", options=_QUALITY)
-        stream.width, stream.height = self._size
+        stream.width, stream.height = self.size
         stream.pix_fmt = "yuv420p"
         stream.time_base = stream.codec_context.time_base = Fraction(1, _TICKS)
         self._stream: Any = stream
@@ -100,7 +101,7 @@ class _Video:
 
         A gap of hours, as a false time makes, is shortened to a second.
         """
-        width, height = self._size
+        width, height = self.size
         ticks = (stamp - self._start) * _TICKS // NANOSECONDS
         if ticks <= self._last or image.shape[0] < height or image.shape[1] < width:
             return
@@ -127,6 +128,6 @@ class _Video:
                 self._container.mux(packet)
         except (self._error, ValueError) as error:
             raise RecordingError(
-                f"cannot write {self.path}: the encoder refuses pictures of {self._size[0]} x "
-                f"{self._size[1]} pixels, or their times ({error})"
+                f"cannot write {self.path}: the encoder refuses pictures of {self.size[0]} x "
+                f"{self.size[1]} pixels, or their times ({error})"
             ) from None

@@ -1,0 +1,1 @@
+"""`aerodaas lab leaderboard`: schedulers ranked on one fixed set of cases."""

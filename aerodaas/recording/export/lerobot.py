@@ -1,0 +1,308 @@
+"""Export of flights as LeRobot datasets (format v3.0), to train policies from.
+
+One episode a flight: what the cameras saw, the vehicle's state, and the velocity that was sent to
+it after all limits. https://huggingface.co/docs/lerobot/lerobot-dataset-v3 describes the format.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.recording.export.lerobot_tables import write_tables
+from aerodaas.recording.export.output import file_name, new_file
+from aerodaas.recording.export.video import VideoFile
+from aerodaas.recording.pictures import frames, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.rotation import from_rpy
+from aerodaas.recording.states import state_of
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import RecordingError
+
+__all__ = ["ACTION", "STATE", "write_lerobot"]
+
+STATE = (
+    *("position.east", "position.north", "position.up"),
+    *("velocity.east", "velocity.north", "velocity.up"),
+    *("attitude.x", "attitude.y", "attitude.z", "attitude.w"),
+)
+"""Metres and metres per second, local ENU; attitude of the body (FLU) in ENU as a quaternion."""
+ACTION = ("velocity.east", "velocity.north", "velocity.up", "yaw_rate")
+"""Metres per second, local ENU; radians per second, counter-clockwise."""
+
+_CHUNK = "chunk-000/file-000"
+_MOST_FRAMES = 1_000_000
+_FASTEST = 240
+"""Frames per second."""
+_STALE = NANOSECONDS
+"""After which a setpoint is no longer in force; a flight sends twenty each second."""
+_SAMPLES = 100
+"""Pictures from which the statistics of a camera's pixels are made, at most."""
+_SAMPLE_WIDTH = 160
+"""Pixels to which they are scaled before."""
+
+_Floats = NDArray[np.float32]
+_Stamps = NDArray[np.int64]
+
+
+def write_lerobot(recording: Recording, folder: Path, *, task: str) -> list[Path]:
+    """Write a LeRobot dataset of one episode for each robot with a camera.
+
+    Rows come at the cameras' rate (the median of the fastest one's, in whole frames per second):
+    each has the newest picture of each camera and the newest state up to then, and the velocity
+    setpoint in force: as sent, after all limits, zero where none was sent for a second. Where a
+    place was sent instead, it is the velocity straight there, at the speed asked for or else flown.
+
+    Args:
+        recording: An open recording.
+        folder: Folder of the datasets, which are folders themselves.
+        task: What the robot was to do, as LeRobot's policies are told.
+
+    Returns:
+        The datasets.
+
+    Raises:
+        RecordingError: If no robot has pictures and states, pyarrow is missing, or a dataset
+            exists or cannot be written.
+    """
+    if not task.strip():
+        raise RecordingError(
+            "a LeRobot dataset needs its task in words, such as 'survey the field'"
+        )
+    robots = _robots(recording)
+    episodes = [
+        (robot, cameras, episode)
+        for robot, cameras in sorted(robots.items())
+        if (episode := _episode(recording, robot, cameras)) is not None
+    ]
+    if not episodes:
+        raise RecordingError(
+            f"{recording.path} has no robot with states and two pictures or more; were they off?"
+        )
+    stem = f"{recording.path.stem}_lerobot"
+    written = []
+    for robot, cameras, episode in episodes:
+        name = stem if len(episodes) == 1 else f"{stem}_{file_name(robot)}"
+        path = new_file(folder / name)
+        try:
+            for camera in _filmed(recording, path, cameras, episode):
+                episode.cameras[camera.key] = camera
+            write_tables(path, task, episode.columns(), episode.features(), episode.fps)
+        except OSError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror}") from None
+        written.append(path)
+    return written
+
+
+@dataclass
+class _Camera:
+    """A camera's video, and what its pixels are like."""
+
+    key: str
+    video: VideoFile
+    last: NDArray[np.uint8]
+    """The newest picture."""
+    start: int
+    """Mission nanoseconds at which its video begins."""
+    fps: int
+    rows: int
+    frames: int = 0
+    """Written so far."""
+    samples: list[_Floats] = field(default_factory=list)
+
+    def fill(self, until: int) -> None:
+        """Show the newest picture in all rows before this one that show none yet."""
+        while self.frames < until:
+            self._add(self.last)
+
+    def _add(self, image: NDArray[np.uint8]) -> None:
+        width, height = self.video.size
+        if image.shape[0] < height or image.shape[1] < width:
+            # A camera that has become smaller; a video has one size.
+            image = np.asarray(cv2.resize(image, (width, height)), np.uint8)
+        self.video.add(image, self.start + self.frames * NANOSECONDS // self.fps)
+        if self.frames % -(-self.rows // _SAMPLES) == 0:
+            small = (_SAMPLE_WIDTH, max(1, round(height * _SAMPLE_WIDTH / width)))
+            pixels = cv2.resize(image, small, interpolation=cv2.INTER_AREA)
+            self.samples.append(pixels[..., ::-1].reshape(-1, 3).astype(np.float32) / 255)
+        self.frames += 1
+
+
+@dataclass
+class _Episode:
+    """Rows of an episode, and its cameras once they are written."""
+
+    fps: int
+    stamps: _Stamps
+    """Mission nanoseconds of the rows."""
+    state: _Floats
+    """N x 10."""
+    action: _Floats
+    """N x 4."""
+    cameras: dict[str, _Camera] = field(default_factory=dict)
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """What statistics are made of, by feature; N x values, of cameras the pixels' samples."""
+        count = len(self.stamps)
+        index = np.arange(count, dtype=np.int64)[:, None]
+        zero = np.zeros((count, 1), np.int64)
+        return {
+            "observation.state": self.state,
+            "action": self.action,
+            "timestamp": (index / self.fps).astype(np.float32),
+            "frame_index": index,
+            "episode_index": zero,
+            "index": index,
+            "task_index": zero,
+            **{key: np.concatenate(one.samples) for key, one in self.cameras.items()},
+        }
+
+    def features(self) -> dict[str, dict[str, Any]]:
+        """Features as `info.json` describes them."""
+        numbers = ("frame_index", "episode_index", "index", "task_index")
+        found: dict[str, dict[str, Any]] = {
+            "observation.state": _feature("float32", STATE),
+            "action": _feature("float32", ACTION),
+            "timestamp": _feature("float32"),
+            **{name: _feature("int64") for name in numbers},
+        }
+        for key, camera in self.cameras.items():
+            width, height = camera.video.size
+            found[key] = {
+                "dtype": "video",
+                "shape": [height, width, 3],
+                "names": ["height", "width", "channels"],
+                "info": {
+                    "video.height": height,
+                    "video.width": width,
+                    "video.codec": "h264",
+                    "video.pix_fmt": "yuv420p",
+                    "video.is_depth_map": False,
+                    "video.fps": self.fps,
+                    "video.channels": 3,
+                    "has_audio": False,
+                },
+            }
+        return found
+
+
+def _feature(dtype: str, names: Sequence[str] = ()) -> dict[str, Any]:
+    return {"dtype": dtype, "shape": [len(names) or 1], "names": list(names) or None}
+
+
+def _robots(recording: Recording) -> dict[str, dict[str, list[int]]]:
+    """Capture times of each robot's cameras, ascending; of none that has a single picture."""
+    found: dict[str, dict[str, set[int]]] = defaultdict(lambda: defaultdict(set))
+    for shot in shots(recording):
+        robot, slash, _ = shot.header.source.partition("/")
+        if slash:
+            found[robot][shot.header.source].add(shot.header.stamp)
+    several = {
+        robot: {source: sorted(stamps) for source, stamps in cameras.items() if len(stamps) > 1}
+        for robot, cameras in found.items()
+    }
+    return {robot: cameras for robot, cameras in several.items() if cameras}
+
+
+def _episode(recording: Recording, robot: str, cameras: dict[str, list[int]]) -> _Episode | None:
+    states: dict[int, list[float]] = {}
+    for record in recording.records(schemas=("aerodaas.VehicleState",)):
+        if record.value["robot"] == robot:
+            state = state_of(record.value)
+            pose = state.odometry
+            turned = from_rpy(pose.roll, pose.pitch, pose.yaw)
+            values = [*pose.position, *pose.velocity, *turned]
+            if all(map(math.isfinite, values)):
+                states[state.stamp] = values
+    if not states:
+        return None
+    times = np.array(sorted(states), np.int64)
+    gap = min(float(np.median(np.diff(stamps))) for stamps in cameras.values())
+    fps = min(max(round(NANOSECONDS / gap), 1), _FASTEST)
+    begin = max(int(times[0]), *(stamps[0] for stamps in cameras.values()))
+    end = min(int(times[-1]), *(stamps[-1] for stamps in cameras.values()))
+    count = (end - begin) * fps // NANOSECONDS + 1
+    if count <= 1:
+        return None
+    if count > _MOST_FRAMES:
+        raise RecordingError(f"{robot} has {count} frames, more than {_MOST_FRAMES}")
+    stamps = begin + np.arange(count, dtype=np.int64) * NANOSECONDS // fps
+    newest = times[np.searchsorted(times, stamps, side="right") - 1]
+    rows = np.array([states[int(at)] for at in newest], np.float32)
+    return _Episode(fps, stamps, rows, _actions(recording, robot, stamps, rows))
+
+
+def _actions(recording: Recording, robot: str, stamps: _Stamps, states: _Floats) -> _Floats:
+    """What was sent and in force at each row, N x 4."""
+    sent: dict[int, dict[str, Any] | None] = {}
+    for record in recording.records(schemas=("aerodaas.Setpoint",)):
+        if record.value["robot"] == robot:
+            sent[record.value["stamp"]] = record.value["sent"]
+    actions = np.zeros((len(stamps), len(ACTION)), np.float32)
+    times = np.array(sorted(sent), np.int64)
+    if not len(times):
+        return actions
+    for row, place in enumerate(np.searchsorted(times, stamps, side="right") - 1):
+        if place >= 0 and stamps[row] - times[place] < _STALE:
+            setpoint = sent[int(times[place])]
+            actions[row] = np.nan_to_num(_action(setpoint, states[row, :3], states[row, 3:6]))
+    return actions
+
+
+def _action(setpoint: dict[str, Any] | None, position: _Floats, velocity: _Floats) -> list[float]:
+    if setpoint is None:
+        return [0.0] * len(ACTION)
+    if setpoint["kind"] == "velocity":
+        return [*_axes(setpoint["velocity"]), _number(setpoint["yaw_rate"])]
+    way = np.array(_axes(setpoint["position"])) - position
+    distance = float(np.linalg.norm(way))
+    asked = setpoint["speed"]
+    speed = float(np.linalg.norm(velocity)) if asked is None else float(asked)
+    return [*(way / max(distance, 1e-9) * min(speed, distance)).tolist(), 0.0]
+
+
+def _axes(vector: dict[str, float | None]) -> list[float]:
+    return [_number(vector[axis]) for axis in "xyz"]
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _filmed(
+    recording: Recording, path: Path, cameras: dict[str, list[int]], episode: _Episode
+) -> list[_Camera]:
+    """Write the cameras' videos: for each row the newest picture up to then that can be decoded."""
+    rows = len(episode.stamps)
+    made: dict[str, _Camera] = {}
+    try:
+        for frame in frames(recording):
+            source = frame.header.source
+            if source not in cameras:
+                continue
+            if source not in made:
+                key = f"observation.images.{file_name(source.partition('/')[2]) or 'camera'}"
+                file = new_file(path / "videos" / key / f"{_CHUNK}.mp4")
+                made[source] = _Camera(
+                    key, VideoFile(file, frame), frame.image, frame.header.stamp, episode.fps, rows
+                )
+            first = int(np.searchsorted(episode.stamps, frame.header.stamp))
+            made[source].fill(first)
+            made[source].last = frame.image
+        if len(made) < len(cameras):
+            raise RecordingError(f"{recording.path}: no picture of a camera can be decoded")
+        for camera in made.values():
+            camera.fill(rows)
+            camera.video.finish()
+    finally:
+        for camera in made.values():
+            camera.video.close()
+    return list(made.values())

@@ -1,0 +1,280 @@
+"""Networks and arrivals from files in the formats of public traces."""
+
+from __future__ import annotations
+
+import random
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from aerodaas.cli.lab_study import workload_of
+from aerodaas.schedulers.analytics.base import MILLISECOND
+from aerodaas.schedulers.lab import Network, read_arrivals, run_lab
+from aerodaas.schedulers.lab.network_trace import read_bandwidth
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import SchedulerError
+
+SECOND = NANOSECONDS
+MBIT = 125_000
+
+GHENT = """\
+1453121790686 39287 51.05 3.73 2493100 1000
+1453121791687 40288 51.05 3.73 0 1001
+1453121792686 41287 51.05 3.73 2728896 0999
+"""
+CORK = """\
+Timestamp,Longitude,Latitude,State,DL_bitrate,UL_bitrate
+2019.12.14_10.16.30,-8.39,51.88,D,1000,5
+2019.12.14_10.16.30,-8.39,51.88,D,3000,5
+2019.12.14_10.16.32,-8.39,51.88,I,0,5
+2019.12.14_10.16.33,-,-,D,8000,5
+"""
+AZURE = """\
+HashOwner,HashApp,HashFunction,Trigger,1,2,3
+o1,a1,f1aa,http,2,0,1
+o1,a1,f2bb,timer,0,3,0
+"""
+
+
+def written(folder: Path, text: str | bytes, name: str = "trace.log") -> Path:
+    """A file with this text."""
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def rates(path: Path, seconds: list[float]) -> list[float]:
+    """Mbit/s at these times of a run of ten seconds."""
+    network = Network.named(f"trace:{path}", 10 * SECOND)
+    return [(network.bandwidth_at(round(at * SECOND)) or 0) / MBIT for at in seconds]
+
+
+def test_mahimahi_counts_packets_and_begins_anew(tmp_path: Path) -> None:
+    """Four packets in 100 ms are 480 kbit/s; none in the next; over after 250 ms."""
+    path = written(tmp_path, "1\n1\n50\n100\n201\n250\n")
+    found = rates(path, [0, 0.15, 0.22, 0.26, 0.4])
+    assert found == pytest.approx([0.48, 0, 0.48, 0.48, 0])
+
+
+def test_a_steady_mahimahi_trace_is_one_rate(tmp_path: Path) -> None:
+    """A packet a millisecond is 12 Mbit/s, however long the run."""
+    path = written(tmp_path, "1\n")
+    assert read_bandwidth(path, 86_400 * SECOND) == ((0, 1_500_000.0),)
+
+
+def test_a_cooked_trace_gives_each_rate_up_to_its_time(tmp_path: Path) -> None:
+    """As Pensieve plays it: the first line only begins; then again from the second."""
+    path = written(tmp_path, "100.0 9\n101.0 2.5\n103.0\t0.5\n")
+    assert rates(path, [0, 0.9, 1.1, 2.9, 3.1, 4.5]) == [2.5, 2.5, 0.5, 0.5, 2.5, 0.5]
+
+
+def test_ghents_logs_divide_bytes_by_milliseconds(tmp_path: Path) -> None:
+    """The columns five and six; a second without a byte has no bandwidth."""
+    path = written(tmp_path, GHENT)
+    found = rates(path, [0.5, 1.5, 2.5, 3.5])
+    assert found == pytest.approx([19.9448, 0, 21.853, 19.9448], abs=1e-3)
+
+
+def test_corks_logs_are_read_by_their_columns(tmp_path: Path) -> None:
+    """The mean of a second, kept until the next row; the other columns do not matter."""
+    path = written(tmp_path, CORK)
+    assert rates(path, [0, 1.9, 2.5, 3.5, 4.5]) == [2, 2, 0, 8, 2]
+
+
+def test_what_is_sent_into_no_bandwidth_waits_for_it(tmp_path: Path) -> None:
+    """At 1.1 s, 0.9 s of nothing and then 40 kB at 8 Mbit/s."""
+    path = written(tmp_path, "0 1\n1 8\n2 0\n3 8\n")
+    network = Network.named(f"trace:{path}", 10 * SECOND)
+    nominal = 500 * MILLISECOND
+    taken = network.cloud_time(nominal, 1100 * MILLISECOND)
+    assert taken == nominal + (900 + 40 - 32) * MILLISECOND
+
+
+def test_without_bandwidth_until_the_end_it_is_lost() -> None:
+    """An execution that cannot begin never ends."""
+    network = Network(bandwidth=((0, 1e6), (SECOND, 0.0)))
+    assert network.cloud_time(SECOND, 2 * SECOND) is None
+    assert network.cloud_time(SECOND, 0) is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "nothing in it"),
+        (" \n\n", "nothing in it"),
+        ("5\n4\n", "line 2: milliseconds must not descend"),
+        ("5\nx\n", "line 2: 'x' is no whole number"),
+        ("5\n-6\n", "line 2: '-6' is no whole number"),
+        ("5\n\n\n6 7\n", "line 4: 2 columns, where the first line has 1"),
+        ("0\n0\n", "spans no time"),
+        ("9" * 20 + "\n", "line 1: .* no whole number of up to 15"),
+        ("999999999999\n", "line 1: the trace is longer than a day"),
+        ("1 2 3\n", "not 3 columns"),
+        ("0 1\n", "a single line measures nothing"),
+        ("0 1\n0 2\n", "line 2: times must ascend"),
+        ("0 1\n1 nan\n", "line 2: 'nan'"),
+        ("0 1\n1 inf\n", "line 2: 'inf'"),
+        ("0 1\n1 -3\n", "line 2: '-3'"),
+        ("0 1\n1 1e300\n", "line 2: '1e300'"),
+        ("0 1\ninf 2\n", "line 2: 'inf'"),
+        ("0 1\n1e15 2\n", "line 2: times must ascend, by 400 days"),
+        ("0 1\n1 0\n", "no line has any bandwidth"),
+        (GHENT.replace(" 40288 ", " 39287 "), "line 2: milliseconds since the start"),
+        (GHENT.replace("2493100 1000", "2493100 0"), "line 1: 2493100 bytes in no time"),
+        (GHENT.replace("51.05", "north"), "line 1: 'north' is no number"),
+        (CORK.replace("2019.12.14_10.16.33", "2019.12.14_10.16.31"), "line 5: times must not"),
+        (CORK.replace("2019.12.14_10.16.33", "noon"), "line 5: 'noon' is no time"),
+        (CORK.replace(",D,8000,5", ""), "line 5: 3 columns"),
+        (CORK.replace(",8000,", ",-,"), "line 5: '-' is no number"),
+        (CORK.splitlines()[0], "a heading and nothing else"),
+        ("0,1\n1,nan\n", "line 2: 'nan'"),
+        ("0,1\n0,2\n", "line 2: seconds must ascend"),
+        ("0,1\n1,0\n", "line 2: each Mbit/s must be positive"),
+        ("seconds,mbps\n", "a heading and nothing else"),
+        (b"\xff\xfe\x00", "is text"),
+    ],
+)
+def test_a_bad_network_is_told_with_its_line(tmp_path: Path, text: str | bytes, told: str) -> None:
+    """What is wrong, and where."""
+    with pytest.raises(SchedulerError, match=rf"trace\.log.*{told}"):
+        read_bandwidth(written(tmp_path, text), SECOND)
+
+
+def test_a_huge_network_is_refused_unread(tmp_path: Path) -> None:
+    """65 MiB, of which the disk holds nothing."""
+    path = tmp_path / "huge.log"
+    with path.open("wb") as file:
+        file.truncate(65 * 2**20)
+    with pytest.raises(SchedulerError, match="at most 64 MiB"):
+        read_bandwidth(path, SECOND)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.one_of(
+        st.text(alphabet="0123456789. ,-eEnaif\n\t", max_size=60),
+        st.lists(st.integers(0, 400), min_size=1, max_size=30).map(
+            lambda values: "\n".join(map(str, sorted(values)))
+        ),
+        st.text(max_size=40),
+    )
+)
+def test_any_text_is_a_network_or_an_error(tmp_path: Path, text: str) -> None:
+    """Times ascend from the start, no rate is negative or infinite; packets are all there."""
+    path = written(tmp_path, text.encode("utf-8", "replace"))
+    try:
+        points = read_bandwidth(path, SECOND)
+    except SchedulerError as error:
+        assert str(path) in str(error)  # noqa: PT017 - either is right
+        return
+    stamps = [stamp for stamp, _ in points]
+    assert stamps == sorted(set(stamps))
+    assert all(0 <= rate < float("inf") for _, rate in points)
+
+
+@given(st.lists(st.integers(1, 3000), min_size=1, max_size=200))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_mahimahi_loses_no_packet(tmp_path: Path, stamps: list[int]) -> None:
+    """Bandwidth over the trace's length is 1500 bytes for each line."""
+    stamps.sort()
+    path = written(tmp_path, "\n".join(map(str, stamps)))
+    points = list(read_bandwidth(path, SECOND))
+    end = stamps[-1] * MILLISECOND
+    points = [point for point in points if point[0] < end] + [(end, 0.0)]
+    sent = sum((after - at) / SECOND * rate for (at, rate), (after, _) in pairwise(points))
+    assert sent == pytest.approx(1500 * len(stamps))
+
+
+def test_a_csv_of_times_is_a_workload(tmp_path: Path) -> None:
+    """A segment at each, with a task for each of the six models; sources keep their numbers."""
+    path = written(tmp_path, "seconds,source,edge\n0.5,a,0\n0.5,b,1\n2.25,a,0\n")
+    workload = read_arrivals(str(path))
+    tasks = workload.tasks(0, random.Random(0))
+    assert (workload.edges, workload.duration) == (2, 3 * SECOND)
+    assert [task.arrival / SECOND for task in tasks] == [0.5] * 6 + [2.25] * 6
+    assert [task.segment for task in tasks[::6]] == [0, 1]
+    assert {task.profile.model for task in tasks[:6]} == set(workload.models)
+    assert {task.source for task in workload.tasks(1, random.Random(0))} == {"b"}
+
+
+def test_times_without_a_heading_and_with_models(tmp_path: Path) -> None:
+    """A single column is seconds; a row that names its model is one task."""
+    plain = read_arrivals(str(written(tmp_path, "0.5\n1\n")))
+    assert len(plain.tasks(0, random.Random(0))) == 12
+    named = read_arrivals(str(written(tmp_path, "seconds,model\n0.5,HV\n1,DEO\n")))
+    assert [one.profile.model for one in named.tasks(0, random.Random(0))] == ["HV", "DEO"]
+
+
+def test_invocations_come_within_their_minute(tmp_path: Path) -> None:
+    """As many as were counted, at times of the seed; one function alone if it is named."""
+    path = written(tmp_path, AZURE, "azure.csv")
+    workload = workload_of(f"trace:{path}", None, None)
+    tasks = workload.tasks(0, random.Random(1))
+    minutes = [task.arrival // (60 * SECOND) for task in tasks[::6]]
+    assert minutes == [0, 0, 1, 1, 1, 2]
+    again, other = (workload.tasks(0, random.Random(seed)) for seed in (1, 2))
+    assert [one.arrival for one in again] == [one.arrival for one in tasks]
+    assert [one.arrival for one in other] != [one.arrival for one in tasks]
+    one = workload_of(f"trace:{path}@f1", 60.0, None)
+    assert {task.source for task in one.tasks(0, random.Random(0))} == {"f1aa"}
+    assert (len(one.tasks(0, random.Random(0))), one.duration) == (12, 60 * SECOND)
+
+
+def test_the_lab_runs_a_trace_on_a_trace(tmp_path: Path) -> None:
+    """Arrivals and network of files; all tasks are accounted for."""
+    load = read_arrivals(str(written(tmp_path, AZURE, "azure.csv")))
+    network = Network.named(f"trace:{written(tmp_path, GHENT)}", load.duration)
+    result = run_lab(load, ["dems"], [0], network=network, jobs=1)
+    score = result.scores["dems"][0]
+    assert score.tasks == 36 == score.done + score.late + score.dropped
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "nothing in it"),
+        ("seconds\n", "no time of it is in the run"),
+        ("when,where\n1,2\n", "line 1: there is no column `seconds`"),
+        ("seconds\n1\nnan\n", "line 3: 'nan' is no time"),
+        ("seconds\n1\ninf\n", "line 3: 'inf' is no time"),
+        ("seconds\n-1\n", "line 2: '-1' is no time"),
+        ("seconds\n2\n1\n", "line 3: seconds must not descend"),
+        ("seconds\nx\n", "line 2: 'x' is no number"),
+        ("seconds,edge\n1,-1\n", "line 2: '-1' is no whole number"),
+        ("seconds,edge\n1\n", "line 2: 1 columns"),
+        ("seconds,model\n1,nope\n", "line 2: no model 'nope'"),
+        ("seconds\n" + "1\n" * 200_001, "more than 200,000 arrivals"),
+        (AZURE.replace(",1,2,3\n", ",1,2,4\n"), "line 1: minutes must be"),
+        (AZURE.replace("http,2,0,1", "http,2,0"), "line 2: 6 columns"),
+        (AZURE.replace("http,2,0,1", "http,2,0.5,1"), "line 2: '0.5' is no whole number"),
+        (AZURE.replace("http,2,0,1", "http,999999,0,1"), "more than 200,000 arrivals"),
+        (AZURE.splitlines()[0], "no invocation of any function"),
+        (b"\xff\xfe\x00", "is text"),
+    ],
+)
+def test_bad_arrivals_are_told_with_their_line(
+    tmp_path: Path, text: str | bytes, told: str
+) -> None:
+    """What is wrong, and where."""
+    with pytest.raises(SchedulerError, match=rf"trace\.log.*{told}"):
+        read_arrivals(str(written(tmp_path, text)))
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.one_of(st.text(alphabet='0123456789.,-en"\n', max_size=60), st.text(max_size=40)))
+def test_any_text_is_a_workload_or_an_error(tmp_path: Path, text: str) -> None:
+    """With a heading or without; tasks come in order and within the run."""
+    for heading in ("", "seconds\n", "seconds,edge\n", "HashFunction,1,2\n"):
+        path = written(tmp_path, (heading + text).encode("utf-8", "replace"))
+        try:
+            load = read_arrivals(str(path))
+        except SchedulerError as error:
+            assert str(path) in str(error)  # noqa: PT017 - either is right
+            continue
+        if load.duration < 10**6 * SECOND:
+            stamps = [task.arrival for task in load.tasks(0, random.Random(0))]
+            assert stamps == sorted(stamps)
+            assert all(0 <= stamp < load.duration for stamp in stamps)
