@@ -567,7 +567,8 @@ def test_each_command_names_the_box_that_it_was_made_from(monkeypatch: pytest.Mo
         world.fly(VelocityCommand())
         return None if command is None else command.target, found
 
-    for _ in range(20):
+    target, found = told()
+    for _ in range(19):
         target, found = told()
     assert target is not None
     assert (target.state, target.track_id) == (TargetState.SURE, follow.target)
