@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from statistics import fmean
 from typing import Any
 
@@ -200,7 +201,6 @@ def run_leaderboard(
     total = len(CASES) * extent.seeds
     results: dict[str, LabResult] = {}
     for number, case in enumerate(CASES):
-        before = number * extent.seeds
         load = Workload.named(case.workload, extent.seconds * NANOSECONDS)
         results[case.name] = run_lab(
             load,
@@ -211,11 +211,16 @@ def run_leaderboard(
             resources=Resources(cloud_slots=case.cloud_slots),
             jobs=jobs,
             spread=spread,
-            progress=(lambda done, _, before=before: progress(before + done, total))
-            if progress
-            else None,
+            progress=partial(_told, progress, number * extent.seeds, total),
         )
     return Leaderboard(extent, _standings([scheduler_label(one) for one in schedulers], results))
+
+
+def _told(
+    progress: Callable[[int, int], None] | None, before: int, total: int, done: int, _: int
+) -> None:
+    if progress is not None:
+        progress(before + done, total)
 
 
 def _standings(names: Sequence[str], results: dict[str, LabResult]) -> tuple[Standing, ...]:
