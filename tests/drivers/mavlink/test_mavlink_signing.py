@@ -125,11 +125,53 @@ def test_timestamps_count_hundred_thousandths_since_2015() -> None:
     assert (before - epoch) * 1e5 - 1 <= stamp <= (after - epoch) * 1e5
 
 
-def test_two_runs_within_a_tick_are_no_replay_of_each_other(
+class Clock:
+    """Time that passes by a tick with each look."""
+
+    now = 2_000_000_000.0
+
+    def __call__(self) -> float:
+        """The next tick."""
+        Clock.now += 1e-5
+        return Clock.now
+
+
+def test_a_hundred_runs_are_one_stream_to_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It remembers sixteen until it is started again; each run begins after the one before."""
+    monkeypatch.setattr("time.time", Clock())
+    vehicle = sender(KEY)
+    for _ in range(100):
+        assert vehicle.decode(packet(KEY)).get_type() == "HEARTBEAT"
+    assert len(vehicle.signing.stream_timestamps) == 1
+
+
+def test_two_processes_at_once_are_no_replay_of_each_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Their link ids differ, as their process ids do; an id has one byte: 1000 is 3 * 256 + 232."""
-    for process, link in ((1000, 232), (1001, 233), (255, 255), (256, 0)):
-        monkeypatch.setattr("os.getpid", lambda process=process: process)
-        assert sender(KEY).signing.link_id == link
-        assert packet(KEY)[-13] == link
+    """A flight goes on being heard while the vehicle is looked at beside it, one packet each."""
+    monkeypatch.setattr("time.time", Clock())
+    vehicle, flight = sender(KEY), sender(KEY)
+    look = sender(KEY)
+    for _ in range(50):
+        for one in (flight, look, look, flight):
+            assert vehicle.decode(bytearray(BEAT.pack(one))).get_type() == "HEARTBEAT"
+
+
+def test_a_vehicle_whose_clock_is_ahead_is_caught_up_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is signed after one of its packets is newer than that, though the clock is behind."""
+    monkeypatch.setattr("time.time", Clock())
+    vehicle, ours = sender(KEY), sender(KEY)
+    vehicle.signing.timestamp = ahead = ours.signing.timestamp + 3600 * 100_000
+    ours.decode(bytearray(BEAT.pack(vehicle)))
+    assert ours.signing.timestamp >= ahead
+    before = ours.signing.timestamp
+    BEAT.pack(ours)
+    assert ours.signing.timestamp == before + 1
+
+
+def test_vehicles_on_one_radio_are_streams_of_their_own() -> None:
+    """Each hears what is signed for the others; an id has one byte."""
+    for vehicle, link in ((1, 1), (255, 255), (256, 0)):
+        mav = mavlink.MAVLink(None, 1, 1)
+        sign_with(mav, KEY, vehicle)
+        assert bytearray(BEAT.pack(mav))[-13] == link

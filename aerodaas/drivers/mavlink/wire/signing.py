@@ -58,14 +58,35 @@ def _key(content: bytes, place: str) -> bytes:
     return key
 
 
+class _Clocked(mavlink.MAVLinkSigning):  # type: ignore[misc]
+    """State of signing whose timestamps are the clock's.
+
+    pymavlink counts on from its start. Of two of our processes that talk to one vehicle, such as a
+    flight and a look at the vehicle's list, the older one's packets would then be replays.
+    """
+
+    _newest = 0
+
+    @property
+    def timestamp(self) -> int:
+        """What the next packet is signed with: never one that was signed or heard before."""
+        return max(self._newest, int((time.time() - _EPOCH) * _TICKS))
+
+    @timestamp.setter
+    def timestamp(self, value: int) -> None:
+        self._newest = value
+
+
 def sign_with(mav: Any, key: bytes, vehicle: int = 0) -> None:  # noqa: ANN401 - pymavlink has no types
-    """Make `mav` sign its packets to the system `vehicle`, and refuse unsigned ones."""
-    signing = mav.signing
+    """Make `mav` sign its packets to the system `vehicle`, and refuse unsigned ones.
+
+    The link id is the same in each run: until it is started again, a vehicle remembers sixteen
+    streams of signed packets (MAVLINK_MAX_SIGNING_STREAMS of the C library), and drops all others.
+    """
+    mav.signing = signing = _Clocked()
     signing.secret_key = key
     signing.sign_outgoing = True
-    signing.timestamp = int((time.time() - _EPOCH) * _TICKS)
-    # Another run within the same clock tick would be rejected as a replay.
-    signing.link_id = (os.getpid() + vehicle) % 256
+    signing.link_id = vehicle % 256
     signing.allow_unsigned_callback = _let_through
 
 
