@@ -132,7 +132,8 @@ class _Camera:
         if self.frames % -(-self.rows // _SAMPLES) == 0:
             small = (_SAMPLE_WIDTH, max(1, round(height * _SAMPLE_WIDTH / width)))
             pixels = cv2.resize(image, small, interpolation=cv2.INTER_AREA)
-            self.samples.append(pixels[..., ::-1].reshape(-1, 3).astype(np.float32) / 255)
+            rows = pixels[..., ::-1].reshape(-1, 3)
+            self.samples.append(np.divide(rows, 255, dtype=np.float32))
         self.frames += 1
 
 
