@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import socket
@@ -187,6 +188,64 @@ def test_a_serial_line_is_raw_at_its_speed(baud: int) -> None:
     assert wire.fileno() == -1
     for end in (master, slave):
         os.close(end)
+
+
+def _numbered(count: int) -> list[bytes]:
+    """Packets of 97 bytes, each of which says which it is."""
+    return [b"<" + f"{number:05}".encode() * 19 + b">" for number in range(count)]
+
+
+def _whole(stream: bytes) -> list[bytes]:
+    """The packets in a stream that has nothing else in it; the last may be without its end."""
+    pieces = [b"<" + piece for piece in stream.split(b"<")[1:]]
+    assert b"".join(pieces) == stream
+    known = set(_numbered(20000))
+    assert set(pieces[:-1]) <= known
+    assert pieces[-1] in {one[: len(pieces[-1])] for one in known}
+    return pieces
+
+
+def test_a_full_serial_line_gets_whole_packets() -> None:
+    """What has no room is dropped whole: half a packet would take the next one with it."""
+    master, slave = os.openpty()
+    wire = open_transport(f"serial:{os.ttyname(slave)}:57600", "a")
+    packets, got = _numbered(3000), b""
+    os.set_blocking(master, False)
+    for number, packet in enumerate(packets):
+        wire.send(packet, ())
+        if number % 300 == 299:
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    got += os.read(master, 1000)
+    received = _whole(got)
+    assert 100 < len(received) < len(packets), "the line was never full"
+    wire.close()
+    for end in (master, slave):
+        os.close(end)
+
+
+def test_a_full_tcp_line_gets_whole_packets() -> None:
+    """The same of a peer that reads too slowly."""
+    with socket.create_server((HOST, 0)) as server:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        server.settimeout(5.0)
+        wire = open_transport(f"tcp:{HOST}:{server.getsockname()[1]}", "a")
+        client = server.accept()[0]
+        client.settimeout(0.2)
+        with socket.socket(fileno=os.dup(wire.fileno())) as same:
+            same.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
+        packets, got = _numbered(20000), b""
+        for part in (packets[:-10], packets[-10:]):
+            for packet in part:
+                wire.send(packet, ())
+            with contextlib.suppress(TimeoutError):
+                while True:
+                    got += client.recv(1 << 20)
+        received = _whole(got)
+        assert received[-1] == packets[-1]
+        assert len(received) < len(packets), "the line was never full"
+        wire.close()
+        client.close()
 
 
 def test_a_serial_device_that_is_pulled_out_is_opened_again(clock: Clock, tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ import socket
 import termios
 import time
 import tty
+from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 from aerodaas.drivers.pin import Peer
@@ -147,8 +149,37 @@ class _Udp:
         self._socket.close()
 
 
+class _Packets:
+    """Whole packets into a stream of bytes that may be full: half of one would spoil the next."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+        """Of a packet whose beginning has been sent."""
+
+    def clear(self) -> None:
+        """Begin anew, on a new stream."""
+        self._rest = b""
+
+    def send(self, packet: bytes, write: Callable[[bytes], int]) -> None:
+        """Send the rest of the packet before, then this one; it is dropped if there is no room.
+
+        `write` returns how many bytes were taken, and raises OSError for none.
+        """
+        for waiting in (self._rest, packet):
+            if not waiting:
+                continue
+            try:
+                taken = write(waiting)
+            except OSError:
+                return
+            self._rest = waiting[taken:] if taken else self._rest
+            if taken < len(waiting):
+                return
+
+
 class _Tcp:
     def __init__(self, host: str, port: int) -> None:
+        self._packets = _Packets()
         self._server: tuple[str, int] = (host, port)
         self._socket: socket.socket | None = self._connected()
         self._tried_at = time.monotonic()
@@ -157,6 +188,7 @@ class _Tcp:
         opened = socket.create_connection(self._server, timeout=_RETRY)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         opened.settimeout(0.0)
+        self._packets.clear()
         # A name may resolve to another host later; it is not the vehicle's.
         self._server = opened.getpeername()[:2]
         return opened
@@ -194,8 +226,7 @@ class _Tcp:
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
         del peers
         if self._socket is not None:
-            with contextlib.suppress(OSError):
-                self._socket.sendall(packet)
+            self._packets.send(packet, self._socket.send)
 
     def close(self) -> None:
         self._drop()
@@ -204,6 +235,7 @@ class _Tcp:
 class _Serial:
     def __init__(self, device: str, baud: int) -> None:
         self._device = device
+        self._packets = _Packets()
         speed = getattr(termios, f"B{baud}", None)
         if speed is None:
             raise OSError(errno.EINVAL, f"{baud} is no speed of a serial line, such as 57600")
@@ -221,6 +253,7 @@ class _Serial:
         except termios.error as error:
             os.close(file)
             raise OSError(*error.args) from None
+        self._packets.clear()
         return file
 
     def fileno(self) -> int:
@@ -248,8 +281,7 @@ class _Serial:
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
         del peers
         if self._file >= 0:
-            with contextlib.suppress(OSError):
-                os.write(self._file, packet)
+            self._packets.send(packet, partial(os.write, self._file))
 
     def close(self) -> None:
         file, self._file = self._file, -1
