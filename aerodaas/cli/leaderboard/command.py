@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -83,7 +84,7 @@ def leaderboard(
         ),
     }
     for name, write in files.items():
-        _writing(out, lambda write=write, name=name: write(out / name))
+        _writing(out, partial(write, out / name))
     Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True)
 
 
