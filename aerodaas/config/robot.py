@@ -71,6 +71,8 @@ class LimitsConfig(Strict):
     """Seconds from a setpoint to the vehicle's answer, kept free before every boundary."""
     separation: NotNegative = 2.0
     """Metres kept from the other drones of the environment; 0 for none."""
+    rangefinder_clearance: NotNegative = 0.0
+    """Metres kept above whatever a rangefinder measures below the drone; 0: it is not heeded."""
     takeoff_height: Positive = 1.5
     takeoff_timeout: Positive = 30.0
     """A take-off that takes longer ends in a landing."""
@@ -105,6 +107,10 @@ class LimitsConfig(Strict):
             f"cruise_speed ({self.cruise_speed:g} m/s) must not exceed max_speed "
             f"({self.max_speed:g} m/s): lower the one or raise the other": self.cruise_speed
             > self.max_speed,
+            f"takeoff_height ({self.takeoff_height:g} m) must be at least rangefinder_clearance "
+            f"({self.rangefinder_clearance:g} m): raise the one or lower the other": (
+                self.takeoff_height < self.rangefinder_clearance
+            ),
             f"takeoff_height ({self.takeoff_height:g} m) must lie between the geofence's floor "
             f"({fence.floor:g} m) and ceiling ({fence.ceiling:g} m)": not (
                 fence.floor <= self.takeoff_height <= fence.ceiling

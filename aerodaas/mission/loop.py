@@ -151,7 +151,8 @@ class SetpointLoop:
     ) -> SetpointRecord:
         duration = _PERIOD if self._before is None else seconds(now - self._before)
         others = [*neighbours, *traffic_neighbours(state, self.mission.limits.traffic)]
-        clamped = self.guard.clamp(asked, state.odometry, duration, others)
+        below = state.below
+        clamped = self.guard.clamp(asked, state.odometry, duration, others, below=below)
         sent = self.vehicle.send(clamped.setpoint)
         names = clamped.clipped_by
         if sent is not clamped.setpoint and not _same(sent, clamped.setpoint):

@@ -74,6 +74,7 @@ _LIMITS: dict[str, Rule] = {
         "max_acceleration",
         "max_range",
         "reaction_time",
+        "rangefinder_clearance",
         "separation",
         "takeoff_height",
         "takeoff_timeout",

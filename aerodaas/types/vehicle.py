@@ -131,6 +131,9 @@ class VehicleState:
     """Where its gimbal looks; None without one, and where it does not say."""
     traffic: tuple[Traffic, ...] = ()
     """Other aircraft that it hears of, the nearest first."""
+    below: float | None = None
+    """Metres straight down to whatever is there, as a rangefinder measures it where the robot's
+    limits need one; None without a fresh reading in its range."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
     video: str = field(default="", repr=False)

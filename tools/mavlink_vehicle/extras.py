@@ -16,6 +16,8 @@ __all__ = ["Extras"]
 
 _UNKNOWN_CELL = 65535
 _NOT_GIVEN = -1
+_RANGE = (20, 1200)
+"""Centimetres that the rangefinder measures, as small lidars do."""
 _ATTITUDE = mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_VELOCITY_VERT
 _HEIGHT = mavlink.ESTIMATOR_POS_VERT_ABS | mavlink.ESTIMATOR_POS_VERT_AGL
 _HORIZONTAL = (
@@ -39,6 +41,7 @@ class Extras:
             mavlink.MAVLINK_MSG_ID_VFR_HUD: self._hud,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self._battery,
             mavlink.MAVLINK_MSG_ID_VIBRATION: self._vibration,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._distance,
         }
         px4 = firmware.number == mavlink.MAV_AUTOPILOT_PX4
         if px4:
@@ -108,6 +111,24 @@ class Extras:
         found: list[int] = [state for most, state in states.items() if left <= most]
         ok: int = mavlink.MAV_BATTERY_CHARGE_STATE_OK
         return found[0] if found else ok
+
+    def _distance(self) -> Any | None:  # noqa: ANN401
+        slope = self._firmware.options.rangefinder
+        if slope is None:
+            return None
+        seen = self._firmware.flight.believed
+        east, _, up = seen.position
+        above = max(0.0, float(up) - slope * max(0.0, float(east)))
+        read = round(100 * above / (math.cos(seen.roll) * math.cos(seen.pitch)))
+        nearest, farthest = _RANGE
+        return mavlink.MAVLink_distance_sensor_message(
+            self._stamp,
+            *(nearest, farthest, min(max(read, nearest - 1), farthest + 1)),
+            mavlink.MAV_DISTANCE_SENSOR_LASER,
+            0,
+            mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+            255,
+        )
 
     def _vibration(self) -> Any:  # noqa: ANN401
         return mavlink.MAVLink_vibration_message(self._stamp * 1000, 0.01, 0.01, 0.1, 0, 0, 0)

@@ -46,6 +46,9 @@ class AutopilotOptions:
     """Whether it carries a camera."""
     remote_id: bool = False
     """Whether it carries a Remote ID transmitter."""
+    rangefinder: float | None = None
+    """How steeply the ground rises to the east as its rangefinder sees it, metres a metre; None: it
+    carries none."""
     actuators: bool = False
     """Whether it carries a gripper, servos, relays and a parachute."""
     components: tuple[int, ...] = ()

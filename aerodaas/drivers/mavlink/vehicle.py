@@ -87,7 +87,8 @@ class MavlinkVehicle:
         self._forget()
 
     def _forget(self) -> None:
-        self._telemetry = Telemetry()
+        limits = self._robot.limits
+        self._telemetry = Telemetry(measures_ground=limits.rangefinder_clearance > 0.0)
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
@@ -149,7 +150,7 @@ class MavlinkVehicle:
             link.adopt(target, found.peer, time.monotonic())
             with self._lock:
                 commander = Commander(link.send, target, self._settings.sender)
-                self._rates = RateKeeper(found.autopilot, commander)
+                self._rates = RateKeeper(found.autopilot, commander, self._report.rates)
                 self._departure = Departure(
                     commander,
                     self._telemetry,
@@ -287,7 +288,7 @@ class MavlinkVehicle:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
-            reasons += self._connection.fallback.objections
+            reasons += self._connection.fallback.objections + self._report.objections(now)
             said = self._connection.autopilot.objections(self._telemetry, now)
             if said and now - self._checked_at > CHECKS:
                 self._checked_at = now

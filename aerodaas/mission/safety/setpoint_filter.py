@@ -29,7 +29,9 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 _FEW = 4
 """Neighbours up to which it takes longer to tell the near ones than to bound by all."""
 _ROUNDING = 1e-3
-"""Metres by which a neighbour is taken to be nearer than it is."""
+"""Metres by which a neighbour is taken to be nearer than it is, and that are no lack of room."""
+_ABOVE = 0.2
+"""Metres over the clearance to which the drone climbs, so that it does not creep up to it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +74,7 @@ class SetpointFilter:
         self._position_setpoints = position_setpoints
         self._yaw_rate = math.radians(limits.max_yaw_rate)
         self._last: Vector | None = None
+        self._below: float | None = None
 
     def clamp(
         self,
@@ -79,9 +82,12 @@ class SetpointFilter:
         odometry: Odometry,
         duration: float,
         neighbours: Iterable[Neighbour] = (),
+        *,
+        below: float | None = None,
     ) -> FilteredSetpoint:
         """Make `setpoint` safe to follow for `duration` seconds from the drone's odometry.
 
+        `below` are metres down to what a rangefinder sees there, None where it sees nothing.
         A setpoint with a number that is not finite becomes standing still (`not_finite`).
         """
         if not _finite(setpoint):
@@ -89,6 +95,7 @@ class SetpointFilter:
             return FilteredSetpoint(VelocitySetpoint(np.zeros(3)), ("not_finite",))
         if not (is_finite(odometry.position) and is_finite(odometry.velocity)):
             return self._blind(setpoint)
+        self._below = below
         if isinstance(setpoint, PositionSetpoint):
             return self._clamp_position(setpoint, odometry, neighbours)
         velocity, names = self._limit(setpoint.velocity)
@@ -182,15 +189,11 @@ class SetpointFilter:
         self, velocity: Vector, odometry: Odometry, neighbours: Iterable[Neighbour]
     ) -> tuple[Vector, list[str]]:
         bounds = self._bounds(velocity, odometry, neighbours)
-        names: list[str] = []
-        if self._clearance is not None:
-            view = self._clearance.view(odometry.position, odometry.velocity, velocity)
-            bounds.append(self._bound("ground", _DOWN, view.room_below(), odometry))
-            slowed = self._over_ground(velocity, view, odometry)
-            if slowed is not velocity:
-                # The other boundaries have the last word: it climbs through no ceiling.
-                velocity = slowed
-                names.append("ground")
+        raised, ground = self._clear_of_ground(velocity, odometry)
+        bounds += ground
+        names = ["ground"] if raised is not velocity else []
+        # The other boundaries have the last word: it climbs through no ceiling.
+        velocity = raised
         sweeps = 4  # alternating projections; scaling down below removes the remainder
         for _ in range(sweeps):
             before = velocity
@@ -207,6 +210,22 @@ class SetpointFilter:
             if closing > bound.speed:
                 velocity = velocity * (bound.speed / closing)
         return velocity, names
+
+    def _clear_of_ground(self, velocity: Vector, odometry: Odometry) -> tuple[Vector, list[_Bound]]:
+        """`velocity`, climbing and slowed down where the ground is too near, and bounds downwards.
+
+        By the terrain, which is known ahead, and by what a rangefinder sees below.
+        """
+        bounds: list[_Bound] = []
+        if self._clearance is not None:
+            view = self._clearance.view(odometry.position, odometry.velocity, velocity)
+            bounds.append(self._bound("ground", _DOWN, view.room_below(), odometry))
+            velocity = self._over_ground(velocity, view, odometry)
+        if self._below is not None and self.limits.rangefinder_clearance > 0.0:
+            room = self._below - self.limits.rangefinder_clearance
+            bounds.append(self._bound("ground", _DOWN, room, odometry))
+            velocity = self._off_ground(velocity, room)
+        return velocity, bounds
 
     def _bounds(
         self, velocity: Vector, odometry: Odometry, neighbours: Iterable[Neighbour]
@@ -278,6 +297,19 @@ class SetpointFilter:
         ways = np.array([neighbour.position for neighbour in neighbours]) - odometry.position
         near = np.einsum("ij,ij->i", ways, ways) <= reach * reach
         return [neighbours[index] for index in np.flatnonzero(near)]
+
+    def _off_ground(self, velocity: Vector, room: float) -> Vector:
+        """`velocity`, climbing where `room` metres below are missing, and slower the more are.
+
+        A rangefinder does not look ahead: at half of its clearance the drone only climbs.
+        """
+        if room >= -_ROUNDING:
+            return velocity
+        limits = self.limits
+        share = max(0.0, 1.0 + room / (limits.rangefinder_clearance / 2))
+        speed = braking_speed(_ABOVE - room, limits.max_acceleration, limits.reaction_time)
+        climb = max(float(velocity[2]), min(limits.max_climb, speed))
+        return np.array([share * velocity[0], share * velocity[1], climb])
 
     def _over_ground(self, velocity: Vector, view: GroundView, odometry: Odometry) -> Vector:
         """`velocity`, slowed down before higher ground, and climbing to pass over it."""

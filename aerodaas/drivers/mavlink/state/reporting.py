@@ -12,6 +12,7 @@ from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightPhase
+from aerodaas.drivers.mavlink.state.rangefinder import RATE
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -47,6 +48,9 @@ class VehicleReport:
         airspace: Airspace | None = None,
     ) -> None:
         """Report by what these know; without an `airspace`, nothing of Remote ID and traffic."""
+        measures = telemetry.rangefinder is not None
+        self.rates = {mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: RATE} if measures else {}
+        """What must be sent beside what every vehicle sends, Hz by message."""
         self.departure: Departure | None = None
         """Its take-offs; None before it is found."""
         self.alignment: Alignment | None = None
@@ -97,7 +101,20 @@ class VehicleReport:
             },
             ended=self._touchdown.ended,
             traffic=traffic,
+            below=self._below(now),
         )
+
+    def objections(self, now: float) -> list[str]:
+        """Why it must not take off, as far as its own state says so."""
+        rangefinder = self._telemetry.rangefinder
+        fault = "" if rangefinder is None else rangefinder.fault(now)
+        return [fault] if fault else []
+
+    def _below(self, now: float) -> float | None:
+        telemetry = self._telemetry
+        if telemetry.rangefinder is None:
+            return None
+        return telemetry.rangefinder.below(telemetry.attitude, now)
 
     def _mission(self) -> dict[str, float]:
         """Items of the vehicle's own mission, where it has told any."""
@@ -174,7 +191,7 @@ class VehicleReport:
             faults.append("telemetry: packets come, and say nothing new")
         if self.alignment is not None:
             faults.append(self.alignment.fault)
-        faults += telemetry.health.faults(now)
+        faults += [*telemetry.health.faults(now), *self.objections(now)]
         faults += [] if self._airspace is None else self._airspace.faults(now)
         faults += telemetry.texts.recent(now, REASONS, _GRAVE)
         return list(dict.fromkeys(fault for fault in faults if fault))

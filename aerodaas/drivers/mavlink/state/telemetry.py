@@ -12,6 +12,7 @@ from aerodaas.drivers.mavlink.microservices.events import EventReader
 from aerodaas.drivers.mavlink.microservices.texts import Texts
 from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
 from aerodaas.drivers.mavlink.state.health import Health
+from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.data import Battery, GpsFix
 from aerodaas.types.errors import VehicleError
@@ -42,7 +43,8 @@ class Sensors(NamedTuple):
 class Telemetry:
     """Newest messages of one vehicle in its own frames, with arrival times in monotonic seconds."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, measures_ground: bool = False) -> None:
+        """Know nothing; heed a rangefinder, and miss it, where one `measures_ground`."""
         self.heard_at = -math.inf
         """Any message at all."""
         self.back_at = -math.inf
@@ -90,8 +92,8 @@ class Telemetry:
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
-        self.texts = Texts()
-        self.events = EventReader()
+        self.rangefinder = Rangefinder() if measures_ground else None
+        self.texts, self.events = Texts(), EventReader()
         self._takers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -107,6 +109,7 @@ class Telemetry:
             "MISSION_ITEM_REACHED": self._reached,
             "STATUSTEXT": self._text,
             "EVENT": self._event,
+            "DISTANCE_SENSOR": self._distance,
         }
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
@@ -252,6 +255,10 @@ class Telemetry:
         self.mission_item = self.mission_reached = math.nan
         self.sensors = self.on_ground = None
         self.health, self.events = Health(), EventReader()
+
+    def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
+        if self.rangefinder is not None:
+            self.rangefinder.take(message, now)
 
     def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
         version = message.flight_sw_version

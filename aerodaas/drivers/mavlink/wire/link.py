@@ -64,7 +64,7 @@ _WANTED = frozenset(
         ),
         mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
         *(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mavlink.MAVLINK_MSG_ID_RELAY_STATUS),
-        mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO,
+        *(mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR),
         *(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS),
         EventMessage.id,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
@@ -20,10 +21,14 @@ _PAUSE = 5.0
 class RateKeeper:
     """Requester of one message after the other; an autopilot accepts one such command at a time."""
 
-    def __init__(self, autopilot: Autopilot, commander: Commander) -> None:
+    def __init__(
+        self, autopilot: Autopilot, commander: Commander, more: Mapping[int, float] | None = None
+    ) -> None:
+        """Keep the rates that `autopilot` needs, and `more` (Hz by message)."""
         self._autopilot = autopilot
         self._commander = commander
-        self._asked_at = dict.fromkeys(autopilot.rates, -math.inf)
+        self._rates = {**autopilot.rates, **(more or {})}
+        self._asked_at = dict.fromkeys(self._rates, -math.inf)
         self._refused: set[int] = set()
         self._reboots = 0
         self._waiting = False
@@ -36,7 +41,7 @@ class RateKeeper:
             self._refused.clear()
         if self._waiting:
             return
-        for message, rate in self._autopilot.rates.items():
+        for message, rate in self._rates.items():
             name = mavlink.mavlink_map[message].msgname
             first = self._asked_at[message] == -math.inf
             missing = first or now - telemetry.seen.get(name, -math.inf) > _OVERDUE + 2.0 / rate
