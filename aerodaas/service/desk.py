@@ -255,10 +255,7 @@ class MissionDesk:
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; raises RefusedError for any other."""
-        found = self.shown(mission)
-        if not sees(principal, found.tenant, found.share):
-            raise RefusedError(404, f"there is no mission {mission!r}")
-        return found
+        return shown(self._seen(principal, mission))
 
     def missions(self, principal: Principal) -> list[MissionOut]:
         """The newest missions that this account may see, newest first."""
@@ -323,9 +320,9 @@ class MissionDesk:
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
-        found, one = self.mission(principal, mission), self._any(mission)
+        one = self._seen(principal, mission)
         files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
-        if not files[name].is_file() or (name == "recording" and not found.phase.over):
+        if not files[name].is_file() or (name == "recording" and not one.over):
             raise RefusedError(404, f"{mission} has no {name} yet")
         return files[name]
 
@@ -538,6 +535,13 @@ class MissionDesk:
             raise RefusedError(409, f"{mission} is over: {phase}")
         return one
 
+    def _seen(self, principal: Principal, mission: str) -> ActiveMission:
+        """A mission that this account may see, over or not; raises RefusedError for any other."""
+        one = self._any(mission)
+        if not sees(principal, one.row.tenant, one.row.request.get("share", ())):
+            raise RefusedError(404, f"there is no mission {mission!r}")
+        return one
+
     def _any(self, mission: str) -> ActiveMission:
         """A mission that may be over; raises RefusedError if there is none."""
         one = self._missions.get(mission)
@@ -548,9 +552,9 @@ class MissionDesk:
 
     def _require_own(self, principal: Principal, mission: str) -> None:
         """Raise RefusedError unless this account may command a mission."""
-        found = self.mission(principal, mission)
-        if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
-            raise RefusedError(403, f"{mission} is {found.tenant}'s: you may watch it")
+        tenant = self._seen(principal, mission).row.tenant
+        if tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
+            raise RefusedError(403, f"{mission} is {tenant}'s: you may watch it")
 
 
 def _may_fly(last: StatusOut) -> bool:
