@@ -181,7 +181,7 @@ def test_a_sensor_that_steers_dies(flyer: Flyer) -> None:
 def test_a_sensor_dies_in_lockstep(flyer: Flyer) -> None:
     """Time goes on without its pictures, and the mission to its end."""
     content = with_camera()
-    content["robots"][0]["sensors"] = [{**CAMERA, "rate": 10}]
+    content["robots"][0]["sensors"] = [{**CAMERA, "rate": 3}]
 
     def build(env: Environment) -> None:
         drone = env.get_robot_by_id("drone")

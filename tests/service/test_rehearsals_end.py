@@ -11,7 +11,7 @@ from served import Served, document, fleet, robot
 
 pytestmark = pytest.mark.slow
 
-FAR = [(25.0 * (number % 2), float(number)) for number in range(40)]
+FAR = [(25.0 * (number % 2), float(number)) for number in range(16)]
 """A way of some minutes, which takes a rehearsal some seconds."""
 SECONDS = 60.0
 
