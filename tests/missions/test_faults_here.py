@@ -181,12 +181,12 @@ def test_a_sensor_that_steers_dies(flyer: Flyer) -> None:
 def test_a_sensor_dies_in_lockstep(flyer: Flyer) -> None:
     """Time goes on without its pictures, and the mission to its end."""
     content = with_camera()
-    content["robots"][0]["sensors"] = [{**CAMERA, "rate": 3}]
+    content["robots"][0]["sensors"] = [{**CAMERA, "rate": 10}]
 
     def build(env: Environment) -> None:
         drone = env.get_robot_by_id("drone")
         drone.get_sensor_by_id("cam").get_data_stream()
-        drone.navigate(hop((4, 0), hover=900))
+        drone.navigate(hop((4, 0), hover=300))
 
     with flyer.flying(build, content) as env:
         run = env.launch()
