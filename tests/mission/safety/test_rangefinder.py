@@ -38,7 +38,7 @@ def clamped(
 def velocity(sent: FilteredSetpoint) -> list[float]:
     """Of a setpoint."""
     assert isinstance(sent.setpoint, VelocitySetpoint)
-    return sent.setpoint.velocity.tolist()
+    return list(map(float, sent.setpoint.velocity))
 
 
 @given(st.floats(0.0, 20.0))
