@@ -124,7 +124,10 @@ def take_over(page: Page, watcher: Page) -> None:
     page.until(f"{figure('Speed')} > 1")
     watcher.until(f"{CONTROLS} === 'pilot has the controls'")
     assert watcher.run("document.querySelector('.hand .take').disabled")
-    assert "flown by hand by pilot" in watcher.text("[data-testid=why]")
+    # The reason follows with the next turn of the drone's loop.
+    watcher.until(
+        "document.querySelector('[data-testid=why]').textContent.includes('flown by hand by pilot')"
+    )
 
 
 def leave(page: Page, watcher: Page) -> None:
@@ -165,14 +168,15 @@ def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
         watcher.until(f"{CONTROLS} === 'nobody has the controls'", 5)
         at = watcher.run(figure("Mission time"))
         until_state(watcher, "paused")
-        watcher.until(f"{figure('Mission time')} > {at} + 2")
+        watcher.until(f"{figure('Mission time')} > {at} + 4")
         watcher.run(button("resume"))
         until_done(watcher, "resume")
         banner = "document.querySelector('[data-testid=banner]')"
         watcher.until(f"{banner}?.innerText.includes('landed')", 90)
         assert watcher.complaints() == []
         assert flight.ended() == 0
-    stood = [speed for when, speed in speeds(flight.recording) if at + 1 < when < at + 2]
+    # The page of a busy machine may show a time that is some tenths of a second old.
+    stood = [speed for when, speed in speeds(flight.recording) if at + 2 < when < at + 4]
     assert stood
     assert max(stood) < 0.4
     for east in (-5.75, -4.25):
