@@ -89,6 +89,16 @@ def test_its_silence_is_told() -> None:
     assert Telemetry().rangefinder is None
 
 
+def test_several_rangefinders_stamp_each_their_own() -> None:
+    """One that looks ahead is told of first, in the same millisecond; one's repetition is none."""
+    telemetry = Telemetry(measures_ground=True)
+    ahead = reading(90, id=0, orientation=mavlink.MAV_SENSOR_ROTATION_NONE)
+    for message in (ahead, reading(350, id=1), reading(500, id=1)):
+        telemetry.take(message, 10.0)
+    assert telemetry.rangefinder is not None
+    assert telemetry.rangefinder.below(LEVEL, 10.0) == pytest.approx(3.5)
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_drone_climbs_with_the_ground(
     monkeypatch: pytest.MonkeyPatch,

@@ -237,10 +237,12 @@ class Telemetry:
             self._restarted()
         if not boot_time <= self.boot_time:
             self.boot_time, self.ticked_at = boot_time, now
-        before = self._stamps.get(kind)
+        # Several sensors of one kind stamp each their own.
+        source = f"{kind} {message.id}"
+        before = self._stamps.get(source)
         if before is not None and stamp <= before:
             return False
-        self._stamps[kind] = stamp
+        self._stamps[source] = stamp
         return True
 
     def _restarted(self) -> None:
