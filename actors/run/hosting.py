@@ -38,7 +38,7 @@ def by_actor(
     simulated = [one for one in specs if one.robot.driver == "simulated"]
     if len(simulated) <= MOST_ALONE:
         return _by_link(specs, places)
-    groups = [*_by_link([one for one in specs if one not in simulated], places)]
+    groups = [*_by_link([one for one in specs if one.robot.driver != "simulated"], places)]
     most = max(1, int(MOST_TOGETHER / max(1.0, session.speed)))
     for place in dict.fromkeys(places[one.robot.id] for one in simulated):
         here = [one for one in simulated if places[one.robot.id] == place]

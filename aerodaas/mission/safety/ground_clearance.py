@@ -19,7 +19,7 @@ from aerodaas.terrain.ground import Ground
 from aerodaas.types.braking import braking_speed
 from aerodaas.types.geometry import Vector, wrap_angle
 
-__all__ = ["GroundClearance"]
+__all__ = ["GroundClearance", "GroundView", "climb_speed"]
 
 _RAYS = 5
 """Directions in which the ground is looked at, from that of the command to that of the flight."""
@@ -148,11 +148,13 @@ class GroundView:
         """Speed at which the drone must climb, m/s; minus infinity if it need not."""
         ahead = self._needed[0][self._covered[0]]
         missing = float(np.nanmax(ahead, initial=-math.inf)) - self._height
-        if missing <= _ROUNDING:
-            return -math.inf
-        limits = self._limits
-        speed = braking_speed(missing + _ABOVE, limits.max_acceleration, limits.reaction_time)
-        return min(limits.max_climb, speed)
+        return -math.inf if missing <= _ROUNDING else climb_speed(missing, self._limits)
+
+
+def climb_speed(missing: float, limits: LimitsConfig) -> float:
+    """Speed at which a drone climbs that flies `missing` metres too low, m/s."""
+    speed = braking_speed(missing + _ABOVE, limits.max_acceleration, limits.reaction_time)
+    return min(limits.max_climb, speed)
 
 
 def _rays(velocity: Vector, asked: Vector) -> NDArray[np.float64]:

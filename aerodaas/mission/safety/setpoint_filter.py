@@ -16,7 +16,7 @@ import numpy as np
 
 from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView
+from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView, climb_speed
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
 from aerodaas.types.data import Odometry
@@ -30,8 +30,6 @@ _FEW = 4
 """Neighbours up to which it takes longer to tell the near ones than to bound by all."""
 _ROUNDING = 1e-3
 """Metres by which a neighbour is taken to be nearer than it is, and that are no lack of room."""
-_ABOVE = 0.2
-"""Metres over the clearance to which the drone climbs, so that it does not creep up to it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -305,10 +303,8 @@ class SetpointFilter:
         """
         if room >= -_ROUNDING:
             return velocity
-        limits = self.limits
-        share = max(0.0, 1.0 + room / (limits.rangefinder_clearance / 2))
-        speed = braking_speed(_ABOVE - room, limits.max_acceleration, limits.reaction_time)
-        climb = max(float(velocity[2]), min(limits.max_climb, speed))
+        share = max(0.0, 1.0 + room / (self.limits.rangefinder_clearance / 2))
+        climb = max(float(velocity[2]), climb_speed(-room, self.limits))
         return np.array([share * velocity[0], share * velocity[1], climb])
 
     def _over_ground(self, velocity: Vector, view: GroundView, odometry: Odometry) -> Vector:
