@@ -62,6 +62,10 @@ class Neighbours:
         """Know of none."""
         self._known: dict[str, Whereabouts] = {}
         self._silent: set[str] = set()
+        self._now = 0
+        self._present: dict[str, tuple[Whereabouts, float, Neighbour]] = {}
+        """What is known of each at `_now`, for which distance, and what that makes of it: all
+        drones of one actor ask at one moment."""
 
     def hear(self, name: str, where: Whereabouts | None) -> None:
         """Take what the drone `name` tells; None, a place unknown to it, leaves the last."""
@@ -78,17 +82,23 @@ class Neighbours:
         Each is where its velocity has taken it since it told. After `SILENT` seconds that is a
         guess: it is kept away from like an aircraft that flies on and does not give way.
         """
-        found = list[Neighbour]()
         if separation <= 0.0:
-            return found
-        for other, where in self._known.items():
-            if other == name:
-                continue
-            age = where.age(now)
-            position = where.position + where.velocity * min(age, SILENT)
-            apart = (separation, separation) if age > SILENT else None
-            found.append(Neighbour(position, where.velocity, apart))
-        return found
+            return []
+        if now != self._now:
+            self._now = now
+            self._present.clear()
+        return [self._by_now(other, separation) for other in self._known if other != name]
+
+    def _by_now(self, name: str, separation: float) -> Neighbour:
+        where, made = self._known[name], self._present.get(name)
+        if made is not None and made[0] is where and made[1] == separation:
+            return made[2]
+        age = where.age(self._now)
+        position = where.position + where.velocity * min(age, SILENT)
+        apart = (separation, separation) if age > SILENT else None
+        neighbour = Neighbour(position, where.velocity, apart)
+        self._present[name] = where, separation, neighbour
+        return neighbour
 
     def newly_silent(self, now: int, own: Collection[str]) -> list[str]:
         """Drones other than our `own` that have told nothing for `SILENT` s; each silence once."""

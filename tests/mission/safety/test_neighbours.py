@@ -77,6 +77,19 @@ def test_who_has_landed_may_be_silent() -> None:
     assert known.newly_silent(3600 * _SECOND, ()) == []
 
 
+def test_each_drone_asks_for_itself_at_one_moment() -> None:
+    """What was told in between, and another's distance, count at once; time goes on for all."""
+    known, now = _known(east=_where()), 2 * _SILENT_NS
+    assert [one.apart for one in known.around("west", now, 3.0)] == [(3.0, 3.0)]
+    assert [one.apart for one in known.around("north", now, 5.0)] == [(5.0, 5.0)]
+    known.hear("east", _where(stamp=now))
+    (other,) = known.around("north", now, 5.0)
+    assert other.apart is None
+    assert other.position == pytest.approx([5.0, 0.0, 10.0])
+    (other,) = known.around("west", now + _SECOND // 2, 3.0)
+    assert other.position == pytest.approx([6.0, 0.0, 10.0])
+
+
 def test_nobody_is_near_himself_or_without_a_separation() -> None:
     """A drone has no neighbour in itself, and where no distance is set there are none."""
     known = _known(east=_where(), west=_where())
