@@ -17,6 +17,7 @@ from pathlib import Path
 
 from aerodaas.schedulers.analytics.base import Profile
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PUBLISHED
+from aerodaas.schedulers.lab.trace_errors import bad_line
 from aerodaas.schedulers.lab.workload import Arrival, Segments, Workload
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import SchedulerError
@@ -69,7 +70,7 @@ def read_arrivals(
                 )
             if "seconds" not in heading:
                 if len(heading) > 1:
-                    raise _bad(path, number, "there is no column `seconds`")
+                    raise bad_line(path, number, "there is no column `seconds`")
                 rows, heading = _before((number, first), rows), ["seconds"]
             return _times(path, heading, rows, duration, models)
     except OSError as error:
@@ -90,11 +91,11 @@ def _times(
     before = last_edge = 0
     for number, cells in rows:
         if len(cells) != len(heading):
-            raise _bad(path, number, f"{len(cells)} columns, the first line has {len(heading)}")
+            raise bad_line(path, number, f"{len(cells)} columns, the first line has {len(heading)}")
         row = dict(zip(heading, (cell.strip() for cell in cells), strict=True))
         at = _stamp(path, number, row["seconds"])
         if at < before:
-            raise _bad(path, number, "seconds must not descend")
+            raise bad_line(path, number, "seconds must not descend")
         before = at
         edge = _whole(path, number, row.get("edge") or "0", _MOST_EDGES)
         if duration is not None and at >= duration:
@@ -105,7 +106,7 @@ def _times(
         elif row["model"] in models:
             arrivals.append(Arrival(at, row["model"], row.get("source", ""), edge))
         else:
-            raise _bad(path, number, f"no model {row['model'][:40]!r}: {', '.join(models)}")
+            raise bad_line(path, number, f"no model {row['model'][:40]!r}: {', '.join(models)}")
         _few_enough(path, len(segments) + len(arrivals))
     if not segments and not arrivals:
         raise SchedulerError(f"{path}: no time of it is in the run")
@@ -132,13 +133,13 @@ def _invocations(
     name = heading.index("HashFunction")
     minutes = [place for place, title in enumerate(heading) if title.isascii() and title.isdigit()]
     if [heading[place] for place in minutes] != [str(one + 1) for one in range(len(minutes))]:
-        raise _bad(path, 1, "minutes must be the columns 1, 2, 3 and so on")
+        raise bad_line(path, 1, "minutes must be the columns 1, 2, 3 and so on")
     read = minutes if duration is None else minutes[: -(-duration // _MINUTE)]
     segments: list[Segments] = []
     total = 0
     for number, cells in rows:
         if len(cells) != len(heading):
-            raise _bad(path, number, f"{len(cells)} columns, the first line has {len(heading)}")
+            raise bad_line(path, number, f"{len(cells)} columns, the first line has {len(heading)}")
         if not cells[name].startswith(function):
             continue
         for minute, place in enumerate(read):
@@ -165,7 +166,7 @@ def _rows(path: Path, reader: Iterator[list[str]]) -> Iterator[_Row]:
             if cells:
                 yield number, cells
     except csv.Error as error:
-        raise _bad(path, number + 1, str(error)) from None
+        raise bad_line(path, number + 1, str(error)) from None
 
 
 def _before(first: _Row, rows: Iterator[_Row]) -> Iterator[_Row]:
@@ -177,16 +178,16 @@ def _stamp(path: Path, number: int, text: str) -> int:
     try:
         seconds = float(text)
     except ValueError:
-        raise _bad(path, number, f"{text[:40]!r} is no number of seconds") from None
+        raise bad_line(path, number, f"{text[:40]!r} is no number of seconds") from None
     if not 0 <= seconds <= _MOST_SECONDS or math.isnan(seconds):
-        raise _bad(path, number, f"{text[:40]!r} is no time from 0 s to 400 days")
+        raise bad_line(path, number, f"{text[:40]!r} is no time from 0 s to 400 days")
     return round(seconds * NANOSECONDS)
 
 
 def _whole(path: Path, number: int, text: str, most: int) -> int:
     plain = text.isascii() and text.isdigit() and len(text) <= len(str(most))
     if not plain or int(text) > most:
-        raise _bad(path, number, f"{text[:40]!r} is no whole number from 0 to {most}")
+        raise bad_line(path, number, f"{text[:40]!r} is no whole number from 0 to {most}")
     return int(text)
 
 
@@ -196,7 +197,3 @@ def _few_enough(path: Path, count: int) -> None:
             f"{path}: more than {_MOST:,} arrivals; take a shorter --duration, or fewer of Azure's "
             "functions: FILE@HASH"
         )
-
-
-def _bad(path: Path, number: int, what: str) -> SchedulerError:
-    return SchedulerError(f"{path}, line {number}: {what}")

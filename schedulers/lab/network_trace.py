@@ -26,6 +26,7 @@ from pathlib import Path
 from statistics import fmean
 
 from aerodaas.schedulers.analytics.base import MILLISECOND
+from aerodaas.schedulers.lab.trace_errors import bad_line
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import SchedulerError
 
@@ -87,7 +88,9 @@ def read_bandwidth(path: Path, duration: int) -> tuple[tuple[int, float], ...]:
     columns = len(first.split())
     for number, words in lines:
         if len(words) != columns:
-            raise _bad(path, number, f"{len(words)} columns, where the first line has {columns}")
+            raise bad_line(
+                path, number, f"{len(words)} columns, where the first line has {columns}"
+            )
     readers = {1: _mahimahi, 2: _cooked, _GHENT: _ghent}
     if columns not in readers:
         raise SchedulerError(
@@ -103,13 +106,13 @@ def _own(path: Path, rows: Sequence[_Row]) -> tuple[tuple[int, float], ...]:
     points: list[tuple[int, float]] = []
     for number, words in rows:
         if len(words) < 2:  # noqa: PLR2004 - seconds and Mbit/s
-            raise _bad(path, number, "each line holds seconds and Mbit/s")
+            raise bad_line(path, number, "each line holds seconds and Mbit/s")
         at = int(_number(path, number, words[0], _LONGEST) * NANOSECONDS)
         rate = _number(path, number, words[1]) * _MBIT
         if points and at <= points[-1][0]:
-            raise _bad(path, number, "seconds must ascend")
+            raise bad_line(path, number, "seconds must ascend")
         if rate <= 0:
-            raise _bad(path, number, "each Mbit/s must be positive; `outage` is for no link")
+            raise bad_line(path, number, "each Mbit/s must be positive; `outage` is for no link")
         points.append((at, rate))
     if not points:
         raise SchedulerError(f"{path}: there is a heading and nothing else")
@@ -120,13 +123,13 @@ def _mahimahi(path: Path, lines: Sequence[_Row]) -> list[_Step]:
     stamps = [_whole(path, number, words[0]) for number, words in lines]
     for place, (number, _) in enumerate(lines[1:], 1):
         if stamps[place] < stamps[place - 1]:
-            raise _bad(path, number, "milliseconds must not descend")
+            raise bad_line(path, number, "milliseconds must not descend")
     period = stamps[-1]
     if period == 0:
         raise SchedulerError(f"{path}: all packets are at 0 ms, which spans no time")
     bins = -(-period // _BIN)
     if bins > _MOST_STEPS:
-        raise _bad(path, lines[-1][0], "the trace is longer than a day")
+        raise bad_line(path, lines[-1][0], "the trace is longer than a day")
     packets = [0] * bins
     for stamp in stamps:
         packets[max(stamp - 1, 0) // _BIN] += 1
@@ -158,10 +161,10 @@ def _ghent(path: Path, lines: Sequence[_Row]) -> list[_Step]:
             _number(path, number, word.removeprefix("-"), math.inf)
         size, taken = (_whole(path, number, word) for word in words[4:])
         if at <= before:
-            raise _bad(path, number, "milliseconds since the start must ascend")
+            raise bad_line(path, number, "milliseconds since the start must ascend")
         before = at
         if taken == 0 and size:
-            raise _bad(path, number, f"{size} bytes in no time")
+            raise bad_line(path, number, f"{size} bytes in no time")
         if taken:
             rate = _number(path, number, str(size * 1000 / taken))
             steps.append((_lasting(path, number, taken / 1000), rate))
@@ -173,18 +176,22 @@ def _gnettrack(path: Path, header: Sequence[str], rows: Sequence[_Row]) -> list[
     seconds: list[tuple[int, datetime, list[float]]] = []
     for number, words in rows:
         if len(words) <= max(time, rate):
-            raise _bad(path, number, f"{len(words)} columns, where the heading has {len(header)}")
+            raise bad_line(
+                path, number, f"{len(words)} columns, where the heading has {len(header)}"
+            )
         try:
             at = datetime.strptime(words[time].strip(), "%Y.%m.%d_%H.%M.%S")  # noqa: DTZ007 - differences only
         except ValueError:
-            raise _bad(path, number, f"{words[time]!r} is no time 2020.01.31_23.59.59") from None
+            raise bad_line(
+                path, number, f"{words[time]!r} is no time 2020.01.31_23.59.59"
+            ) from None
         value = _number(path, number, words[rate]) * _KBIT
         if seconds and at == seconds[-1][1]:
             # Of several rows within a second, which is as fine as stamps are, the mean.
             seconds[-1][2].append(value)
             continue
         if seconds and at < seconds[-1][1]:
-            raise _bad(path, number, "times must not descend")
+            raise bad_line(path, number, "times must not descend")
         seconds.append((number, at, [value]))
     if not seconds:
         raise SchedulerError(f"{path}: there is a heading and nothing else")
@@ -234,13 +241,13 @@ def _lasting(path: Path, number: int, seconds: float) -> int:
     """A step's length in nanoseconds."""
     length = int(seconds * NANOSECONDS) if 0 < seconds < _LONGEST else 0
     if length <= 0:
-        raise _bad(path, number, "times must ascend, by 400 days at most")
+        raise bad_line(path, number, "times must ascend, by 400 days at most")
     return length
 
 
 def _whole(path: Path, number: int, text: str) -> int:
     if not (text.isascii() and text.isdigit()) or len(text) > 15:  # noqa: PLR2004 - exact as a float, too
-        raise _bad(path, number, f"{text[:40]!r} is no whole number of up to 15 digits")
+        raise bad_line(path, number, f"{text[:40]!r} is no whole number of up to 15 digits")
     return int(text)
 
 
@@ -249,9 +256,9 @@ def _number(path: Path, number: int, text: str, most: float = 1e9) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise _bad(path, number, f"{text[:40]!r} is no number") from None
+        raise bad_line(path, number, f"{text[:40]!r} is no number") from None
     if not 0 <= value <= most or math.isinf(value):
-        raise _bad(path, number, f"{text[:40]!r} is no number from 0 to {most:g}")
+        raise bad_line(path, number, f"{text[:40]!r} is no number from 0 to {most:g}")
     return value
 
 
@@ -261,7 +268,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _bad(path: Path, number: int, what: str) -> SchedulerError:
-    return SchedulerError(f"{path}, line {number}: {what}")

@@ -1,0 +1,14 @@
+"""Errors of a trace's lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aerodaas.types.errors import SchedulerError
+
+__all__ = ["bad_line"]
+
+
+def bad_line(path: Path, number: int, what: str) -> SchedulerError:
+    """The error that says `what` is wrong in a line of the file, the `number`th from 1."""
+    return SchedulerError(f"{path}, line {number}: {what}")
