@@ -10,15 +10,13 @@ fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
 # One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
-# continuous integration does; those that go by the wall clock afterwards, and at last, with nothing
-# beside them, those that need the whole machine. There one that met a busy machine is run once more,
-# named, and counted as a rerun. Each part ends with its slowest tests, before one of them meets its
-# time-out.
+# continuous integration does; those that go by the wall clock afterwards. There one that met a busy
+# machine is run once more, named, and counted as a rerun. Each part ends with its slowest tests,
+# before one of them meets its time-out.
 CLOCK := slow and wall_clock
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not ($(CLOCK)),not slow)" $(SLOWEST)
-	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "$(CLOCK) and not whole_machine" $(SLOWEST))
-	$(if $(CI),$(BIN)/python -m pytest -m "$(CLOCK) and whole_machine" $(SLOWEST))
+	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "$(CLOCK)" $(SLOWEST))
 
 # The two type checkers, which take minutes, side by side.
 lint: $(VENV)/.installed-dev

@@ -60,6 +60,10 @@ PEERS = {
     "AERODAAS_TEST_DATABASE": Peer(
         "an empty PostgreSQL database, by a URL such as postgresql://USER@127.0.0.1/NAME"
     ),
+    "AERODAAS_TEST_TELLO": Peer(
+        "applications for the emulated Tello, five minutes each of a machine with nothing beside "
+        "them: situation_awareness,search_and_rescue"
+    ),
     "AERODAAS_TEST_DATA": Peer(
         "a folder of real pictures and models: tests/analytics/detection/test_real_models.py"
     ),

@@ -56,13 +56,22 @@ _UNWANTED = ("dashboard/dashboard.py", "_private/monitor.py", "v2/monitor.py", "
 `ray start` waits for the first, whose option only makes it smaller, or for its end.
 """
 _SUBREAPER = 36
+_NAME_BYTES = 200
 _MISSING = ("ray.serve.scripts", "grpc", "ray.dashboard.optional_deps")
 """Modules that `ray start` does without, as where they are not installed: a second of imports for
 other subcommands, the proxy for remote drivers, and the web server of the node's agent."""
+_LAUNCHER = Path(__file__).with_name("worker_launcher.py")
+_SERVER = Path(__file__).with_name("fork_server.py")
+_SOCKET = "workers.sock"
+FORK_SERVER = "AERODAAS_FORK_SERVER"
+"""Environment variable of Ray's processes that names the fork server's socket."""
 _RAY = (
     f"import sys; sys.modules.update(dict.fromkeys({_MISSING})); "
+    "from functools import partialmethod; from ray._private.parameter import RayParams; "
+    "RayParams.__init__ = partialmethod(RayParams.__init__, setup_worker_path=sys.argv.pop(1)); "
     "from ray.scripts.scripts import main; main()"
 )
+"""`ray start` whose workers are started by the program that comes first."""
 
 
 def main(application: int, streams: str, words: list[str]) -> None:
@@ -136,9 +145,12 @@ class _Client:
 
 def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
     """Start Ray; returns its address and "", or "" and the reason of the failure."""
-    environment = {**os.environ, VARIABLE: str(folder)}
+    server = str(folder / _SOCKET)
+    environment = {**os.environ, VARIABLE: str(folder), FORK_SERVER: server}
+    _start_fork_server(server, environment)
     own = folder / _RAYS_OWN
-    command = [sys.executable, "-c", _RAY, "start", "--temp-dir", str(own), *words]
+    ray = [sys.executable, "-c", _RAY, str(_LAUNCHER)]
+    command = [*ray, "start", "--temp-dir", str(own), *words]
     reason = ""
     for _ in range(_TRIES):
         with (folder / "start.log").open("w+") as log:
@@ -155,12 +167,26 @@ def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
             said = log.read().strip()
         if code == 0:
             return (own / "ray_current_cluster").read_text().strip(), ""
-        _end_all()
+        _end_all(lambda line: str(_SERVER) not in line)
         slow = code is None or _TOO_SLOW in said
         reason = _TOO_SLOW if slow else said.rpartition("\n")[2]
         if not slow:
             break
     return "", reason
+
+
+def _start_fork_server(path: str, environment: dict[str, str]) -> None:
+    """Start what workers are forked from; without it they start Ray's own way."""
+    # Ray writes names into the process' words, which are the room that there is for them.
+    words = [sys.executable, str(_SERVER), path, "-" * _NAME_BYTES]
+    quiet = subprocess.DEVNULL
+    subprocess.Popen(  # noqa: S603 - our own file
+        words,
+        env={"OPENBLAS_NUM_THREADS": "1", **environment},
+        stdin=quiet,
+        stdout=quiet,
+        stderr=quiet,
+    )
 
 
 def _under_way(folder: Path) -> bool:

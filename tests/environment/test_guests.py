@@ -200,39 +200,68 @@ def test_a_guest_sees_what_it_is_granted(flyer: Flyer, guest: Path, alone: Run) 
     assert poses(run) == poses(alone)
 
 
-@pytest.mark.parametrize(
-    ("process", "told"),
-    [
-        ("if self.count == 5: raise ValueError('boo')", "ValueError: boo"),
-        ("if self.count == 5: os._exit(4)", "has been ended: its process has ended, with code 4"),
-        ("if self.count == 5: sys.exit(4)", "has been ended"),
-        ("while self.count == 5: pass", "has been ended: did not answer in time"),
-        ("self.x = bytearray(4 << 30)", "MemoryError"),
-        ("return [0.0] * 5_000_000", "too large|has been ended"),
-        ("os.kill(os.getppid(), 9); return 1", "theirs"),
-    ],
-)
-def test_a_bad_analysis_harms_its_guest_alone(
-    flyer: Flyer, guest: Path, alone: Run, process: str, told: str
+BAD = {
+    "raising": ("if self.count == 5: raise ValueError('boo')", "ValueError: boo"),
+    "quitting": (
+        "if self.count == 5: os._exit(4)",
+        "has been ended: its process has ended, with code 4",
+    ),
+    "exiting": ("if self.count == 5: sys.exit(4)", "has been ended"),
+    "hanging": ("while self.count == 5: pass", "has been ended: did not answer in time"),
+    "hoarding": ("self.x = bytearray(4 << 30)", "MemoryError"),
+    "flooding": ("return [0.0] * 5_000_000", "too large|has been ended"),
+    "killing": ("os.kill(os.getppid(), 9); return 1", "killing"),
+}
+"""What an analysis of a guest does, and what is told of it."""
+
+
+def unopened() -> str:
+    """A guest whose analysis ends its process before it is asked for anything."""
+    opening = "    count = 0\n    def open(self):\n        os._exit(9)\n"
+    return analysis("return 1").replace("    count = 0\n", opening)
+
+
+@pytest.fixture(scope="module")
+def crowd(tmp_path_factory: pytest.TempPathFactory, alone: Run) -> tuple[Run, list[str]]:
+    """The owner's flight with all bad guests at once, and the alerts that there are more of."""
+    folder = tmp_path_factory.mktemp("crowd")
+    texts = {name: analysis(process) for name, (process, _) in BAD.items()}
+    texts |= {"unopened": unopened(), "refused": HEAD + "sys.exit(0)"}
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    guests = tuple(folder / f"{name}.py" for name in texts)
+    grants = dict.fromkeys(BAD, RIGHTS) | {"unopened": RIGHTS}
+    run = Flyer(folder).fly(owner_who_looks, CONTENT, guests=guests, grants=grants, seed=3)
+    return run, [text for text in alerts(run) if text not in alerts(alone)]
+
+
+def test_bad_guests_together_leave_the_owners_flight_as_it_is(
+    crowd: tuple[Run, list[str]], alone: Run
 ) -> None:
-    """It is told once; the owner's analysis goes on, and the flight is the same to the digit."""
-    guest.write_text(analysis(process))
-    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
+    """Its analysis goes on, and the flight is the same to the digit; each guest is told once."""
+    run, found = crowd
     assert poses(run) == poses(alone)
-    found = [text for text in alerts(run) if text not in alerts(alone)]
-    assert all("theirs" in text for text in found)
-    assert len(found) == 1
-    assert re.search(told, "".join(found))
     assert results_of(run, "owners_eye") == results_of(alone, "owners_eye") > 50
+    assert len(found) == len(BAD) + 2
 
 
-def test_a_refused_guest_is_told_and_the_owner_flies(flyer: Flyer, guest: Path, alone: Run) -> None:
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_analysis_is_told_by_its_guests_name(crowd: tuple[Run, list[str]], name: str) -> None:
+    """With what it has done."""
+    (told,) = [text for text in crowd[1] if name in text]
+    assert re.search(BAD[name][1], told)
+
+
+def test_a_guest_that_fails_to_open_is_told(crowd: tuple[Run, list[str]]) -> None:
+    """As ended."""
+    (told,) = [text for text in crowd[1] if "unopened" in text]
+    assert "the guest unopened has been ended" in told
+
+
+def test_a_refused_guest_is_told_and_the_owner_flies(crowd: tuple[Run, list[str]]) -> None:
     """One that exits while it builds, of which today's run would end."""
-    guest.write_text(HEAD + "sys.exit(0)")
-    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), seed=3)
-    (told,) = alerts(run, "guest_refused")
-    assert "theirs does not take part" in told
-    assert poses(run) == poses(alone)
+    (told,) = alerts(crowd[0], "guest_refused")
+    assert "refused does not take part" in told
 
 
 @pytest.mark.parametrize("granted", [True, False], ids=["namespaces", "none"])
@@ -327,19 +356,33 @@ def test_a_stream_of_navigation_without_the_right_reaches_no_drone(
     assert poses(run) == poses(alone)
 
 
-@pytest.mark.parametrize(
-    "forged", ["42.0", "['a']", "Reckless()", "Odometry([0, 0, 0], [0, 0, 0], 0.0)"]
-)
-def test_a_forged_navigation_is_refused(flyer: Flyer, guest: Path, forged: str) -> None:
-    """Though the guest may fly: what is no navigation is told, and the drone flies on."""
+@pytest.fixture(scope="module")
+def forgers(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A flight with a guest for each forgery, all of whom may fly."""
+    folder = tmp_path_factory.mktemp("forgers")
     reckless = "class Reckless:\n    def __reduce__(self):\n        return os.abort, ()\n"
-    text = HEAD + reckless + FORGED.format(forged=forged) + "drone.navigate(flight)\n" + READY
-    guest.write_text(text)
-    rights = (*RIGHTS, "fly:drone")
-    run = flyer.fly(owner_then_home, CONTENT, guests=(guest,), grants={"theirs": rights})
-    assert run.state is not None
-    assert run.state.robots["drone"].status.visited == ("wp0", "wp1")
-    assert any("theirs" in text for text in alerts(run, "analysis_failed"))
+    for name, value in FORGERIES.items():
+        text = HEAD + reckless + FORGED.format(forged=value) + "drone.navigate(flight)\n" + READY
+        (folder / f"{name}.py").write_text(text)
+    guests = tuple(folder / f"{name}.py" for name in FORGERIES)
+    grants = dict.fromkeys(FORGERIES, (*RIGHTS, "fly:drone"))
+    return Flyer(folder).fly(owner_then_home, CONTENT, guests=guests, grants=grants)
+
+
+FORGERIES = {
+    "number": "42.0",
+    "words": "['a']",
+    "reckless": "Reckless()",
+    "reading": "Odometry([0, 0, 0], [0, 0, 0], 0.0)",
+}
+
+
+@pytest.mark.parametrize("name", FORGERIES)
+def test_a_forged_navigation_is_refused(forgers: Run, name: str) -> None:
+    """Though the guest may fly: what is no navigation is told, and the drone flies on."""
+    assert forgers.state is not None
+    assert forgers.state.robots["drone"].status.visited == ("wp0", "wp1")
+    assert any(name in text for text in alerts(forgers, "analysis_failed"))
 
 
 PRYING = """
@@ -452,18 +495,6 @@ def test_a_guest_that_hangs_while_it_builds(
     fresh = [one["cmdline"] or [] for one in left if one["pid"] not in before]
     assert not [words for words in fresh if "77.25" in words or any("sandbox" in w for w in words)]
     assert not list(Path(tempfile.gettempdir()).glob("aerodaas-guest-theirs-*"))
-
-
-def test_a_guest_that_fails_to_open(flyer: Flyer, guest: Path, alone: Run) -> None:
-    """The owner flies without it, and is told."""
-    text = analysis("return 1").replace(
-        "    count = 0\n", "    count = 0\n    def open(self):\n        os._exit(9)\n"
-    )
-    guest.write_text(text)
-    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
-    (told,) = [text for text in alerts(run) if text not in alerts(alone)]
-    assert "the guest theirs has been ended" in told
-    assert poses(run) == poses(alone)
 
 
 FORGED_DOCUMENT = """

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from served import Served, document, fleet, robot
+from served import Served, document, fleet, quick, robot
 
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -26,8 +26,7 @@ FLIGHT_SECONDS = 280
 @pytest.fixture(scope="module")
 def farm() -> Iterator[Served]:
     """The Farm Survey's environment, in lockstep."""
-    content = json.loads(FARM.read_text())
-    with Served(content, "--speed", "max") as served:
+    with Served(quick(FARM), "--speed", "max") as served:
         yield served
 
 
@@ -60,7 +59,9 @@ def test_the_farm_survey_flies_by_url_as_it_flies_at_home(farm: Served, tmp_path
     token = farm.user("asha", "growers")
     words = ("submit", app, "--to", farm.url, "--seed", "11", "--record", str(tmp_path / "url"))
     flown(*words, folder=tmp_path, token=token)
-    home = ("run", app, "--seed", "11", "--speed", "max", "--no-view")
+    environment = tmp_path / "farm.json"
+    environment.write_text(json.dumps(quick(FARM)))
+    home = ("run", app, "--env", str(environment), "--seed", "11", "--speed", "max", "--no-view")
     flown(*home, "--record", str(tmp_path / "home"), folder=tmp_path)
     theirs = states(tmp_path / "url" / "flight.mcap")
     ours = states(tmp_path / "home" / "flight.mcap")

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from flying import Flyer
-from served import Served, fleet, robot
+from served import Served, fleet, quick, robot
 
 from aerodaas import AeroNavigation, Analytics, Environment, NavigationType, Waypoint
-from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -64,11 +63,12 @@ def test_an_application_flies_by_url_as_on_ones_own_drone(
     """Farm Survey, unchanged but for the environment's name: the same trajectory, exactly."""
     application, flights = APPS / "farm_survey.py", []
     monkeypatch.setattr(sys, "path", [str(APPS), *sys.path])
-    content = EnvironmentConfig.load(FARM).model_dump(mode="json", by_alias=True)
+    content = quick(FARM)
+    environment = flyer.write(content, FARM.name)
     with Served(content, "--no-rehearse", "--speed", "max") as service:
         monkeypatch.setenv("AERODAAS_TOKEN", service.token)
         for name, changes in (
-            ("own", {"lockstep": True, "environment": FARM}),
+            ("own", {"lockstep": True, "environment": environment}),
             ("provided", {"provider": ProviderOptions(url=service.url)}),
         ):
             record = flyer.folder / name
