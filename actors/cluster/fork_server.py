@@ -1,8 +1,10 @@
-"""Fork server of a local Ray: has imported what actors need, and forks itself for each worker.
+"""Fork server of a local Ray: has imported what actors need, and is forked for each worker.
 
-As Python's own `multiprocessing.forkserver`, it runs no thread and keeps nothing but modules, so
-that a fork of it is as good as a new process. It ends with the supervisor that started it
-(`ray_process.py`); its workers live on until Ray ends them.
+As Python's own `multiprocessing.forkserver`, its processes run no thread and keep nothing but
+modules, so that a fork of one is as good as a new process. Ray reads its variables as it is loaded,
+and the workers of a job differ from those of no job in one: for each set of them the server has
+itself forked once, as a template, which loads Ray and is forked for each worker. They end with the
+supervisor that started the server (`ray_process.py`); workers live on until Ray ends them.
 """
 
 from __future__ import annotations
@@ -24,18 +26,14 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.actors.cluster.ray_internals import reread_variables, rereads_variables
-
 __all__ = ["main"]
 
-_MODULES = (
-    "ray._private.workers.default_worker",
-    "aerodaas.actors.run.actor_classes",
-    "aerodaas.drivers.simulated",
-    "aerodaas.recording.recorder",
-)
-"""What each worker imports first. None starts a thread, but numpy's BLAS where it may."""
-_READ_AT_ONCE = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
+_EARLY = ("aerodaas.mission.loop", "aerodaas.drivers.simulated", "aerodaas.recording.recorder")
+"""Modules of the server, imported while Ray starts. None imports Ray or starts a thread."""
+_LATE = ("ray._private.workers.default_worker", "aerodaas.actors.run.actor_classes")
+"""Further modules of a template."""
+_MOST_TEMPLATES = 4
+_READ_AT_ONCE = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_", "RAY_")
 """Prefixes of variables that are read as a process, or a library, is loaded."""
 _READ_LATER = {"PYTHONBREAKPOINT", "PYTHONUNBUFFERED", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"}
 """Those of them that make no difference to a worker here."""
@@ -52,71 +50,123 @@ class _Wanted:
     """Ray's program for workers, and its arguments."""
     variables: dict[str, str]
     folder: str
-    outputs: list[int]
-    """Files for its standard output and error."""
+    files: list[int]
+    """Standard output and error; in a template, then the socket of who asks."""
+    text: bytes
+    """All of it but the files, as it was sent."""
+
+
+class _Server:
+    """The templates, by the variables that they have been loaded with."""
+
+    def __init__(self) -> None:
+        self._began_with = _read_at_once(os.environ, but="RAY_")
+        self._templates: dict[frozenset[tuple[str, str]], socket.socket] = {}
+        for name in _EARLY:
+            importlib.import_module(name)
+
+    def serve(self, caller: socket.socket) -> socket.socket | None:
+        """Pass on to a template what is asked for, or refuse it.
+
+        Returns where a template gets its work, in one just forked; None in the server.
+        Raises OSError, ValueError or KeyError if nothing of the kind is asked for.
+        """
+        caller.settimeout(_LOOK_SECONDS)
+        wanted = _received(caller, 2)
+        try:
+            key = frozenset(_read_at_once(wanted.variables).items())
+            alike = _read_at_once(wanted.variables, but="RAY_") == self._began_with
+            if key not in self._templates and alike and len(self._templates) < _MOST_TEMPLATES:
+                ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                if os.fork() == 0:
+                    for one in (ours, *self._templates.values()):
+                        one.close()
+                    return theirs
+                theirs.close()
+                self._templates[key] = ours
+            if key not in self._templates:
+                caller.send(_REFUSED)
+            elif not _sent(self._templates[key], wanted, caller):
+                self._templates.pop(key).close()  # it has been killed; the next gets another
+        finally:
+            for file in wanted.files:
+                os.close(file)
+        return None
 
 
 def main(path: str) -> None:
     """Serve at the socket `path` until the parent has ended; in a worker, until its own end."""
-    parent, began_with = os.getppid(), _read_at_once(os.environ)
+    parent = os.getppid()
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    wanted = None
+    work = None
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind(path)
-        listener.listen(64)  # who asks before all is imported waits
-        for name in _MODULES:
-            importlib.import_module(name)
-        # A fork has none of the other threads, and what they hold is held for ever.
-        if len(list(Path("/proc/self/task").iterdir())) > 1 or not rereads_variables():
-            return  # workers start Ray's own way
-        gc.collect()
-        gc.freeze()  # or each worker's first collection would copy all that it shares
+        listener.listen(64)  # who asks before the modules are there waits
         listener.settimeout(_LOOK_SECONDS)
-        while wanted is None and os.getppid() == parent:
+        server = _Server()
+        while work is None and os.getppid() == parent:
             with contextlib.suppress(TimeoutError):
                 caller, _ = listener.accept()
                 with caller, contextlib.suppress(OSError, ValueError, KeyError):
-                    wanted = _serve(caller, began_with)
+                    work = server.serve(caller)
+    wanted = _template(work) if work is not None else None
     if wanted is not None:
         _become(wanted)
 
 
-def _serve(caller: socket.socket, began_with: dict[str, str]) -> _Wanted | None:
-    """Fork for who asks; returns what to become in the worker, None in the server.
-
-    A worker that does not begin with the same variables as the server did is refused.
-    Raises OSError, ValueError or KeyError if nothing of the kind is asked for.
-    """
-    caller.settimeout(_LOOK_SECONDS)
-    wanted = _received(caller)
-    same = _read_at_once(wanted.variables) == began_with
-    if same and os.fork() == 0:
-        return wanted
-    for file in wanted.outputs:
-        os.close(file)
-    caller.send(_DONE if same else _REFUSED)
+def _template(work: socket.socket) -> _Wanted | None:
+    """Load Ray and fork for each worker asked for; returns it there, None when the server ends."""
+    loaded = False
+    with contextlib.suppress(OSError, ValueError), work:
+        while True:
+            wanted = _received(work, 3)
+            if not loaded:
+                os.environ.update(wanted.variables)
+                for name in _LATE:
+                    importlib.import_module(name)
+                gc.collect()
+                gc.freeze()  # or each worker's first collection would copy all that it shares
+                loaded = True
+            # A fork has none of the other threads, and what they hold is held for ever.
+            alone = len(list(Path("/proc/self/task").iterdir())) == 1
+            if alone and os.fork() == 0:
+                os.close(wanted.files.pop())
+                return wanted
+            with socket.socket(fileno=wanted.files.pop()) as caller, contextlib.suppress(OSError):
+                caller.send(_DONE if alone else _REFUSED)
+            for file in wanted.files:
+                os.close(file)
     return None
 
 
-def _received(caller: socket.socket) -> _Wanted:
-    room = socket.CMSG_SPACE(array.array("i").itemsize * 2)
-    text, rights, _, _ = caller.recvmsg(_MOST_BYTES, room)
+def _sent(template: socket.socket, wanted: _Wanted, caller: socket.socket) -> bool:
+    """Whether a template has got it."""
+    files = array.array("i", [*wanted.files, caller.fileno()])
+    with contextlib.suppress(OSError):
+        template.sendmsg([wanted.text], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, files)])
+        return True
+    return False
+
+
+def _received(asking: socket.socket, files: int) -> _Wanted:
+    """What is asked for with so many files; raises ValueError if nothing comes any more."""
+    room = socket.CMSG_SPACE(array.array("i").itemsize * files)
+    text, rights, _, _ = asking.recvmsg(_MOST_BYTES, room)
     ((_, _, sent),) = rights
     told: dict[str, Any] = json.loads(text)
-    outputs = array.array("i", sent).tolist()
-    return _Wanted(told["words"], told["variables"], told["folder"], outputs)
+    found = array.array("i", sent).tolist()
+    return _Wanted(told["words"], told["variables"], told["folder"], found, text)
 
 
 def _become(wanted: _Wanted) -> None:
     """Be the worker: run Ray's program as a new process would."""
     os.setpgid(0, 0)  # Ray ends the group of a worker that has died
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-    for number, file in enumerate(wanted.outputs, start=1):
+    for number, file in enumerate(wanted.files, start=1):
         os.dup2(file, number)
         os.close(file)
     os.environ.clear()
     os.environ.update(wanted.variables)
-    reread_variables()  # which Ray read as it was loaded: its job, the process of its node
     os.chdir(wanted.folder)
     program = wanted.words[0]
     sys.argv[:] = wanted.words
@@ -126,12 +176,15 @@ def _become(wanted: _Wanted) -> None:
     runpy.run_path(program, run_name="__main__")
 
 
-def _read_at_once(variables: Mapping[str, str]) -> dict[str, str]:
-    """Variables in which a worker must not differ from the process that it is forked from."""
+def _read_at_once(variables: Mapping[str, str], but: str = "-") -> dict[str, str]:
+    """Variables in which a worker must not differ from the process that it is forked from.
+
+    Those that begin with `but` are left out.
+    """
     return {
         name: value
         for name, value in variables.items()
-        if name.startswith(_READ_AT_ONCE) and name not in _READ_LATER
+        if name.startswith(_READ_AT_ONCE) and name not in _READ_LATER and not name.startswith(but)
     }
 
 

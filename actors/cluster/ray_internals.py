@@ -17,21 +17,12 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
-import os
 from typing import Any
 
-__all__ = [
-    "cluster_metadata",
-    "forbid_start",
-    "reread_variables",
-    "rereads_variables",
-    "silence_nodes",
-]
+__all__ = ["cluster_metadata", "forbid_start", "reread_variables", "silence_nodes"]
 
 _CHANGED = (ImportError, AttributeError, TypeError)
 """Errors of a use of internals that have changed."""
-_PROBE, _PROBED = "RAY_health_check_period_ms", 7_654_321
-"""A setting of Ray's, and a value that nobody gives it."""
 _PRINTS = "print_to_stdstream"
 _STARTS = "enable_auto_connect"
 
@@ -61,22 +52,6 @@ def reread_variables() -> None:
     """Make Ray in this process read its environment variables again."""
     with contextlib.suppress(*_CHANGED):
         importlib.import_module("ray._raylet").Config.initialize("")
-
-
-def rereads_variables() -> bool:
-    """Whether Ray in this process reads its variables again where `reread_variables` asks it to."""
-    before = os.environ.get(_PROBE)
-    os.environ[_PROBE] = str(_PROBED)
-    reread_variables()
-    try:
-        config = importlib.import_module("ray._raylet").Config
-        return bool(config.health_check_period_ms() == _PROBED)
-    except _CHANGED:
-        return False
-    finally:
-        os.environ.pop(_PROBE)
-        os.environ.update({_PROBE: before} if before is not None else {})
-        reread_variables()
 
 
 def silence_nodes() -> None:

@@ -25,12 +25,10 @@ SERVER, LAUNCHER = str(module.__file__), str(worker_launcher.__file__)
 PROGRAM = """
 import json, os, random, sys
 import numpy as np
-import ray
 told = {"words": sys.argv[1:], "folder": os.getcwd(), "name": __name__, "first": sys.path[0]}
 told |= {"mine": os.environ.get("MINE"), "job": os.environ["RAY_JOB_ID"]}
 told |= {"drawn": [random.random(), np.random.random()], "id": os.getpid(), "parent": os.getppid()}
 told["ready"] = "aerodaas.actors.run.actor_classes" in sys.modules
-told["setting"] = ray._raylet.Config.health_check_period_ms()
 told["group"] = os.getpgid(0) == os.getpid()
 print(json.dumps(told), flush=True)
 """
@@ -65,6 +63,10 @@ class Pool:
         told: dict[str, Any] = json.loads(done.stdout)
         return told
 
+    def templates(self) -> list[psutil.Process]:
+        """Processes that the server has forked."""
+        return psutil.Process(self.process.pid).children()
+
 
 def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
     """Wait for something to happen."""
@@ -98,15 +100,15 @@ def test_a_fork_is_as_a_new_process(pool: Pool) -> None:
 def test_no_two_draw_the_same(pool: Pool) -> None:
     """By Python's generator or numpy's."""
     one, other = pool.start(), pool.start()
-    assert one["parent"] == other["parent"] == pool.process.pid
+    assert one["parent"] == other["parent"] != pool.process.pid
     assert not set(one["drawn"]) & set(other["drawn"])
 
 
-def test_rays_settings_are_the_workers_own(pool: Pool) -> None:
-    """Ray has read its variables as it was loaded, and reads them again."""
-    assert pool.start(RAY_health_check_period_ms="1234")["setting"] == 1234
-    assert pool.start(RAY_health_check_period_ms="4321")["setting"] == 4321
-    assert pool.start()["setting"] not in {1234, 4321}
+def test_what_ray_reads_as_it_is_loaded_is_the_workers_own(pool: Pool) -> None:
+    """Another job's workers come of another template."""
+    one, other = pool.start(), pool.start(RAY_JOB_ID="02")
+    assert (one["job"], other["job"]) == ("01", "02")
+    assert one["parent"] != other["parent"]
 
 
 @pytest.mark.parametrize(
@@ -144,18 +146,20 @@ def test_nonsense_ends_nothing(pool: Pool) -> None:
     assert pool.start()["ready"]
 
 
-def test_without_the_server_workers_start_all_the_same(tmp_path: Path) -> None:
-    """It has been killed: its socket is there, and nobody behind it."""
-    pool = Pool(tmp_path)
-    assert pool.start()["ready"]
-    pool.process.kill()
-    pool.process.wait()
-    assert Path(pool.socket).exists()
-    assert pool.start()["job"] == "anew"
+def test_a_template_that_is_killed_is_made_again(pool: Pool) -> None:
+    """Who asks first finds it dead, and starts Ray's own way."""
+    before = pool.start()["parent"]
+    dead = psutil.Process(before)
+    dead.kill()
+    until(lambda: not dead.is_running())
+    assert not pool.start()["ready"]
+    after = pool.start()
+    assert after["ready"]
+    assert after["parent"] != before
 
 
 def test_they_end_with_who_started_them(tmp_path: Path) -> None:
-    """Though it is killed."""
+    """Though it is killed: server and templates."""
     path = tmp_path / "workers.sock"
     starting = (
         "import subprocess, sys, time\n"
@@ -183,6 +187,6 @@ def test_the_actors_of_a_flight_are_forks(flyer: Flyer) -> None:
             assert run._flight is not None
             infos = run._flight.infos().values()
             parents = {psutil.Process(info.pid).parent() for info in infos}
-            (server,) = parents
-            assert server is not None
-            assert SERVER in server.cmdline()
+            (template,) = parents
+            assert template is not None
+            assert SERVER in template.cmdline()
