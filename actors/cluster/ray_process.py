@@ -57,21 +57,11 @@ _UNWANTED = ("dashboard/dashboard.py", "_private/monitor.py", "v2/monitor.py", "
 """
 _SUBREAPER = 36
 _NAME_BYTES = 200
-_MISSING = ("ray.serve.scripts", "grpc", "ray.dashboard.optional_deps")
-"""Modules that `ray start` does without, as where they are not installed: a second of imports for
-other subcommands, the proxy for remote drivers, and the web server of the node's agent."""
-_LAUNCHER = Path(__file__).with_name("worker_launcher.py")
 _SERVER = Path(__file__).with_name("fork_server.py")
 _SOCKET = "workers.sock"
 FORK_SERVER = "AERODAAS_FORK_SERVER"
 """Environment variable of Ray's processes that names the fork server's socket."""
-_RAY = (
-    f"import sys; sys.modules.update(dict.fromkeys({_MISSING})); "
-    "from functools import partialmethod; from ray._private.parameter import RayParams; "
-    "RayParams.__init__ = partialmethod(RayParams.__init__, setup_worker_path=sys.argv.pop(1)); "
-    "from ray.scripts.scripts import main; main()"
-)
-"""`ray start` whose workers are started by the program that comes first."""
+_RAY = Path(__file__).with_name("ray_start.py")
 
 
 def main(application: int, streams: str, words: list[str]) -> None:
@@ -149,8 +139,7 @@ def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
     environment = {**os.environ, VARIABLE: str(folder), FORK_SERVER: server}
     _start_fork_server(server, environment)
     own = folder / _RAYS_OWN
-    ray = [sys.executable, "-c", _RAY, str(_LAUNCHER)]
-    command = [*ray, "start", "--temp-dir", str(own), *words]
+    command = [sys.executable, str(_RAY), "start", "--temp-dir", str(own), *words]
     reason = ""
     for _ in range(_TRIES):
         with (folder / "start.log").open("w+") as log:

@@ -13,7 +13,7 @@ from bench_runs import run_benchmark
 def test_falls_are_told_and_walks_are_not(tmp_path: Path) -> None:
     """On renders, by the shipped models."""
     path = tmp_path / "falls.json"
-    words = ["--falls", "2", "--walks", "1", "--duration", "20", "--json", str(path)]
+    words = ["--falls", "1", "--walks", "1", "--duration", "20", "--json", str(path)]
     done = run_benchmark("falls", *words)
     assert done.returncode == 0, done.stderr
     rows = {row["case"]: row for row in json.loads(path.read_text())["rows"]}
