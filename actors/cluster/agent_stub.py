@@ -26,7 +26,8 @@ def main(words: list[str]) -> None:
 
     `words` are the program and the arguments of Ray's agent.
     """
-    options = dict(word.removeprefix("--").partition("=")[::2] for word in words[1:])
+    parts = (word.removeprefix("--").partition("=") for word in words[1:])
+    options = {name: value for name, _, value in parts}
     folder, node = options.get("session-dir"), options.get("node-id")
     if not folder or not node or "minimal" not in options:
         os.execv(sys.executable, [sys.executable, "-u", *words])  # noqa: S606 - Ray's own program
