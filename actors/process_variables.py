@@ -14,9 +14,15 @@ from pydantic import SecretStr
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import MAVLINK_KEY, is_secret_name
 
-__all__ = ["ProcessVariables", "private_variables", "ray_variables", "vehicle_variables"]
+__all__ = [
+    "AT_START",
+    "ProcessVariables",
+    "private_variables",
+    "ray_variables",
+    "vehicle_variables",
+]
 
-_AT_START = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
+AT_START = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
 """Prefixes of variables that loaders, interpreters and libraries read as a process starts."""
 
 
@@ -65,4 +71,4 @@ def vehicle_variables() -> ProcessVariables:
 
 
 def _at_start(name: str) -> bool:
-    return name.startswith(_AT_START) and not is_secret_name(name)
+    return name.startswith(AT_START) and not is_secret_name(name)

@@ -26,6 +26,8 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.actors.process_variables import AT_START
+
 __all__ = ["main"]
 
 _EARLY = ("aerodaas.mission.loop", "aerodaas.drivers.simulated", "aerodaas.recording.recorder")
@@ -33,10 +35,8 @@ _EARLY = ("aerodaas.mission.loop", "aerodaas.drivers.simulated", "aerodaas.recor
 _LATE = ("ray._private.workers.default_worker", "aerodaas.actors.run.actor_classes")
 """Further modules of a template."""
 _MOST_TEMPLATES = 4
-_READ_AT_ONCE = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_", "RAY_")
-"""Prefixes of variables that are read as a process, or a library, is loaded."""
 _READ_LATER = {"PYTHONBREAKPOINT", "PYTHONUNBUFFERED", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"}
-"""Those of them that make no difference to a worker here."""
+"""Variables of those read at a process' start that make no difference to a worker here."""
 _DONE, _REFUSED = b"1", b"0"
 _LOOK_SECONDS = 5.0
 _MOST_BYTES = 2**20
@@ -60,7 +60,7 @@ class _Server:
     """The templates, by the variables that they have been loaded with."""
 
     def __init__(self) -> None:
-        self._began_with = _read_at_once(os.environ, but="RAY_")
+        self._began_with = _chosen(os.environ, AT_START)
         self._templates: dict[frozenset[tuple[str, str]], socket.socket] = {}
         for name in _EARLY:
             importlib.import_module(name)
@@ -74,9 +74,9 @@ class _Server:
         caller.settimeout(_LOOK_SECONDS)
         wanted = _received(caller, 2)
         try:
-            key = frozenset(_read_at_once(wanted.variables).items())
-            alike = _read_at_once(wanted.variables, but="RAY_") == self._began_with
-            if key not in self._templates and alike and len(self._templates) < _MOST_TEMPLATES:
+            key = frozenset(_chosen(wanted.variables, ("RAY_",)).items())
+            alike = _chosen(wanted.variables, AT_START) == self._began_with
+            if alike and key not in self._templates and len(self._templates) < _MOST_TEMPLATES:
                 ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
                 if os.fork() == 0:
                     for one in (ours, *self._templates.values()):
@@ -84,7 +84,7 @@ class _Server:
                     return theirs
                 theirs.close()
                 self._templates[key] = ours
-            if key not in self._templates:
+            if not alike or key not in self._templates:
                 caller.send(_REFUSED)
             elif not _sent(self._templates[key], wanted, caller):
                 self._templates.pop(key).close()  # it has been killed; the next gets another
@@ -176,15 +176,12 @@ def _become(wanted: _Wanted) -> None:
     runpy.run_path(program, run_name="__main__")
 
 
-def _read_at_once(variables: Mapping[str, str], but: str = "-") -> dict[str, str]:
-    """Variables in which a worker must not differ from the process that it is forked from.
-
-    Those that begin with `but` are left out.
-    """
+def _chosen(variables: Mapping[str, str], prefixes: tuple[str, ...]) -> dict[str, str]:
+    """Variables in which a worker must not differ from the process that it is forked from."""
     return {
         name: value
         for name, value in variables.items()
-        if name.startswith(_READ_AT_ONCE) and name not in _READ_LATER and not name.startswith(but)
+        if name.startswith(prefixes) and name not in _READ_LATER
     }
 
 

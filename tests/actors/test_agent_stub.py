@@ -4,45 +4,29 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
 import pytest
 from flying import Flyer, hop
+from orphans import until_gone_with_its_parent
 
 from aerodaas import Environment
 from aerodaas.actors.cluster import agent_stub
 
 STUB = str(agent_stub.__file__)
-PORTS = {"metrics_agent_port_n1", "metrics_export_port_n1", "dashboard_agent_listen_port_n1"}
-
-
-def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
-    """Wait for something to happen."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.02)
+NAMES = ("metrics_agent_port_n1", "metrics_export_port_n1", "dashboard_agent_listen_port_n1")
+PORTS = dict.fromkeys(NAMES, "-1")
 
 
 def test_it_writes_ports_down_and_ends_with_its_node(tmp_path: Path) -> None:
     """As Ray's own does without a web server: that there are none. The node may be killed."""
     words = [sys.executable, "-I", "-S", STUB, "agent.py", "--minimal", f"--session-dir={tmp_path}"]
-    node = (
-        "import subprocess, time\n"
-        f"one = subprocess.Popen({[*words, '--node-id=n1']!r})\n"
-        "print(one.pid, flush=True)\ntime.sleep(60)\n"
-    )
-    with subprocess.Popen([sys.executable, "-c", node], stdout=subprocess.PIPE) as parent:
-        assert parent.stdout is not None
-        stub = psutil.Process(int(parent.stdout.readline()))
-        until(lambda: {path.name for path in tmp_path.iterdir()} == PORTS)
-        assert {path.read_text() for path in tmp_path.iterdir()} == {"-1"}
-        assert stub.is_running()
-        parent.kill()
-    until(lambda: not stub.is_running() or stub.status() == psutil.STATUS_ZOMBIE)
+
+    def written() -> bool:
+        return {path.name: path.read_text() for path in tmp_path.iterdir()} == PORTS
+
+    until_gone_with_its_parent([*words, "--node-id=n1"], written)
 
 
 @pytest.mark.parametrize(

@@ -7,14 +7,14 @@ import os
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 from flying import Flyer, hop
+from orphans import until, until_gone_with_its_parent
 
 import aerodaas.actors.cluster.fork_server as module
 from aerodaas import Environment
@@ -62,18 +62,6 @@ class Pool:
         )
         told: dict[str, Any] = json.loads(done.stdout)
         return told
-
-    def templates(self) -> list[psutil.Process]:
-        """Processes that the server has forked."""
-        return psutil.Process(self.process.pid).children()
-
-
-def until(holds: Callable[[], bool], seconds: float = 30.0) -> None:
-    """Wait for something to happen."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module")
@@ -159,19 +147,9 @@ def test_a_template_that_is_killed_is_made_again(pool: Pool) -> None:
 
 
 def test_they_end_with_who_started_them(tmp_path: Path) -> None:
-    """Though it is killed: server and templates."""
+    """Though it is killed."""
     path = tmp_path / "workers.sock"
-    starting = (
-        "import subprocess, sys, time\n"
-        f"one = subprocess.Popen([sys.executable, {SERVER!r}, {str(path)!r}])\n"
-        "print(one.pid, flush=True)\ntime.sleep(60)\n"
-    )
-    with subprocess.Popen([sys.executable, "-c", starting], stdout=subprocess.PIPE) as parent:
-        assert parent.stdout is not None
-        server = psutil.Process(int(parent.stdout.readline()))
-        until(path.exists)
-        parent.kill()
-    until(lambda: not server.is_running() or server.status() == psutil.STATUS_ZOMBIE)
+    until_gone_with_its_parent([sys.executable, SERVER, str(path)], path.exists)
 
 
 @pytest.mark.slow
