@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Collection
 from typing import Any
 
-from sqlalchemy import ColumnElement, delete, func, insert, select, true
+from sqlalchemy import ColumnElement, bindparam, delete, func, insert, select, true
 
 from aerodaas.protocol.schemas import LeaseState, MissionPhase
 from aerodaas.service.store import tables
@@ -36,6 +36,12 @@ __all__ = [
 
 _PAGE = 1000
 """Rows that a list has, where nobody asks for another number."""
+_OWNED = (
+    select(tables.TOKENS, tables.ACCOUNTS)
+    .join(tables.ACCOUNTS, tables.TOKENS.c.account == tables.ACCOUNTS.c.name)
+    .where(tables.TOKENS.c.id == bindparam("token"))
+)
+"""A token with its account. Each request asks this, so that it is put together once."""
 
 
 class Tenants(Rows[Tenant]):
@@ -74,13 +80,8 @@ class Tokens(Rows[Token]):
 
     def owned(self, id_: str) -> tuple[Token, Account] | None:
         """A token and its account; None if there is none of this id."""
-        statement = (
-            select(tables.TOKENS, tables.ACCOUNTS)
-            .join(tables.ACCOUNTS, tables.TOKENS.c.account == tables.ACCOUNTS.c.name)
-            .where(tables.TOKENS.c.id == id_)
-        )
         with self._database.reading() as connection:
-            found = connection.execute(statement).one_or_none()
+            found = connection.execute(_OWNED, {"token": id_}).one_or_none()
         if found is None:
             return None
         length = len(tables.TOKENS.c)
