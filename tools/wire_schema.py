@@ -17,6 +17,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -38,6 +39,7 @@ _OUT: tuple[type[BaseModel], ...] = (
     PlaybackOut,
     PreflightOut,
     RefusalOut,
+    SceneryOut,
     SurveyOut,
 )
 _IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)

@@ -23,6 +23,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
 from aerodaas.config.home import HomeConfig
 from aerodaas.config.json_text import check_plain, read_json
+from aerodaas.config.map_tiles import MapTilesConfig
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import (
@@ -189,6 +190,7 @@ class EnvironmentConfig(Strict):
     name: str = "environment"
     home: HomeConfig | None = None
     terrain: TerrainConfig | None = None
+    map_tiles: MapTilesConfig | None = None
     robots: list[RobotConfig] = Field(min_length=1)
     sensors: list[SensorConfig] = Field(default_factory=list)
     """Sensors of the environment that no robot carries."""
@@ -214,6 +216,13 @@ class EnvironmentConfig(Strict):
             if twice:
                 message = f"more than one {kind} is called {', '.join(twice)}"
                 raise ValueError(message)
+        return self
+
+    @model_validator(mode="after")
+    def _on_the_map(self) -> Self:
+        if self.map_tiles is not None and self.home is None:
+            message = "map_tiles lie around home: give a home with latitude and longitude"
+            raise ValueError(message)
         return self
 
     @model_validator(mode="after")

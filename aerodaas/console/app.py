@@ -12,6 +12,7 @@ from starlette.requests import HTTPConnection
 
 from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.config.map_tiles import MapTilesConfig
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue
 from aerodaas.console.access import role_of
@@ -24,6 +25,7 @@ from aerodaas.console.surveys import SurveyPlanner
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -50,10 +52,12 @@ def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool 
 
     `framed`: a page of this machine, such as a notebook, may hold it in a frame.
     """
-    return build_page(_Routes(flight, config).router(), framed=framed)
+    return build_page(_Routes(flight, config).router(), framed=framed, tiles=config.map_tiles)
 
 
-def build_page(routes: APIRouter, *, framed: bool = False) -> FastAPI:
+def build_page(
+    routes: APIRouter, *, framed: bool = False, tiles: MapTilesConfig | None = None
+) -> FastAPI:
     """The application with the page, and the routes that it asks; a guard stands before it."""
     app = FastAPI(
         title="AeroDaaS console",
@@ -64,7 +68,7 @@ def build_page(routes: APIRouter, *, framed: bool = False) -> FastAPI:
     )
     for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
         app.add_exception_handler(kind, _refused)
-    app.include_router(page_routes(framed=framed))
+    app.include_router(page_routes(framed=framed, tiles=tiles))
     app.include_router(routes)
     return app
 
@@ -89,6 +93,7 @@ class _Routes:
         self._flight = flight
         self._hub = StreamHub(flight.items)
         self._surveys = SurveyPlanner()
+        self._scenery = SceneryOut.of(config)
         self._fleet = FleetOut(
             name=config.name,
             robots=[
@@ -106,6 +111,7 @@ class _Routes:
         router.add_api_route("/robots/{robot}/preflight", self.preflight)
         router.add_api_route("/missions", self.missions)
         router.add_api_route("/missions/{mission}", self.mission)
+        router.add_api_route("/missions/{mission}/scenery", self.scenery)
         router.add_api_route("/missions/{mission}/commands", self.command, methods=["POST"])
         router.add_api_route("/missions/{mission}/navigation", self.navigation, methods=["POST"])
         router.add_api_route("/missions/{mission}/plan", self.rearrange, methods=["POST"])
@@ -133,6 +139,11 @@ class _Routes:
         """The one flight."""
         require_known(mission)
         return self._flight.mission()
+
+    def scenery(self, mission: str) -> SceneryOut:
+        """What lies below the flight on the map."""
+        require_known(mission)
+        return self._scenery
 
     def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
         """Give a robot a command; answers what the drone said."""

@@ -9,6 +9,8 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse
 from starlette.requests import HTTPConnection
 
+from aerodaas.config.map_tiles import MapTilesConfig
+
 __all__ = ["is_page", "page_routes"]
 
 _FOLDER = Path(__file__).parent / "page"
@@ -21,7 +23,7 @@ _FILES = {
 _HEADERS = {
     # Nothing from elsewhere, no inline script or style, and in nobody's frame unless asked for.
     "content-security-policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:{tiles}; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
     ),
     "x-content-type-options": "nosniff",
@@ -40,11 +42,19 @@ def is_page(connection: HTTPConnection) -> bool:
     return connection.scope["type"] == "http" and connection.scope["path"] in _FILES
 
 
-def page_routes(*, framed: bool = False) -> APIRouter:
-    """Routes of the page's files; `framed`: pages of this machine may hold them in a frame."""
+def page_routes(*, framed: bool = False, tiles: MapTilesConfig | None = None) -> APIRouter:
+    """Routes of the page's files.
+
+    Args:
+        framed: Pages of this machine may hold them in a frame.
+        tiles: Pictures may come from their server, too.
+    """
     router = APIRouter()
-    ancestors = _NOTEBOOKS if framed else _NOBODY
-    headers = {key: value.format(ancestors=ancestors) for key, value in _HEADERS.items()}
+    given = {
+        "ancestors": _NOTEBOOKS if framed else _NOBODY,
+        "tiles": "" if tiles is None else f" {tiles.origin}",
+    }
+    headers = {key: value.format(**given) for key, value in _HEADERS.items()}
     for path, (name, kind) in _FILES.items():
         router.add_api_route(
             path, _sender(name, kind, headers), response_class=FileResponse, include_in_schema=False

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut, TrafficOut
 from aerodaas.protocol.bases import AnswerModel
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
 __all__ = [
@@ -100,6 +101,8 @@ class RecordedOut(AnswerModel):
     """What of the recording could not be read; empty if all could."""
     environment: dict[str, Any]
     """Where it was flown, as in `FleetOut`; empty if that was not recorded."""
+    scenery: SceneryOut = SceneryOut()
+    """What lies below it on the map; of a simulated world one of those that ship."""
     tracks: dict[str, TrackOut]
     """By robot."""
     alerts: list[AlertOut]

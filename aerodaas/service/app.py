@@ -103,6 +103,6 @@ def build_service(
     app.include_router(PilotingRoutes(desk, admission, audit).router())
     app.include_router(LiveRoutes(desk, hub, admission).router())
     app.include_router(HereRoutes(desk, admission).router())
-    app.include_router(page_routes())
+    app.include_router(page_routes(tiles=settings.config.map_tiles))
     app.add_middleware(Gate, admission=admission)
     return app

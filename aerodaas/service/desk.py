@@ -15,6 +15,7 @@ from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
@@ -256,6 +257,11 @@ class MissionDesk:
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; raises RefusedError for any other."""
         return shown(self._seen(principal, mission))
+
+    def scenery(self, principal: Principal, mission: str) -> SceneryOut:
+        """What lies below a mission that this account may see."""
+        seed = self._seen(principal, mission).row.request.get("seed")
+        return SceneryOut.of(self._settings.config, seed)
 
     def missions(self, principal: Principal) -> list[MissionOut]:
         """The newest missions that this account may see, newest first."""

@@ -113,6 +113,7 @@ function Half({ title, flight, recorded, robot, theme, onRobot, onAlone }: HalfP
       </header>
       <FlightMap
         {...{ flight, place, robot }}
+        scenery={recorded.scenery}
         areas={[]}
         mayFly={false}
         marked={null}

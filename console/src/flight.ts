@@ -1,7 +1,7 @@
 // The state of one mission as the page knows it, live or recorded: newest status, trails, charts.
 
 import { Refused, ask, openSocket } from "./connection";
-import type { Point } from "./place";
+import type { Spot } from "./place";
 import type { Past, Source } from "./source";
 import type {
   AnalyticsOut,
@@ -78,7 +78,7 @@ export class Flight {
   connected = false;
   over = false;
   heard = Date.now();
-  trails = new Map<string, Point[]>();
+  trails = new Map<string, Spot[]>();
   history = new Map<string, Sample[]>();
   orders: Order[] = [];
   alerts: Alert[] = [];
@@ -231,7 +231,8 @@ export class Flight {
     const [east, north, up] = status.position ?? [];
     if (east != null && north != null) {
       const trail = this.trails.get(robot) ?? [];
-      if (shifted(trail.at(-1), east, north)) trail.push([east, north]);
+      const spot: Spot = [east, north, up ?? 0];
+      if (shifted(trail.at(-1), spot)) trail.push(spot);
       this.trails.set(robot, trail.length > TRAIL ? trail.filter((_, n) => n % 2 === 0) : trail);
     }
     const samples = this.history.get(robot) ?? [];
@@ -279,9 +280,9 @@ export class Flight {
   }
 }
 
-/** Whether a place is far enough from the last point of a trail to be one of its own. */
-export function shifted(last: Point | undefined, east: number, north: number): boolean {
-  return !last || Math.hypot(last[0] - east, last[1] - north) >= STEP;
+/** Whether a place is far enough from the last one of a trail to be one of its own. */
+export function shifted(last: Spot | undefined, [east, north, up]: Spot): boolean {
+  return !last || Math.hypot(last[0] - east, last[1] - north, last[2] - up) >= STEP;
 }
 
 /** Waypoints that lie ahead, the one being flown to first. */

@@ -12,6 +12,7 @@ import { type LeasedArea, type Place, type Point, areasOf, placeOf } from "./pla
 import { Playback } from "./playback";
 import { Garage, PreflightPanel } from "./preflight";
 import { Recorded } from "./recorded";
+import { useScenery } from "./scenery";
 import { LiveSource } from "./source";
 import { Timeline, momentOfLink } from "./timeline";
 import type { AccountOut, FleetOut, MissionOut, RecordedOut, RobotOut } from "./wire";
@@ -238,6 +239,7 @@ function Console(props: ConsoleProps) {
     () => (recorded ? placeOf({ ...recorded, robots: [] }) : known.place),
     [recorded, known],
   );
+  const scenery = useScenery(first.id, token, recorded?.scenery);
   const abilities = place.robots.get(robot);
   const up = flight?.status(robot)?.position?.[2] ?? 0;
   const height = up > 0.5 ? up : place.takeoffHeight;
@@ -323,6 +325,7 @@ function Console(props: ConsoleProps) {
         <FlightMap
           flight={flight}
           place={place}
+          scenery={scenery}
           areas={recorded ? [] : props.areas}
           robot={robot}
           mayFly={may && !flight.over}

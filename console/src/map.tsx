@@ -1,23 +1,22 @@
 // The map: a metric grid in the environment's local frame, north up, drawn as SVG.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Flight, aheadOf } from "./flight";
+import type { Flight } from "./flight";
+import { Drone, Grid, Plan, Scale } from "./map_layers";
 import type { LeasedArea, Place, Point } from "./place";
+import { RulerLayer, measured } from "./ruler";
+import { SceneryLayer } from "./scenery";
+import { Sight, type Size, type View } from "./sight";
 import { type Drawn, SurveyLayer } from "./survey_map";
+import { TileLayer } from "./tiles";
 import { TrafficLayer, heightOf, headingOf, trafficOf } from "./traffic";
-import type { StatusOut } from "./wire";
+import type { SceneryOut } from "./wire";
 import "./map.css";
-
-interface View {
-  east: number;
-  north: number;
-  /** Pixels a metre. */
-  scale: number;
-}
 
 export interface MapProps {
   flight: Flight;
   place: Place;
+  scenery: SceneryOut;
   areas: LeasedArea[];
   robot: string;
   mayFly: boolean;
@@ -29,14 +28,15 @@ export interface MapProps {
 }
 
 const ZOOM = 1.25;
-/** Most waypoints with their names beside them; a survey has more than can be read. */
-const LABELS = 24;
 
 export function FlightMap(props: MapProps) {
   const box = useRef<HTMLDivElement>(null);
   const [size, setSize] = useState({ width: 600, height: 400 });
   const [view, setView] = useState<View | null>(null);
   const [follow, setFollow] = useState(false);
+  const [tilted, setTilted] = useState(false);
+  /** The points that are measured between. */
+  const [ruler, setRuler] = useState<Point[] | null>(null);
   const drag = useRef<{ x: number; y: number; moved: boolean } | null>(null);
 
   useEffect(() => {
@@ -55,21 +55,20 @@ export function FlightMap(props: MapProps) {
   if (follow && position?.[0] != null && position[1] != null) {
     shown = { ...shown, east: position[0], north: position[1] };
   }
-  const x = (east: number) => size.width / 2 + (east - shown.east) * shown.scale;
-  const y = (north: number) => size.height / 2 - (north - shown.north) * shown.scale;
-  const metres = (px: number, py: number): Point => [
-    shown.east + (px - size.width / 2) / shown.scale,
-    shown.north - (py - size.height / 2) / shown.scale,
-  ];
-  const line = (points: readonly Point[]) =>
-    points.map(([east, north]) => `${x(east).toFixed(1)},${y(north).toFixed(1)}`).join(" ");
+  const sight = new Sight(shown, size, tilted);
+  const x = (east: number) => sight.x(east);
+  const y = (north: number) => sight.y(north);
   const zoom = (factor: number) => {
     const scale = Math.min(400, Math.max(0.05, shown.scale * factor));
     setView({ ...shown, scale });
   };
   const pan = (dx: number, dy: number) => {
     setFollow(false);
-    setView({ ...shown, east: shown.east - dx / shown.scale, north: shown.north + dy / shown.scale });
+    setView({
+      ...shown,
+      east: shown.east - dx / shown.scale,
+      north: shown.north + dy / shown.scale / sight.lies,
+    });
   };
 
   const own = props.flight.status(props.robot)?.position?.[2] ?? null;
@@ -81,18 +80,28 @@ export function FlightMap(props: MapProps) {
     "-": () => zoom(1 / ZOOM),
     "0": () => (setFollow(false), setView(null)),
     f: () => setFollow(!follow),
+    t: () => setTilted(!tilted),
+    m: () => measure(),
     ArrowLeft: () => pan(40, 0),
     ArrowRight: () => pan(-40, 0),
     ArrowUp: () => pan(0, 40),
     ArrowDown: () => pan(0, -40),
-    Enter: () => props.mayFly && place([shown.east, shown.north]),
+    Enter: () => place([shown.east, shown.north]),
   };
   const drawing = props.drawn;
-  if (drawing) {
+  const measure = () => setRuler(ruler ? null : []);
+  if (ruler) {
+    keys["Backspace"] = () => setRuler(ruler.slice(0, -1));
+    keys["Escape"] = () => setRuler(null);
+  } else if (drawing) {
     keys["Backspace"] = () => drawing.undo();
     keys["Escape"] = () => drawing.cancel();
   }
-  const place = (point: Point) => (drawing ? drawing.add(point) : props.onMark(point));
+  const place = (point: Point) => {
+    if (ruler) setRuler([...ruler, point]);
+    else if (drawing) drawing.add(point);
+    else if (props.mayFly) props.onMark(point);
+  };
 
   return (
     <section class="card map" aria-label="Map">
@@ -101,11 +110,12 @@ export function FlightMap(props: MapProps) {
         ref={box}
         tabIndex={0}
         role="application"
-        aria-label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, Enter sets a waypoint, or a corner of the survey that is drawn, at the cross."
+        aria-label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, T tilts the view, M measures, Enter sets a waypoint, a corner of the survey that is drawn, or a point that is measured, at the cross."
         data-testid="map"
         data-scale={shown.scale}
         data-east={shown.east}
         data-north={shown.north}
+        data-tilted={tilted}
         onKeyDown={(event) => {
           const act = keys[event.key];
           if (act) {
@@ -132,25 +142,27 @@ export function FlightMap(props: MapProps) {
         onPointerUp={(event) => {
           const from = drag.current;
           drag.current = null;
-          if (!from || from.moved || !props.mayFly) return;
+          if (!from || from.moved) return;
           const at = event.currentTarget.getBoundingClientRect();
-          place(metres(event.clientX - at.left, event.clientY - at.top));
+          place(sight.metres(event.clientX - at.left, event.clientY - at.top));
         }}
       >
         <svg width={size.width} height={size.height} aria-hidden="true">
-          <Grid size={size} view={shown} x={x} y={y} />
+          {props.scenery.tiles && <TileLayer tiles={props.scenery.tiles} sight={sight} />}
+          <Grid sight={sight} />
+          <SceneryLayer shapes={props.scenery.shapes} sight={sight} />
           {props.place.fences.map((fence) => (
             <g key={fence.robot}>
-              {fence.polygon.length > 2 && <polygon class="fence" points={line(fence.polygon)} />}
+              {fence.polygon.length > 2 && <polygon class="fence" points={sight.line(fence.polygon)} />}
               {fence.noFly.map((zone, number) => (
-                <polygon key={number} class="nofly" points={line(zone)} />
+                <polygon key={number} class="nofly" points={sight.line(zone)} />
               ))}
             </g>
           ))}
           {props.areas.map(({ lease, polygon, title }) => (
             <g key={lease} class="area" data-lease={lease}>
-              <polygon points={line(polygon)} />
-              <text {...middle(polygon, x, y)}>{title}</text>
+              <polygon points={sight.line(polygon)} />
+              <text {...middle(polygon, sight)}>{title}</text>
             </g>
           ))}
           <g class="home" transform={`translate(${x(0)} ${y(0)})`}>
@@ -162,23 +174,21 @@ export function FlightMap(props: MapProps) {
             if (!status) return null;
             return (
               <g key={robot} class={`robot r${number % 6}`}>
-                <polyline class="trail" points={line(props.flight.trails.get(robot) ?? [])} />
-                <Plan status={status} x={x} y={y} line={line} />
+                <polyline class="trail" points={sight.line(props.flight.trails.get(robot) ?? [])} />
+                <Plan status={status} sight={sight} />
                 <Drone
                   name={robot}
                   status={status}
-                  x={x}
-                  y={y}
+                  sight={sight}
                   chosen={robot === props.robot}
                   stale={props.flight.stale}
                 />
               </g>
             );
           })}
-          <TrafficLayer traffic={traffic} own={own} stale={props.flight.stale} x={x} y={y} />
-          {drawing && (
-            <SurveyLayer drawn={drawing} x={x} y={y} line={line} metres={metres} box={box} />
-          )}
+          <TrafficLayer traffic={traffic} own={own} stale={props.flight.stale} sight={sight} />
+          {drawing && <SurveyLayer drawn={drawing} sight={sight} box={box} />}
+          {ruler && <RulerLayer points={ruler} sight={sight} />}
           {props.marked && (
             <g class="marked" transform={`translate(${x(props.marked[0])} ${y(props.marked[1])})`}>
               <circle r="10" />
@@ -188,6 +198,9 @@ export function FlightMap(props: MapProps) {
           <path class="cross" d={`M${size.width / 2 - 6} ${size.height / 2}h12m-6-6v12`} />
         </svg>
         <Scale scale={shown.scale} />
+        {props.scenery.tiles?.attribution && (
+          <div class="attribution">{props.scenery.tiles.attribution}</div>
+        )}
         <div class="north" aria-hidden="true">
           N
         </div>
@@ -204,6 +217,22 @@ export function FlightMap(props: MapProps) {
             Survey
           </button>
         )}
+        <button
+          type="button"
+          title="Measure distances (M)"
+          aria-pressed={ruler !== null}
+          onClick={measure}
+        >
+          Measure
+        </button>
+        <button
+          type="button"
+          title="Look from the south, and see heights (T)"
+          aria-pressed={tilted}
+          onClick={() => setTilted(!tilted)}
+        >
+          Tilt
+        </button>
         <button type="button" title="Zoom in (+)" aria-label="Zoom in" onClick={() => zoom(ZOOM)}>
           +
         </button>
@@ -234,6 +263,11 @@ export function FlightMap(props: MapProps) {
           Follow
         </button>
       </div>
+      {ruler && (
+        <p class="measured" role="status" data-testid="measured">
+          {measured(ruler)}
+        </p>
+      )}
       <ul class="legend" aria-label="Legend">
         <li class="visited">visited</li>
         <li class="current">current</li>
@@ -261,132 +295,11 @@ export function FlightMap(props: MapProps) {
   );
 }
 
-export interface Frame {
-  x(east: number): number;
-  y(north: number): number;
-}
-
-function Plan({ status, x, y, line }: Frame & { status: StatusOut; line(p: Point[]): string }) {
-  const ahead = aheadOf(status);
-  const known = Object.entries(status.places);
-  const way: Point[] = [];
-  if (status.position?.[0] != null && status.position[1] != null) {
-    way.push([status.position[0], status.position[1]]);
-  }
-  for (const id of ahead) {
-    const place = status.places[id];
-    if (place) way.push([place[0], place[1]]);
-  }
-  return (
-    <g>
-      {ahead.length > 0 && <polyline class="way" points={line(way)} />}
-      {known.map(([id, [east, north]]) => {
-        const number = ahead.indexOf(id);
-        const current = id === status.target;
-        const visited = number < 0 && status.visited.includes(id);
-        const kind = current ? "current" : number >= 0 ? "coming" : visited ? "visited" : "dropped";
-        return (
-          <g
-            key={id}
-            class={`waypoint ${kind}`}
-            data-waypoint={id}
-            transform={`translate(${x(east)} ${y(north)})`}
-          >
-            <circle r={current ? 8 : 6} />
-            {visited && <path d="M-3 0l2 3 4-6" />}
-            {(current || known.length <= LABELS) && (
-              <text x="11" dy="4">
-                {id}
-              </text>
-            )}
-          </g>
-        );
-      })}
-    </g>
-  );
-}
-
-function Drone(props: Frame & { name: string; status: StatusOut; chosen: boolean; stale: boolean }) {
-  const [east, north, up] = props.status.position ?? [];
-  if (east == null || north == null) return null;
-  const turn = 90 - ((props.status.yaw ?? Math.PI / 2) * 180) / Math.PI;
-  const [ve, vn] = props.status.velocity ?? [];
-  return (
-    <g
-      class={`drone ${props.chosen ? "chosen" : ""} ${props.stale ? "stale" : ""}`}
-      transform={`translate(${props.x(east)} ${props.y(north)})`}
-      data-drone={props.name}
-    >
-      {ve != null && vn != null && <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14}`} />}
-      <path class="body" d="M0-14L9 10L0 5L-9 10Z" transform={`rotate(${turn})`} />
-      <text y="-20">
-        {props.name}
-        {up != null && <tspan class="small"> {up.toFixed(1)} m</tspan>}
-      </text>
-    </g>
-  );
-}
-
-function Grid(props: Frame & { size: { width: number; height: number }; view: View }) {
-  const step = niceStep(70 / props.view.scale);
-  const lines = [];
-  const half = props.size.width / 2 / props.view.scale;
-  const high = props.size.height / 2 / props.view.scale;
-  const from = Math.ceil((props.view.east - half) / step);
-  const to = Math.floor((props.view.east + half) / step);
-  for (let n = from; n <= to; n += 1) {
-    const at = props.x(n * step);
-    lines.push(
-      <g key={`e${n}`}>
-        <path class={n === 0 ? "axis" : "grid"} d={`M${at} 0V${props.size.height}`} />
-        <text class="coordinate" x={at + 3} y={props.size.height - 5}>
-          {label(n * step)}
-        </text>
-      </g>,
-    );
-  }
-  const low = Math.ceil((props.view.north - high) / step);
-  const top = Math.floor((props.view.north + high) / step);
-  for (let n = low; n <= top; n += 1) {
-    const at = props.y(n * step);
-    lines.push(
-      <g key={`n${n}`}>
-        <path class={n === 0 ? "axis" : "grid"} d={`M0 ${at}H${props.size.width}`} />
-        <text class="coordinate" x="4" y={at - 3}>
-          {label(n * step)}
-        </text>
-      </g>,
-    );
-  }
-  return <g>{lines}</g>;
-}
-
-function Scale({ scale }: { scale: number }) {
-  const length = niceStep(60 / scale);
-  return (
-    <svg class="scale" width={length * scale + 4} height="24" aria-hidden="true">
-      <text x={(length * scale) / 2 + 2} y="11">
-        {label(length)} m
-      </text>
-      <path d={`M2 14v7h${length * scale}v-7`} />
-    </svg>
-  );
-}
-
-function label(value: number): string {
-  return String(Number(value.toFixed(2)));
-}
-
-function niceStep(least: number): number {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return ([1, 2, 5, 10].find((one) => one * power >= least) ?? 10) * power;
-}
-
 /** Where an area's name stands: amid its corners. */
-function middle(polygon: Point[], x: Frame["x"], y: Frame["y"]): { x: number; y: number } {
+function middle(polygon: Point[], sight: Sight): { x: number; y: number } {
   const mean = (of: (point: Point) => number) =>
     polygon.reduce((sum, point) => sum + of(point), 0) / polygon.length;
-  return { x: x(mean(([east]) => east)), y: y(mean(([, north]) => north)) };
+  return { x: sight.x(mean(([east]) => east)), y: sight.y(mean(([, north]) => north)) };
 }
 
 function planKey(flight: Flight): string {
@@ -396,7 +309,7 @@ function planKey(flight: Flight): string {
 }
 
 /** The view that shows home, starts, waypoints and the fences that are not far beyond them. */
-function fit({ flight, place }: MapProps, size: { width: number; height: number }): View {
+function fit({ flight, place }: MapProps, size: Size): View {
   const points: Point[] = [[0, 0], ...place.starts];
   for (const status of Object.values(flight.mission.status)) {
     for (const [east, north] of Object.values(status.places)) points.push([east, north]);

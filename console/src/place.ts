@@ -3,6 +3,8 @@
 import type { FleetOut, RobotOut } from "./wire";
 
 export type Point = readonly [number, number];
+/** With its height. */
+export type Spot = readonly [number, number, number];
 
 export interface Place {
   fences: { robot: string; polygon: Point[]; noFly: Point[][]; ceiling: number }[];

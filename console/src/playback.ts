@@ -2,7 +2,7 @@
 
 import { answered } from "./connection";
 import { type Alert, type Sample, shifted, speedOf } from "./flight";
-import type { Point } from "./place";
+import type { Spot } from "./place";
 import type { FlightEars, ItemEars, Past, Source, Wanted } from "./source";
 import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
 
@@ -182,7 +182,7 @@ export class Playback implements Source {
     this.shown = performance.now();
     const status: Record<string, StatusOut> = {};
     const past: Past = {
-      trails: new Map<string, Point[]>(),
+      trails: new Map<string, Spot[]>(),
       history: new Map<string, Sample[]>(),
       alerts: this.alerts(),
       analytics: this.flight.analytics,
@@ -218,7 +218,7 @@ export class Playback implements Source {
 /** One robot's flight by time. */
 class Track {
   readonly history: Sample[];
-  private way: { time: number; point: Point }[] = [];
+  private way: { time: number; spot: Spot }[] = [];
 
   constructor(private readonly track: TrackOut) {
     this.history = track.time.map((time, row) => ({
@@ -228,16 +228,17 @@ class Track {
       battery: track.battery[row] ?? null,
     }));
     track.time.forEach((time, row) => {
-      const [east, north] = track.position[row] ?? [];
+      const [east, north, up] = track.position[row] ?? [];
       if (east == null || north == null) return;
-      if (shifted(this.way.at(-1)?.point, east, north)) this.way.push({ time, point: [east, north] });
+      const spot: Spot = [east, north, up ?? 0];
+      if (shifted(this.way.at(-1)?.spot, spot)) this.way.push({ time, spot });
     });
     while (this.way.length > TRAIL) this.way = this.way.filter((_, place) => place % 2 === 0);
   }
 
-  trail(time: number): Point[] {
+  trail(time: number): Spot[] {
     const until = lastBefore(this.way, time, (one) => one.time);
-    return this.way.slice(0, until + 1).map((one) => one.point);
+    return this.way.slice(0, until + 1).map((one) => one.spot);
   }
 
   /** Other aircraft at a time: where the last word put them, and on from there. */

@@ -2,13 +2,13 @@
 
 import { LiveSocket } from "./connection";
 import type { Alert, Sample } from "./flight";
-import type { Point } from "./place";
+import type { Spot } from "./place";
 import { wantedForm } from "./video_pictures";
 import type { AnalyticsOut, MissionOut } from "./wire";
 
 /** What came before a moment of a recording, and of its charts what comes after it, too. */
 export interface Past {
-  trails: Map<string, Point[]>;
+  trails: Map<string, Spot[]>;
   history: Map<string, Sample[]>;
   alerts: Alert[];
   analytics: AnalyticsOut[];

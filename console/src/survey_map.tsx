@@ -2,8 +2,8 @@
 
 import type { RefObject } from "preact";
 import { useRef } from "preact/hooks";
-import type { Frame } from "./map";
 import type { Point } from "./place";
+import type { Sight } from "./sight";
 
 /** What the map needs of a survey that is being drawn. */
 export interface Drawn {
@@ -16,33 +16,32 @@ export interface Drawn {
   cancel(): void;
 }
 
-interface LayerProps extends Frame {
+interface LayerProps {
   drawn: Drawn;
-  line(points: readonly Point[]): string;
-  metres(px: number, py: number): Point;
+  sight: Sight;
   box: RefObject<HTMLDivElement | null>;
 }
 
-export function SurveyLayer({ drawn, x, y, line, metres, box }: LayerProps) {
+export function SurveyLayer({ drawn, sight, box }: LayerProps) {
   const held = useRef<number | null>(null);
   const drag = (event: PointerEvent) => {
     const at = box.current?.getBoundingClientRect();
     if (held.current === null || !at) return;
     event.stopPropagation();
-    drawn.move(held.current, metres(event.clientX - at.left, event.clientY - at.top));
+    drawn.move(held.current, sight.metres(event.clientX - at.left, event.clientY - at.top));
   };
   const [first] = drawn.path;
   return (
     <g class={`survey ${drawn.refused ? "refused" : ""}`}>
-      {drawn.area.length > 1 && <polygon class="area" points={line(drawn.area)} />}
-      {drawn.path.length > 1 && <polyline class="sweeps" points={line(drawn.path)} />}
-      {first && <circle class="entry" cx={x(first[0])} cy={y(first[1])} r="5" />}
+      {drawn.area.length > 1 && <polygon class="area" points={sight.line(drawn.area)} />}
+      {drawn.path.length > 1 && <polyline class="sweeps" points={sight.line(drawn.path)} />}
+      {first && <circle class="entry" cx={sight.x(first[0])} cy={sight.y(first[1])} r="5" />}
       {drawn.area.map(([east, north], corner) => (
         <g
           key={corner}
           class="corner"
           data-corner={corner}
-          transform={`translate(${x(east)} ${y(north)})`}
+          transform={`translate(${sight.x(east)} ${sight.y(north)})`}
           onPointerDown={(event) => {
             event.stopPropagation();
             held.current = corner;

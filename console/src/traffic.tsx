@@ -1,6 +1,6 @@
 // Other aircraft on the map: where they are, their heading, and how much higher than the drone.
 
-import type { Frame } from "./map";
+import type { Sight } from "./sight";
 import type { StatusOut, TrafficOut } from "./wire";
 
 /** Seconds without a word after which an aircraft is shown as old; after 10 it is gone. */
@@ -35,7 +35,7 @@ export function headingOf({ velocity: [east, north] }: TrafficOut): string {
 }
 
 export function TrafficLayer(
-  props: Frame & { traffic: TrafficOut[]; own: number | null; stale: boolean },
+  props: { traffic: TrafficOut[]; own: number | null; stale: boolean; sight: Sight },
 ) {
   return (
     <g>
@@ -49,7 +49,7 @@ export function TrafficLayer(
           <g
             key={one.address}
             class={`traffic ${old ? "stale" : ""}`}
-            transform={`translate(${props.x(east)} ${props.y(north)})`}
+            transform={`translate(${props.sight.x(east)} ${props.sight.y(north)})`}
             data-aircraft={one.callsign}
           >
             {moves ? (

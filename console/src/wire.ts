@@ -46,6 +46,7 @@ export interface Wire {
   PreflightOut: PreflightOut;
   RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
+  SceneryOut: SceneryOut1;
   SteerIn: SteerIn;
   SurveyIn: SurveyIn;
   SurveyOut: SurveyOut;
@@ -297,6 +298,7 @@ export interface RecordedOut {
   };
   name: string;
   remark: string;
+  scenery: SceneryOut;
   streams: {
     [k: string]: StreamKind;
   };
@@ -311,6 +313,32 @@ export interface AlertOut {
   kind: string;
   text: string;
   time: number;
+}
+/**
+ * What the map draws below a flight; empty where nothing is known.
+ */
+export interface SceneryOut {
+  shapes: ShapeOut[];
+  tiles: TilesOut | null;
+}
+/**
+ * One thing of a simulated world that stands still.
+ */
+export interface ShapeOut {
+  height: number;
+  kind: "building" | "crops" | "fence" | "road" | "rubble" | "tower" | "tree";
+  outline: [number, number][];
+  width: number;
+}
+/**
+ * Tiles of the Earth, and where the local frame lies on it.
+ */
+export interface TilesOut {
+  attribution: string;
+  latitude: number;
+  longitude: number;
+  max_zoom: number;
+  url: string;
 }
 /**
  * One robot's flight.
@@ -395,6 +423,13 @@ export interface RearrangeIn {
  */
 export interface RefusalOut {
   text: string;
+}
+/**
+ * What the map draws below a flight; empty where nothing is known.
+ */
+export interface SceneryOut1 {
+  shapes: ShapeOut[];
+  tiles: TilesOut | null;
 }
 /**
  * A velocity by hand, in the drone's level frame; it is good for a third of a second.

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.config.model import validated
+from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.redaction import catalogue
 from aerodaas.protocol.playback import AlertOut, RecordedOut
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import StreamKind
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, picture_topics
@@ -17,6 +18,7 @@ from aerodaas.recording.playback.target import NAVIGATION_SCHEMA
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
+from aerodaas.simulation.scenario import scenario_names
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.errors import AeroDaaSError
 
@@ -117,7 +119,7 @@ class _Reading:
             begin=max(0.0, seconds(first)),
             end=seconds(last),
             remark=_remark(recording, last, self._room.untold),
-            environment=_environment(recording),
+            **_surroundings(recording),
             tracks={name: one.track for name, one in self._robots.items()},
             alerts=sorted(self._alerts, key=lambda one: one.time),
             analytics=self._sums.rows,
@@ -149,12 +151,23 @@ def _remark(recording: Recording, last: int, untold: int) -> str:
     return "; ".join(parts)
 
 
-def _environment(recording: Recording) -> dict[str, Any]:
-    """What anybody may know of the recorded environment; empty where there is none."""
+def _surroundings(recording: Recording) -> dict[str, Any]:
+    """The recorded environment as anybody may know it, and what it looks like, if there is one."""
     try:
-        content = allowed_content(recorded_content(recording))
+        recorded = recorded_content(recording)
+        content = allowed_content(recorded)
         config = validated(content, f"the environment in {recording.path}")
     except AeroDaaSError:
-        return {}
-    shown: dict[str, Any] = catalogue(config).model_dump(mode="json", by_alias=True)
-    return shown
+        return {"environment": {}}
+    shown = catalogue(config).model_dump(mode="json", by_alias=True)
+    return {"environment": shown, "scenery": _scenery(recorded, config)}
+
+
+def _scenery(recorded: Any, config: EnvironmentConfig) -> SceneryOut:  # noqa: ANN401 - JSON
+    """Of a world that ships: another one is a file's path, which a stranger may have chosen."""
+    simulation = recorded.get("simulation")
+    world = simulation.get("world") if isinstance(simulation, dict) else None
+    if world not in scenario_names():
+        return SceneryOut()
+    named = config.simulation.model_copy(update={"world": world})
+    return SceneryOut.of(config.model_copy(update={"simulation": named}))

@@ -16,6 +16,7 @@ from aerodaas.console.playback import (
     flight_answer,
     picture_answer,
 )
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     CommandIn,
     GrantIn,
@@ -50,6 +51,7 @@ class MissionRoutes:
         router.add_api_route("", self.submit, methods=["POST"], status_code=202)
         router.add_api_route("", self.missions)
         router.add_api_route("/{mission}", self.mission)
+        router.add_api_route("/{mission}/scenery", self.scenery)
         router.add_api_route("/{mission}", self.cancel, methods=["DELETE"])
         router.add_api_route("/{mission}/approve", self.approve, methods=["POST"])
         router.add_api_route("/{mission}/commands", self.command, methods=["POST"])
@@ -94,6 +96,10 @@ class MissionRoutes:
         if self._desk.flies(principal, mission):
             self._desk.hear(mission)
         return found
+
+    def scenery(self, mission: str, request: Request) -> SceneryOut:
+        """What lies below a mission on the map."""
+        return self._desk.scenery(self._admission.require(request, Role.VIEWER), mission)
 
     def cancel(self, mission: str, request: Request) -> MissionOut:
         """Cancel a mission; drones in flight come home."""

@@ -1,0 +1,90 @@
+"""What lies below a flight on the map: the simulated world, or tiles of the Earth."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.robot import RobotConfig
+from aerodaas.protocol.bases import AnswerModel
+from aerodaas.simulation.ground_plan import ShapeKind, ground_plan
+from aerodaas.simulation.world import World
+
+__all__ = ["SceneryOut", "ShapeOut", "TilesOut"]
+
+
+class ShapeOut(AnswerModel):
+    """One thing of a simulated world that stands still."""
+
+    kind: ShapeKind
+    outline: list[tuple[float, float]]
+    """Metres east and north: the corners of an area, the points of a road's or fence's line, the
+    middle of a tree."""
+    height: float
+    """Metres."""
+    width: float
+    """Of a road, and of a tree's crown, metres."""
+
+
+class TilesOut(AnswerModel):
+    """Tiles of the Earth, and where the local frame lies on it."""
+
+    url: str
+    attribution: str
+    max_zoom: int
+    latitude: float
+    """Of the local frame's origin, degrees."""
+    longitude: float
+
+
+class SceneryOut(AnswerModel):
+    """What the map draws below a flight; empty where nothing is known."""
+
+    shapes: list[ShapeOut] = Field(default_factory=list)
+    tiles: TilesOut | None = None
+
+    @classmethod
+    def of(cls, config: EnvironmentConfig, seed: int | None = None) -> SceneryOut:
+        """The scenery of an environment; a simulated world's where all of its drones are simulated.
+
+        Args:
+            config: The environment.
+            seed: Of the flight; None for the environment's own.
+
+        Raises:
+            ConfigError: If its world cannot be read.
+        """
+        return cls(shapes=_shapes(config, seed), tiles=_tiles(config))
+
+
+def _shapes(config: EnvironmentConfig, seed: int | None) -> list[ShapeOut]:
+    if not all(map(_simulated, config.robots)):
+        return []
+    chosen = {} if seed is None else {"seed": seed}
+    world = World.load(config.simulation.model_copy(update=chosen))
+    return [
+        ShapeOut(
+            kind=one.kind,
+            outline=[(round(east, 2), round(north, 2)) for east, north in one.outline],
+            height=round(one.height, 2),
+            width=round(one.width, 2),
+        )
+        for one in ground_plan(world)
+    ]
+
+
+def _simulated(robot: RobotConfig) -> bool:
+    return robot.driver == "simulated"
+
+
+def _tiles(config: EnvironmentConfig) -> TilesOut | None:
+    tiles, home = config.map_tiles, config.home
+    if tiles is None or home is None:
+        return None
+    return TilesOut(
+        url=tiles.url,
+        attribution=tiles.attribution,
+        max_zoom=tiles.max_zoom,
+        latitude=home.latitude,
+        longitude=home.longitude,
+    )

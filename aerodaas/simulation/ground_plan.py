@@ -1,0 +1,85 @@
+"""The ground plan of a simulated world: what stands still in it, as a map draws it.
+
+People and cars are left out, those that stand still, too: where they are is for cameras to find.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from aerodaas.simulation.boxes import Box
+from aerodaas.simulation.scenario import (
+    Building,
+    Car,
+    CropRows,
+    Fence,
+    Person,
+    Road,
+    Rubble,
+    Tower,
+    Tree,
+)
+from aerodaas.simulation.world import Thing, World
+
+__all__ = ["Shape", "ShapeKind", "ground_plan"]
+
+ShapeKind: TypeAlias = Literal["building", "crops", "fence", "road", "rubble", "tower", "tree"]
+_Point: TypeAlias = tuple[float, float]
+_KINDS: dict[type, ShapeKind] = {
+    Building: "building",
+    CropRows: "crops",
+    Rubble: "rubble",
+    Tower: "tower",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One thing of the plan."""
+
+    kind: ShapeKind
+    outline: tuple[_Point, ...]
+    """Metres east and north: the corners of an area, the points of a road's or fence's line, the
+    middle of a tree."""
+    height: float
+    """Of its highest point, metres."""
+    width: float = 0.0
+    """Of a road, and of a tree's crown, metres."""
+
+
+def ground_plan(world: World) -> list[Shape]:
+    """What stands still in a world, in the scenario's order."""
+    return [shape for thing in world.things if (shape := _shape(thing)) is not None]
+
+
+def _shape(thing: Thing) -> Shape | None:
+    spec = thing.spec
+    if isinstance(spec, Person | Car):
+        return None
+    if isinstance(spec, Road):
+        return Shape("road", tuple(spec.points), 0.0, spec.width)
+    if isinstance(spec, Fence):
+        return Shape("fence", tuple(spec.points), spec.height)
+    (box,) = thing.boxes(0.0)
+    _, width, height = box.size
+    if isinstance(spec, Tree):
+        return Shape("tree", ((thing.x, thing.y),), height, width)
+    return Shape(_KINDS[type(spec)], _corners(box), height)
+
+
+def _corners(box: Box) -> tuple[_Point, ...]:
+    """Corners of a box's foot, counter-clockwise."""
+    east, north, _ = box.centre
+    length, width, _ = box.size
+    cosine, sine = math.cos(box.yaw), math.sin(box.yaw)
+    return tuple(
+        (east + cosine * ahead - sine * left, north + sine * ahead + cosine * left)
+        for ahead, left in (
+            (length / 2, width / 2),
+            (-length / 2, width / 2),
+            (-length / 2, -width / 2),
+            (length / 2, -width / 2),
+        )
+    )
