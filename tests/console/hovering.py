@@ -33,8 +33,8 @@ ENVIRONMENT = {
 class Run:
     """A flight that hovers before one waypoint, and remembers what it was told."""
 
-    def __init__(self) -> None:
-        self.config = EnvironmentConfig.model_validate(ENVIRONMENT)
+    def __init__(self, **environment: object) -> None:
+        self.config = EnvironmentConfig.model_validate({**ENVIRONMENT, **environment})
         self.graph = Graph()
         self.over = False
         self.state: Any = None
@@ -80,9 +80,9 @@ class Run:
 
 
 @contextmanager
-def console(*, framed: bool = False) -> Iterator[tuple[ConsoleServer, Run]]:
-    """The console of a flight that never ends."""
-    run = Run()
+def console(*, framed: bool = False, **environment: object) -> Iterator[tuple[ConsoleServer, Run]]:
+    """The console of a flight that never ends, in an environment with further fields."""
+    run = Run(**environment)
     server = ConsoleServer("127.0.0.1:0", framed=framed)
     server.start(run, "survey")
     try:

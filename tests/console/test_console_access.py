@@ -79,10 +79,29 @@ def test_the_page_needs_no_token_and_admits_nothing_from_elsewhere(
     assert content
     policy = headers["content-security-policy"]
     assert "default-src 'none'" in policy
+    assert "img-src 'self' blob:; " in policy
     assert "script-src 'self';" in policy
     assert "unsafe" not in policy
     assert "frame-ancestors 'none'" in policy
     assert headers["x-content-type-options"] == "nosniff"
+
+
+def test_pictures_come_from_the_tiles_server_too_and_scripts_do_not() -> None:
+    """Where an environment names one; what lies below the flight is told to whoever watches."""
+    tiles = {"url": "https://tiles.example/{z}/{x}/{y}.png", "attribution": "© them"}
+    home = {"latitude": 50.0, "longitude": 8.0}
+    with console(map_tiles=tiles, home=home, simulation={"world": "campus"}) as (server, _):
+        policy = ask(server.address(), "/", token="")[1]["content-security-policy"]
+        assert "img-src 'self' blob: https://tiles.example; " in policy
+        assert policy.count("tiles.example") == 1
+        address = server.address(viewer=True)
+        status, _, scenery = ask(address, "/v1/missions/own/scenery")
+        assert status == 200
+        assert scenery["tiles"] == {**tiles, **home, "max_zoom": 19}
+        library = next(one for one in scenery["shapes"] if one["kind"] == "building")
+        assert library["outline"][0] == [30.0, 22.0]
+        assert ask(address, "/v1/missions/other/scenery")[0] == 404
+        assert ask(f"{address}9", "/v1/missions/own/scenery")[0] == 401
 
 
 def test_a_notebook_of_this_machine_may_frame_the_page() -> None:
@@ -91,6 +110,7 @@ def test_a_notebook_of_this_machine_may_frame_the_page() -> None:
         policy = ask(server.address(), "/", token="")[1]["content-security-policy"]
     assert "frame-ancestors http://127.0.0.1:* http://localhost:*" in policy
     assert "default-src 'none'" in policy
+    assert "img-src 'self' blob:; " in policy
 
 
 @pytest.mark.parametrize("token", ["", "wrong", "é"])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from flown import Proxy, Watched
 from hovering import console
+from pages import click_map, until_state
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
@@ -39,30 +40,12 @@ def button(name: str) -> str:
     return f"document.querySelector('.command.{name}:not(:disabled)').click()"
 
 
-def until_state(page: Page, *states: str) -> None:
-    """Wait until the page says that the drone is in one of these states."""
-    page.until(
-        f"{json.dumps(states)}.includes(document.querySelector('[data-testid=state]')?.innerText)"
-    )
-
-
 def until_done(page: Page, what: str) -> None:
     """Wait until the newest order is this one, and was seen to be carried out."""
     page.until(
         f"(one => one?.dataset.stage === 'done' && one.innerText.startsWith({json.dumps(what)}))"
         "(document.querySelector('.orders li'))"
     )
-
-
-def click_map(page: Page, east: float, north: float) -> None:
-    """Click a place of the map."""
-    x, y = page.run(
-        "(map => { const box = map.getBoundingClientRect(); const of = map.dataset; return ["
-        f"box.x + box.width / 2 + ({east} - of.east) * of.scale,"
-        f"box.y + box.height / 2 - ({north} - of.north) * of.scale]; }})"
-        "(document.querySelector('[data-testid=map]'))"
-    )
-    page.click(x, y)
 
 
 def fly_there(page: Page, **values: float) -> None:

@@ -12,6 +12,7 @@ from mcap.writer import Writer
 from synthetic_flight import SyntheticFlight, record
 
 from aerodaas.protocol.playback import RecordedOut
+from aerodaas.protocol.scenery import ShapeOut
 from aerodaas.recording.playback import decisions, track
 from aerodaas.recording.playback.decisions import DecisionSums
 from aerodaas.recording.playback.flight import read_flight
@@ -113,6 +114,35 @@ def test_what_it_was_flown_in_and_what_happened(path: Path) -> None:
         "tello/detector": "detections",
         "tello/follow": "navigation",
     }
+
+
+def flown_in(path: Path, world: object, driver: str = "simulated") -> list[ShapeOut]:
+    """What a recording that says it was flown in this world shows below its flight."""
+    environment = {"robots": [{"id": "x", "driver": driver}], "simulation": {"world": world}}
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        content = json.dumps(environment).encode()
+        writer.add_attachment(0, 0, "environment.json", "application/json", content)
+        schema = writer.register_schema("aerodaas.Alert", "jsonschema", b"{}")
+        channel = writer.register_channel("/alerts", "json", schema)
+        alert = {"stamp": 0, "kind": "k", "text": "t", "values": {}}
+        writer.add_message(channel, 0, json.dumps(alert).encode(), 0)
+        writer.finish()
+    flight = read(path)
+    assert flight.environment["robots"][0]["id"] == "x"
+    return flight.scenery.shapes
+
+
+def test_the_world_below_is_one_that_ships(tmp_path: Path) -> None:
+    """A stranger's recording cannot have a file of the reader's read; a real drone flew in none."""
+    path = tmp_path / "odd.mcap"
+    own = tmp_path / "own.json"
+    own.write_text('{"name": "own", "entities": [{"kind": "building", "id": "mine"}]}')
+    for world in (str(own), "../worlds/campus", ["campus"], {"campus": 1}, None, 7):
+        assert flown_in(path, world) == []
+    assert {one.kind for one in flown_in(path, "campus")} == {"road", "building", "tree"}
+    assert flown_in(path, "campus", driver="mavlink") == []
 
 
 def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path) -> None:

@@ -70,6 +70,10 @@ LOCAL_ALONE = {
     "compute.endpoint.token_header",
     "compute.settings",
     "runtime_env",
+    # A reader's page would fetch pictures from wherever a stranger's recording says.
+    "map_tiles.url",
+    "map_tiles.attribution",
+    "map_tiles.max_zoom",
     # Paths of files, and what belongs to them.
     "terrain.files",
     "terrain.clearance",

@@ -6,13 +6,15 @@ import json
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from served import document, fleet, robot
 
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, SimulationConfig
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     MissionIn,
     MissionOut,
@@ -271,3 +273,19 @@ def test_so_is_a_flight_that_cannot_be_heard(
 
 def _unreadable() -> None:
     raise OSError("unreadable")
+
+
+def test_trees_stand_where_the_missions_own_seed_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the map of a mission that asked for one; the fleet's seed is for all others."""
+    desk = Desk(tmp_path, monkeypatch)
+    wooded = desk.settings.config.model_copy(
+        update={"simulation": SimulationConfig(world="campus")}
+    )
+    desk.settings = replace(desk.settings, config=wooded)
+    desk.open()
+    known = SceneryOut.of(wooded)
+    own, other = desk.submit("one", seed=3), desk.submit("two")
+    assert desk.desk.scenery(PILOT, own.id) == SceneryOut.of(wooded, 3) != known
+    assert desk.desk.scenery(PILOT, other.id) == known

@@ -64,6 +64,16 @@ def test_the_list_before_take_off_is_told_between_missions_and_in_them(provider:
     assert client.fleet().robots[0].preflight is Verdict.GOOD
 
 
+def test_what_lies_below_a_mission_is_told_to_who_sees_it(provider: Served, mission: str) -> None:
+    """Another tenant has no such mission; the world of this fleet is empty."""
+    path = f"/v1/missions/{mission}/scenery"
+    assert provider.ask("GET", path) == {"shapes": [], "tiles": None}
+    stranger = provider.user("stranger", "others", "operator")
+    viewer = provider.user("looker", "others", "viewer")
+    assert provider.send("GET", path, token=stranger)[0] == 200
+    assert provider.send("GET", path, token=viewer)[0] == 404
+
+
 def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission: str) -> None:
     """With the account's token; places of waypoints are told."""
     url = f"{provider.url.replace('http', 'ws')}/v1/missions/{mission}/live"

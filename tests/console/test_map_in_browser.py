@@ -1,0 +1,140 @@
+"""The map of the console in a real browser: what lies below a flight, tilted and measured."""
+
+from __future__ import annotations
+
+import math
+import re
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import cv2
+import numpy as np
+import pytest
+from hovering import console
+from pages import click_map, until_state
+from required import needs_peer
+
+from aerodaas.types.geometry import GeodeticOrigin
+from tools.browser import Browser
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
+
+
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    """A browser of the test's own."""
+    with Browser() as browser:
+        yield browser
+
+
+@contextmanager
+def tile_server(asked: list[str]) -> Iterator[int]:
+    """A server of green tiles; yields its port, and notes the paths that it is asked for."""
+    picture = cv2.imencode(".png", np.full((256, 256, 3), (90, 160, 90), np.uint8))[1].tobytes()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_response(200)
+            self.send_header("Content-Type", "image/png")
+            self.end_headers()
+            self.wfile.write(picture)
+
+        def log_message(self, *_: object) -> None:
+            """Nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield server.server_address[1]
+        finally:
+            server.shutdown()
+
+
+def corner_of(column: float, row: float, level: int) -> tuple[float, float]:
+    """Latitude and longitude of a tile's north-west corner, as OpenStreetMap's wiki has it."""
+    count = 2**level
+    latitude = math.degrees(math.atan(math.sinh(math.pi * (1 - 2 * row / count))))
+    return latitude, column / count * 360 - 180
+
+
+def test_the_world_below_is_seen_tilted_and_measured(browser: Browser) -> None:
+    """Houses get walls, the drone a stem to the ground; a viewer measures, by mouse and keys."""
+    with console(simulation={"world": "campus"}) as (server, _):
+        page = browser.open(server.address(viewer=True))
+        until_state(page, "enroute")
+        page.until("document.querySelectorAll('.scenery .building').length === 4")
+        assert page.run("document.querySelectorAll('.scenery .wall, .stem').length") == 0
+        low = page.run("document.querySelector('.drone .body').getBoundingClientRect().top")
+        page.run("document.querySelector('[data-testid=map]').focus()")
+        page.key("t")
+        page.until("document.querySelector('[data-testid=map]').dataset.tilted === 'true'")
+        # Two sides of each house look south at least, its roof up.
+        assert page.run("document.querySelectorAll('.scenery .building .roof').length") == 4
+        assert page.run("document.querySelectorAll('.scenery .building .wall').length") >= 4
+        stem = page.run(
+            "document.querySelector('.drone .stem').getBBox().height"
+            " / document.querySelector('[data-testid=map]').dataset.scale"
+        )
+        assert stem == pytest.approx(3.0 * np.sqrt(1 - 0.55**2), abs=0.05)
+        page.key("t")
+        page.until("document.querySelector('[data-testid=map]').dataset.tilted === 'false'")
+        assert page.run(
+            "document.querySelector('.drone .body').getBoundingClientRect().top"
+        ) == pytest.approx(low, abs=1)
+        page.key("m")
+        for place in ((0, 0), (3, 4), (3, 5)):
+            click_map(page, *place)
+        page.until("document.querySelector('[data-testid=measured]')?.innerText.includes('in all')")
+        assert page.text("[data-testid=measured]") == "1.0 m at 000°, 6.0 m in all"
+        page.key("Backspace")
+        page.until("document.querySelector('[data-testid=measured]').innerText === '5.0 m at 037°'")
+        page.key("Escape")
+        page.until("document.querySelector('[data-testid=measured]') === null")
+        assert page.complaints() == []
+
+
+def test_tiles_lie_where_they_are_on_the_earth(browser: Browser) -> None:
+    """Each one's corners, by the project's own geodesy; the page fetches them from there alone."""
+    asked: list[str] = []
+    with tile_server(asked) as port:
+        tiles = {"url": f"http://127.0.0.1:{port}/{{z}}/{{x}}/{{y}}.png", "attribution": "© nobody"}
+        home = {"latitude": 50.1, "longitude": 8.6}
+        with console(map_tiles=tiles, home=home) as (server, _):
+            page = browser.open(server.address())
+            until_state(page, "enroute")
+            page.run("document.querySelector('[data-testid=map]').focus()")
+            for _ in range(8):
+                page.key("-")
+            page.until("document.querySelectorAll('.tiles image').length > 3")
+            assert page.text(".attribution") == "© nobody"
+            drawn = page.run(
+                "(map => [...document.querySelectorAll('.tiles image')].map(one => {"
+                "const of = map.dataset, box = one.getBBox();"
+                "const east = x => (x - map.clientWidth / 2) / of.scale + Number(of.east);"
+                "const north = y => (map.clientHeight / 2 - y) / of.scale + Number(of.north);"
+                "return [one.getAttribute('href'), east(box.x), north(box.y),"
+                "east(box.x + box.width), north(box.y + box.height)]; }))"
+                "(document.querySelector('[data-testid=map]'))"
+            )
+            scale = float(page.run("document.querySelector('[data-testid=map]').dataset.scale"))
+            origin = GeodeticOrigin(50.1, 8.6, 0.0)
+            pixel = 1.5 / scale
+            for href, west, north, east, south in drawn:
+                level, column, row = map(int, re.findall(r"/(\d+)", href.partition(str(port))[2]))
+                for corner, found in (
+                    ((column, row), (west, north)),
+                    ((column + 1, row + 1), (east, south)),
+                ):
+                    place = origin.to_local(*corner_of(*corner, level), 0.0)
+                    assert found == pytest.approx(place[:2], abs=pixel)
+            assert max(one[3] for one in drawn) > 0 > min(one[1] for one in drawn)
+            deadline = time.monotonic() + 20
+            while len(set(asked)) < len(drawn) and time.monotonic() < deadline:
+                time.sleep(0.1)
+            known = {f"http://127.0.0.1:{port}{path}" for path in asked}
+            assert known >= {one[0] for one in drawn}
+            assert page.complaints() == []
