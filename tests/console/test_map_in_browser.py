@@ -43,7 +43,7 @@ def tile_server(asked: list[str]) -> Iterator[int]:
             self.end_headers()
             self.wfile.write(picture)
 
-        def log_message(self, *_: object) -> None:
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its own word
             """Nothing."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
