@@ -37,6 +37,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
         "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
         "mavlink": "aerodaas.drivers.mavlink.vehicle:MavlinkVehicle",
+        "ros2": "aerodaas.drivers.ros2.vehicle:Ros2Vehicle",
         "replayed": "aerodaas.recording.replay.vehicle:ReplayedVehicle",
     },
     "cameras": {
@@ -46,6 +47,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
         "mavlink": "aerodaas.cameras.video:VideoCamera",
+        "ros2": "aerodaas.drivers.ros2.camera:Ros2Camera",
         "mcap": "aerodaas.recording.replay.mcap_camera:McapCamera",
         "replayed": "aerodaas.recording.replay.mcap_camera:ReplayedCamera",
     },

@@ -10,8 +10,8 @@ from foxglove import Channel, Context
 from foxglove.websocket import ChannelView, Client, ServerListener
 from typing_extensions import Self
 
+from aerodaas.cameras.images import VIDEO_SCHEMAS
 from aerodaas.recording.encoding import Entry
-from aerodaas.recording.images import VIDEO_SCHEMAS
 from aerodaas.recording.web_gate import WebGate
 from aerodaas.types.errors import ConfigError
 

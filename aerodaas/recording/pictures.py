@@ -14,9 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
-from aerodaas.recording.h264 import H264Decoder, is_key_frame
-from aerodaas.recording.images import (
+from aerodaas.cameras.images import (
     IMAGE_SCHEMAS,
     VIDEO_SCHEMAS,
     decode_depth,
@@ -24,6 +22,8 @@ from aerodaas.recording.images import (
     picture_bytes,
     picture_field,
 )
+from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
+from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry

@@ -19,6 +19,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 from mcap_files import Said, write_file
 
+from aerodaas.cameras.images import check_picture, decode_image
 from aerodaas.recording.decoding.limits import (
     MAX_ATTACHMENT,
     MAX_CHANNELS,
@@ -26,7 +27,6 @@ from aerodaas.recording.decoding.limits import (
     MAX_METADATA,
 )
 from aerodaas.recording.h264 import H264Decoder, H264Encoder
-from aerodaas.recording.images import check_picture, decode_image
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
 from aerodaas.types.errors import RecordingError

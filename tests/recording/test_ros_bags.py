@@ -24,10 +24,10 @@ from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros.bag import RosBag
 from aerodaas.recording.ros.bag_writer import write_bag
 from aerodaas.recording.ros.importing import import_bag
-from aerodaas.recording.ros.incoming import odometry_of
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.recording.states import vehicle_states
+from aerodaas.ros.incoming import odometry_of
 from aerodaas.types.data import Frame, Header, Odometry
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import CameraModel, rotation_from_rpy

@@ -21,6 +21,8 @@ _BY_TEXT = {
     "BSD-2-Clause": r"(BSD[ -]2[ -]Clause( License)?|FreeBSD)",
     "BSD-3-Clause": r"(BSD[ -]3[ -]Clause( License)?|3-Clause BSD License|Modified BSD License"
     r"|BSD( License)?)",
+    # Eclipse's double licence: their files and LICENSE leave the choice.
+    "EPL-2.0 OR BSD-3-Clause": r"EPL-2\.0, BSD-3-Clause",
     "GPL-2.0-only": r"GPLv2",
     "ISC": r"ISC( License)?( \(ISCL\))?",
     "LGPL-3.0-only": r"(LGPLv3|GNU Lesser General Public License v3 \(LGPLv3\))",
@@ -82,7 +84,8 @@ def _expression(found: Distribution) -> str:
     for expression in metadata.get_all("License-Expression") or ():
         return str(expression)
     text = "".join(metadata.get_all("License") or ()).strip()
-    known = _known([text]) or _known(
+    # Some give the whole licence, below its title.
+    known = _known([text.partition("\n")[0]]) or _known(
         line.rpartition("::")[2].strip()
         for line in metadata.get_all("Classifier") or ()
         if line.startswith("License ::")

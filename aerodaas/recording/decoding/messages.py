@@ -18,8 +18,8 @@ from mcap_protobuf.decoder import DecoderFactory
 from pydantic import ConfigDict, Field, TypeAdapter, with_config
 from typing_extensions import NotRequired, TypedDict
 
+from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
 from aerodaas.recording.decoding.limits import MAX_DEPTH, MAX_JSON
-from aerodaas.recording.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
 from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.vehicle import FlightEnd, VehicleMode

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.analytics.wire_items import ItemError, pack
+from aerodaas.cameras.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.recording.h264 import is_key_frame
-from aerodaas.recording.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.recording.pictures import Shot, detections, shots
 from aerodaas.recording.playback.page_items import packed_depth, packed_picture, packed_target
 from aerodaas.recording.playback.target import target_of

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.cameras.images import decode_image, picture_bytes
 from aerodaas.cameras.settings import camera_model
 from aerodaas.config.checked import checked
 from aerodaas.config.document import public_document
@@ -21,15 +22,14 @@ from aerodaas.config.model import (
     validated,
 )
 from aerodaas.recording.encoded_frame import EncodedFrame
-from aerodaas.recording.images import decode_image, picture_bytes
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance, package_versions
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
 from aerodaas.recording.ros.beginning import Beginning
-from aerodaas.recording.ros.incoming import battery_of, detection_items, fix_of, odometry_of
 from aerodaas.recording.ros.topics import BagTopics
+from aerodaas.ros.incoming import battery_of, detection_items, fix_of, odometry_of
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Detections, Frame, Header, Odometry
 from aerodaas.types.errors import AeroDaaSError, RecordingError, SourceError

@@ -1,4 +1,4 @@
-"""Values of ROS 2 messages, checked: the inverse of `outgoing`, for bags of anyone."""
+"""Values of ROS 2 messages of anyone, checked; of bags as of live topics."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def odometry_of(message: Any) -> Odometry:  # noqa: ANN401
     _, about_left, about_up = _vector(twist.angular)
     rate = about_left * math.sin(roll) + about_up * math.cos(roll)
     steep = abs(math.cos(pitch)) < _STEEP
-    variance = float(np.max(message.pose.covariance[[0, 7]]))
+    variance = max(float(message.pose.covariance[place]) for place in (0, 7))
     yaw_rate = 0.0 if steep else rate / math.cos(pitch)
     return Odometry(position, velocity, yaw, roll, pitch, yaw_rate, _sigma(variance))
 
