@@ -60,6 +60,11 @@ PEERS = {
     "AERODAAS_TEST_DATABASE": Peer(
         "an empty PostgreSQL database, by a URL such as postgresql://USER@127.0.0.1/NAME"
     ),
+    "AERODAAS_FASTDDS": Peer(
+        "Fast DDS' fastddsgen, with libfastrtps-dev and g++ (Debian: fastddsgen libfastrtps-dev)",
+        ("fastddsgen",),
+        ("g++",),
+    ),
     "AERODAAS_TEST_TELLO": Peer(
         "applications for the emulated Tello, five minutes each of a machine with nothing beside "
         "them: situation_awareness,search_and_rescue"

@@ -31,7 +31,8 @@ class Host:
 
 def told(x: float = 1.0, stamp: int = SECOND) -> ros.Odometry:
     """Odometry at `x`."""
-    return odometry_message(KinematicState((x, 2.0, 3.0), (0.0, 0.0, 0.0), 0.1, 0.2, 0.3, 0.0), stamp)
+    motion = KinematicState((x, 2.0, 3.0), (0.0, 0.0, 0.0), 0.1, 0.2, 0.3, 0.0)
+    return odometry_message(motion, stamp)
 
 
 @pytest.fixture
