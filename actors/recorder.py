@@ -6,21 +6,25 @@ import itertools
 from collections import Counter, deque
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aerodaas.actors.base import StreamActor
 from aerodaas.actors.batch_pause import BatchPause
 from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import vitals_stream
+from aerodaas.config.options import LiveViews
 from aerodaas.recording.provenance import Provenance
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
-from aerodaas.types.errors import RecordingError
+from aerodaas.types.errors import RecordingError, failure_line
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.payload import Photo
 from aerodaas.types.status import Message
 from aerodaas.types.vitals import Vitals
+
+if TYPE_CHECKING:
+    from aerodaas.recording.ros.live import RosGraph
 
 __all__ = ["RecorderActor"]
 
@@ -40,25 +44,26 @@ class RecorderActor(ReaperHost, StreamActor):
         path: Path,
         streams: dict[str, int],
         provenance: Provenance,
-        live: str | None,
+        live: LiveViews | None,
         watched: Watched,
     ) -> None:
         """Create the actor, which writes to `path`; its reaper looks after the `watched`.
 
-        `live` is the address (`host:port`) of the live view.
+        `live` says who looks on.
         `streams` are queue depths by stream; further messages are dropped and counted, because
         the flight never waits.
         """
         StreamActor.__init__(self, session, "recorder", streams)
         ReaperHost.__init__(self, watched)
         self._path = path
-        self._address = live
+        self._views = live or LiveViews()
+        self._ros: RosGraph | None = None
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
         self._readings = 0
         # Who watches live sees each message as it comes.
-        self._pause = BatchPause(0.0 if live else _LONGEST_PAUSE)
+        self._pause = BatchPause(0.0 if self._views != LiveViews() else _LONGEST_PAUSE)
 
     def _open(self) -> None:
         # The application's process imports this module, but does not need the writers.
@@ -69,7 +74,13 @@ class RecorderActor(ReaperHost, StreamActor):
         environment = self.session.environment
         home = environment.home
         name = self._provenance.name
-        self._live = LiveServer(self._address, name) if self._address else None
+        address, domain = self._views.foxglove, self._views.ros2
+        self._live = LiveServer(address, name) if address else None
+        if domain is not None:
+            from aerodaas.recording.ros.live import RosGraph  # noqa: PLC0415 - an extra
+
+            quality = environment.recording.jpeg_quality
+            self._ros = RosGraph(domain, self._provenance.started_ns, quality)
         # A restarted actor keeps its predecessor's file and writes a second part.
         self._path = _unwritten(self._path)
         self._album = PhotoAlbum(album_folder(self._path), environment)
@@ -131,6 +142,7 @@ class RecorderActor(ReaperHost, StreamActor):
         self._write(message)
 
     def _write(self, message: Message[Any]) -> None:
+        self._show(message)
         if self._failure:
             return
         try:
@@ -141,6 +153,18 @@ class RecorderActor(ReaperHost, StreamActor):
 
         if isinstance(message.item, Photo):
             self._keep(message.stream.partition("/")[0], message.item)
+
+    def _show(self, message: Message[Any]) -> None:
+        """Publish on ROS 2 topics; what fails there ends that, and no recording."""
+        graph = self._ros
+        if graph is None:
+            return
+        try:
+            graph.put(message)
+        except Exception as error:  # noqa: BLE001 - a middleware's
+            self._ros = None
+            graph.close()
+            self.alert("ros2_stopped", failure_line(error))
 
     def _keep(self, robot: str, photo: Photo) -> None:
         """Keep a picture beside the recording; one that cannot be kept does not end it."""
@@ -162,6 +186,8 @@ class RecorderActor(ReaperHost, StreamActor):
         self._album.close()
         if self._live is not None:
             self._live.close()
+        if self._ros is not None:
+            self._ros.close()
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}

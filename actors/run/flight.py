@@ -38,6 +38,7 @@ from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 from aerodaas.actors.stream_names import done_stream
+from aerodaas.config.options import LiveViews
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
@@ -67,11 +68,11 @@ class Flight:
         plan: FlightPlan,
         recording: Path | None = None,
         provenance: Provenance | None = None,
-        live: str | None = None,
+        live: LiveViews | None = None,
     ) -> None:
         """Create the actors of `plan`, all at once; `recording` is the path of the MCAP file.
 
-        `live` is the address (`host:port`) of the recorder's live view; None for none.
+        `live` says who looks on at what is recorded.
         """
         self.plan = plan
         self._classes = actor_classes(plan.session)

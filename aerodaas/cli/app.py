@@ -147,6 +147,12 @@ def run(
     live_address: Annotated[
         str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
     ] = "127.0.0.1:8765",
+    ros2: Annotated[  # noqa: FBT002
+        bool,
+        typer.Option(
+            "--ros2", help="Publish the flight on ROS 2 topics of the domain ROS_DOMAIN_ID, or 0."
+        ),
+    ] = False,
 ) -> None:
     """Fly an application.
 
@@ -163,6 +169,7 @@ def run(
     """
     from aerodaas.config.grants import parse_words  # noqa: PLC0415 - slow to load
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
+    from aerodaas.ros.link import domain_of  # noqa: PLC0415 - as above
 
     application = find_application(application)
     # Who looks on and commands has the clock's time, unless another speed is asked for.
@@ -178,6 +185,7 @@ def run(
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=view,
         live=live_address if live else None,
+        ros2=domain_of(None) if ros2 else None,
         console=console_address if console else None,
         guests=tuple(find_application(path).resolve() for path in guest or ()),
         grants=parse_words(grant or ()),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
     from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["ProviderOptions", "RunOptions", "Speed", "current_options"]
+__all__ = ["LiveViews", "ProviderOptions", "RunOptions", "Speed", "current_options"]
 
 Speed: TypeAlias = "float | Literal['max']"
 """Mission seconds per wall second; `max`: as fast as the machine goes, in lockstep."""
@@ -42,6 +42,16 @@ class ProviderOptions:
     """Tenants that may attach missions to its cameras: `TENANT`, or `TENANT=SENSOR,…`."""
     report: Callable[[Any], None] | None = None
     """Told of each mission that has ended, a `MissionOut`."""
+
+
+@dataclass(frozen=True)
+class LiveViews:
+    """Who looks on at what is recorded."""
+
+    foxglove: str | None = None
+    """Address (`host:port`) of Foxglove's WebSocket; None for none."""
+    ros2: int | None = None
+    """DDS domain of the ROS 2 topics; None for none."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +95,8 @@ class RunOptions:
     summary as JSON."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
+    ros2: int | None = None
+    """Publish the flight on ROS 2 topics of this DDS domain."""
     console: str | None = None
     """Serve the console to browsers at this `host:port` while flying."""
     replay: Path | None = None

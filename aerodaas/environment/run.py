@@ -13,7 +13,7 @@ from aerodaas.actors.run.checks import check_served
 from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
-from aerodaas.config.options import Speed, current_options
+from aerodaas.config.options import LiveViews, Speed, current_options
 from aerodaas.config.plugins import is_built_in, load_plugin
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.signals import (
@@ -23,6 +23,7 @@ from aerodaas.environment.signals import (
     raise_on_signals,
 )
 from aerodaas.mission.commands import Answer, Command, End
+from aerodaas.ros.link import require_dds
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -125,7 +126,7 @@ class Run:
                 document=document,
             )
             options = self.options
-            flight = Flight(plan, self.recording, provenance, options.live)
+            flight = Flight(plan, self.recording, provenance, LiveViews(options.live, options.ros2))
             try:
                 flight.launch(starting.step)
             except BaseException:
@@ -164,6 +165,10 @@ class Run:
             require_extra("remote", "--console")
         if self.options.live and self.recording is None:
             raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
+        if self.options.ros2 is not None:
+            require_dds("--ros2")
+            if self.recording is None:
+                raise ConfigError('--ros2 shows what is recorded; set "recording.enabled" to true')
 
     def _console_server(self) -> ConsoleServer | None:
         """The console's server, listening, if it is asked for."""

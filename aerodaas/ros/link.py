@@ -153,14 +153,22 @@ class RosLink:
         self._waiting.attach(fresh)
         self._bell.set(True)
 
-    def publisher(self, topic: str, message: type, *, reliable: bool = True) -> RosPublisher:
-        """A publisher of `topic`; reliable ones reach every subscriber, as ROS 2's defaults do."""
+    def publisher(self, topic: str, message: type, *, latched: bool = False) -> RosPublisher:
+        """A reliable publisher of `topic`, which every subscriber can hear.
+
+        With `latched`, its newest message is kept for those who subscribe later (ROS 2's
+        transient local).
+        """
         from cyclonedds.pub import DataWriter  # noqa: PLC0415
         from cyclonedds.qos import Policy, Qos  # noqa: PLC0415
         from cyclonedds.topic import Topic  # noqa: PLC0415
 
-        how = Policy.Reliability.Reliable(_BLOCKING) if reliable else Policy.Reliability.BestEffort
-        qos = Qos(how, Policy.History.KeepLast(1))
+        durability = Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile
+        qos = Qos(
+            Policy.Reliability.Reliable(_BLOCKING),
+            Policy.History.KeepLast(1),
+            durability,
+        )
         described: Any = Topic(self._participant, dds_topic(topic), message)
         made = RosPublisher(DataWriter(self._participant, described, qos=qos))
         self._publishers.append(made)

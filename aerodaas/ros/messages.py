@@ -29,6 +29,7 @@ __all__ = [
     "BatteryState",
     "Bool",
     "BoundingBox2D",
+    "CameraInfo",
     "CompressedImage",
     "Detection2D",
     "Detection2DArray",
@@ -46,7 +47,11 @@ __all__ = [
     "PoseStamped",
     "PoseWithCovariance",
     "Quaternion",
+    "RegionOfInterest",
+    "TFMessage",
     "Time",
+    "Transform",
+    "TransformStamped",
     "Twist",
     "TwistStamped",
     "TwistWithCovariance",
@@ -56,12 +61,16 @@ __all__ = [
 if TYPE_CHECKING:
     Float64x9: TypeAlias = list[float]
     Float64x36: TypeAlias = list[float]
+    Float64x12: TypeAlias = list[float]
+    Float64s: TypeAlias = list[float]
     Float32s: TypeAlias = list[float]
     Octets: TypeAlias = bytes
 else:
     # What the binding reads, and no type checker understands.
     Float64x9 = array[float64, 9]
     Float64x36 = array[float64, 36]
+    Float64x12 = array[float64, 12]
+    Float64s = sequence[float64]
     Float32s = sequence[float32]
     Octets = sequence[uint8]
 
@@ -146,6 +155,36 @@ class PoseWithCovariance(IdlStruct, typename="geometry_msgs::msg::dds_::PoseWith
 
 
 @dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    """A shift and a rotation."""
+
+    translation: Vector3 = field(default_factory=Vector3)
+    rotation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    """Pose of the frame `child_frame_id` in the header's."""
+
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    transform: Transform = field(default_factory=Transform)
+
+
+if TYPE_CHECKING:
+    Transforms: TypeAlias = list[TransformStamped]
+else:
+    Transforms = sequence[TransformStamped]
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    """Poses of frames in others."""
+
+    transforms: Transforms = field(default_factory=list)
+
+
+@dataclass
 class Twist(IdlStruct, typename="geometry_msgs::msg::dds_::Twist_"):
     """Linear velocity in m/s, angular velocity in rad/s."""
 
@@ -217,6 +256,34 @@ class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedIma
     header: Header = field(default_factory=Header)
     format: str = ""
     data: Octets = b""
+
+
+@dataclass
+class RegionOfInterest(IdlStruct, typename="sensor_msgs::msg::dds_::RegionOfInterest_"):
+    """The part of a camera's picture that it delivers; all zero: the whole."""
+
+    x_offset: uint32 = 0
+    y_offset: uint32 = 0
+    height: uint32 = 0
+    width: uint32 = 0
+    do_rectify: bool = False
+
+
+@dataclass
+class CameraInfo(IdlStruct, typename="sensor_msgs::msg::dds_::CameraInfo_"):
+    """Lens of a camera: K, R and P by rows, in pixels."""
+
+    header: Header = field(default_factory=Header)
+    height: uint32 = 0
+    width: uint32 = 0
+    distortion_model: str = ""
+    d: Float64s = field(default_factory=list)
+    k: Float64x9 = field(default_factory=lambda: [0.0] * 9)
+    r: Float64x9 = field(default_factory=lambda: [0.0] * 9)
+    p: Float64x12 = field(default_factory=lambda: [0.0] * 12)
+    binning_x: uint32 = 0
+    binning_y: uint32 = 0
+    roi: RegionOfInterest = field(default_factory=RegionOfInterest)
 
 
 @dataclass

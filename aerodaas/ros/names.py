@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-__all__ = ["Domain", "TopicName", "dds_topic", "ros_topic", "ros_type"]
+__all__ = ["Domain", "TopicName", "dds_topic", "permitted_topic", "ros_topic", "ros_type"]
 
 _PATTERN = r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$"
+_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
+_LEADING_DIGIT = re.compile(r"/(?=[0-9])")
 _PREFIX = "rt/"
 """Before the names of ROS 2's topics, as against those of services and actions."""
 
@@ -31,6 +34,17 @@ def dds_topic(name: str) -> str:
     'rt/drone/odom'
     """
     return _PREFIX + name.removeprefix("/")
+
+
+def permitted_topic(name: str) -> str:
+    """A name as like `name` as ROS 2's rules permit.
+
+    Letters, digits and `_`; no part begins with a digit.
+
+    >>> permitted_topic("/drone-1/2nd/image")
+    '/drone_1/_2nd/image'
+    """
+    return _LEADING_DIGIT.sub("/_", _FORBIDDEN.sub("_", name))
 
 
 def ros_topic(name: str) -> str:

@@ -61,6 +61,6 @@ def odometry(index: int, *, frame: str = "map", late: int = 0) -> Sent:
     """A vehicle that climbs at 1 m/s, ten times a second."""
     stamp = index * SECOND // 10
     value = Odometry(np.array([1.0, 2.0, index / 10]), np.array([0.0, 0.0, 1.0]), 0.5)
-    message = MessageBuilder(TYPES, EPOCH).odometry(value, stamp, "drone")
+    message = MessageBuilder(TYPES.types, EPOCH).odometry(value, stamp, "drone")
     message.header.frame_id = frame
     return Sent("/odom", EPOCH + stamp + late, message)

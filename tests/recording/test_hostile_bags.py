@@ -117,7 +117,9 @@ def test_lengths_that_lie_cost_no_memory() -> None:
         ros_decoder(DETECTIONS)(header + struct.pack("<I", 2**32 - 1) + bytes(40))
     assert not isinstance(caught.value, MemoryError)
     found = Detections(Header(0, 0, "cam"), (Detection((0, 0, 1, 1), "x", 0.5),) * 4000, 9, 9)
-    raw = bytes(TYPES.serialize_cdr(MessageBuilder(TYPES, EPOCH).detections(found), DETECTIONS))
+    raw = bytes(
+        TYPES.serialize_cdr(MessageBuilder(TYPES.types, EPOCH).detections(found), DETECTIONS)
+    )
     with pytest.raises(ValueError, match="exceeds"):
         ros_decoder(DETECTIONS)(raw)
 

@@ -144,7 +144,7 @@ def test_there_and_back_is_the_same_flight(recorded: Path, bag: Path, tmp_path: 
 def test_signs_of_a_leaning_vehicle() -> None:
     """Eastwards with the nose 30 degrees down, the body sees itself move forwards and upwards."""
     value = Odometry(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.0, 0.0, math.radians(30), 0.2)
-    twist = MessageBuilder(TYPES, 0).odometry(value, 0, "drone").twist.twist
+    twist = MessageBuilder(TYPES.types, 0).odometry(value, 0, "drone").twist.twist
     assert twist.linear.x == pytest.approx(math.cos(math.radians(30)))
     assert twist.linear.z == pytest.approx(math.sin(math.radians(30)))
     assert twist.angular.x == pytest.approx(-0.2 * math.sin(math.radians(30)))
@@ -161,7 +161,7 @@ def test_any_attitude_comes_back(yaw: float, pitch: float, roll: float, rate: fl
     """Velocity, angles and the yaw's rate survive the body's axes and the quaternion."""
     velocity = np.array([3.0, -2.0, 0.5])
     value = Odometry(np.array([1.0, 2.0, 3.0]), velocity, yaw, roll, pitch, rate, 0.5)
-    found = odometry_of(MessageBuilder(TYPES, 0).odometry(value, 0, "drone"))
+    found = odometry_of(MessageBuilder(TYPES.types, 0).odometry(value, 0, "drone"))
     np.testing.assert_allclose(found.velocity, velocity, atol=1e-9)
     np.testing.assert_allclose(
         rotation_from_rpy(found.roll, found.pitch, found.yaw),
@@ -202,7 +202,9 @@ def test_raw_pictures_and_a_simulations_clock(tmp_path: Path) -> None:
     image[:] = (250, 120, 10)
     sent = []
     for number in range(4):
-        message = MessageBuilder(TYPES, 0).depth_image(np.zeros((32, 48), np.uint16), 0, "lens")
+        message = MessageBuilder(TYPES.types, 0).depth_image(
+            np.zeros((32, 48), np.uint16), 0, "lens"
+        )
         message.header.stamp.sec, message.header.stamp.nanosec = 7, number * 100_000_000
         message.encoding, message.step, message.data = "rgb8", 3 * 48, image.reshape(-1)
         # It runs at half the speed of the clock.

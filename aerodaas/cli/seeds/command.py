@@ -59,7 +59,8 @@ def _shared_options(job: Job) -> RunOptions:
     options = job.options
     if options.lockstep is False:
         raise ConfigError("--seeds flies as fast as the machine goes: leave --speed out")
-    for given, name in ((options.live, "--live"), (options.console, "--console")):
+    shown = {"--live": options.live, "--console": options.console, "--ros2": options.ros2}
+    for name, given in shown.items():
         if given is not None:
             raise ConfigError(f"{name} shows one flight, and --seeds flies several: leave it out")
     if options.record is not None and options.record.suffix == ".mcap":

@@ -51,6 +51,7 @@ _ENDING_SECONDS = 60.0
 _OWN = (
     "address",
     "live",
+    "ros2",
     "console",
     "replay",
     "speed",

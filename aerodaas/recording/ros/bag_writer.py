@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import re
 import shutil
 import struct
 from collections.abc import Callable, Iterator
@@ -20,6 +19,7 @@ from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.recording.states import state_of
+from aerodaas.ros.names import permitted_topic
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import is_finite
 
@@ -35,8 +35,6 @@ _STATE = "aerodaas.VehicleState"
 _CALIBRATION = "foxglove.CameraCalibration"
 _TRANSFORM = "foxglove.FrameTransform"
 _MOUNT = "/mount"
-_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
-_LEADING_DIGIT = re.compile(r"/(?=[0-9])")
 
 
 class _Message(NamedTuple):
@@ -69,7 +67,7 @@ def write_bag(recording: Recording, folder: Path, storage: str = "mcap") -> Path
     from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: PLC0415 - an extra
 
     path = new_file(folder / f"{recording.path.stem}_{storage}")
-    conversion = _Conversion(MessageBuilder(types, recording.epoch_ns))
+    conversion = _Conversion(MessageBuilder(types.types, recording.epoch_ns))
     plugin = StoragePlugin[storage.upper()]
     topics = _Topics()
     try:
@@ -103,7 +101,7 @@ class _Topics:
         self.known: dict[str, tuple[str, Connection]] = {}
 
     def connection(self, writer: Writer, message: _Message) -> Connection:
-        topic = ros_name(message.topic)
+        topic = permitted_topic(message.topic)
         owner, connection = self.known.get(topic, ("", None))
         if connection is None:
             connection = writer.add_connection(
@@ -206,11 +204,6 @@ class _Conversion:
     def _detections(self, record: Record) -> Iterator[_Message]:
         value = self._build.detections(detections_of(record.value))
         yield _Message(record.topic, typestore.DETECTIONS, value)
-
-
-def ros_name(topic: str) -> str:
-    """A topic by ROS 2's rules: letters, digits and `_`, no part beginning with a digit."""
-    return _LEADING_DIGIT.sub("/_", _FORBIDDEN.sub("_", topic))
 
 
 def _qos(*, latched: bool) -> Qos:

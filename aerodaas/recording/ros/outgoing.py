@@ -1,4 +1,4 @@
-"""ROS 2 messages of a recording's values.
+"""ROS 2 messages of a recording's or a flight's values.
 
 By REP 103 and REP 105: positions in `map`, which is ENU as ours; `ROBOT/base_link` is FLU; a
 camera's frame, named as the camera, is optical (x right, y down, z forward). Figures that are not
@@ -8,7 +8,8 @@ known are NaN, and covariances zero, as the messages' definitions ask.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,6 @@ from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Detections, GpsFix, Odometry
 from aerodaas.types.geometry import Vector
 
-if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
-
 __all__ = ["MessageBuilder"]
 
 _DISTORTION = "plumb_bob"
@@ -33,9 +31,12 @@ _SERVICE_GPS = 1
 class MessageBuilder:
     """Makes ROS 2 messages; stamps are mission time in nanoseconds."""
 
-    def __init__(self, types: Typestore, epoch_ns: int) -> None:
-        """Build messages of `types`, with stamps counted from `epoch_ns` (Unix, nanoseconds)."""
-        self._types: dict[str, Any] = dict(types.types)
+    def __init__(self, types: Mapping[str, Any], epoch_ns: int) -> None:
+        """Build messages of `types`, which are callable with their fields, by name.
+
+        Stamps count from `epoch_ns` (Unix, nanoseconds).
+        """
+        self._types = types
         self._epoch_ns = epoch_ns
 
     def odometry(self, value: Odometry, stamp: int, robot: str) -> Any:  # noqa: ANN401 - a type made at run time
