@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
@@ -213,7 +214,8 @@ def _vehicle(
     warned = "".join(f"; {one.text}" for one in items if one.verdict is Verdict.WARNING)
     state = vehicle.read()
     charge = 100 * state.battery.fraction
-    return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %{warned}"
+    battery = "battery unknown" if math.isnan(charge) else f"battery {charge:.0f} %"
+    return f"{robot.driver} answers: {state.mode.value}, {battery}{warned}"
 
 
 def _camera(environment: Environment, sensor: SensorConfig, vehicles: dict[str, Vehicle]) -> str:

@@ -59,6 +59,12 @@ class Slow(SimulatedVehicle):
         Slow.asked += 1
         return super().preflight()
 
+class Uncharged(SimulatedVehicle):
+    advance_to = None
+
+    def read(self):
+        return replace(super().read(), battery=Battery(math.nan))
+
 class Blind:
     model, finished, skipped = None, False, 0
     def __init__(self, sensor, environment): ...
@@ -166,6 +172,15 @@ def test_a_vehicle_is_judged_by_what_it_says_in_the_end(
     slow = sys.modules["check_parts"].Slow
     assert slow.asked == 1
     assert slow.reads > 4
+
+
+def test_a_charge_that_no_vehicle_tells_is_called_unknown(
+    checked: Checked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no number."""
+    monkeypatch.setattr(preflight, "_SETTLING", 0.1)
+    _, told = checked(vehicle="check_parts:Uncharged", camera="simulated")
+    assert "check_parts:Uncharged answers: grounded, battery unknown" in told
 
 
 @pytest.mark.parametrize(
