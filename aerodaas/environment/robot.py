@@ -14,7 +14,15 @@ from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.loading import load_vehicle
-from aerodaas.mission.commands import Actuate, End, Pause, ReleaseParachute, Resume
+from aerodaas.mission.commands import (
+    Actuate,
+    End,
+    HandOver,
+    Pause,
+    ReleaseParachute,
+    Resume,
+    TakeBack,
+)
 from aerodaas.types.errors import GraphError, UnknownIdError
 
 if TYPE_CHECKING:
@@ -106,6 +114,22 @@ class Robot(PaperNames, IRobot):
     def resume_mission(self) -> None:
         """Resume the ongoing mission."""
         self._environment.command(self.robot_id, Resume())
+
+    def hand_over(self) -> None:
+        """Have the autopilot fly the waypoints ahead by its own mission mode, while we watch.
+
+        It returns once the upload has begun; an alert of the kind `handover` tells what became of
+        it. Pausing, coming home and new navigation take them back, as a failsafe does. Raises
+        MissionError, with the reason, for what the autopilot cannot fly.
+        """
+        self._environment.command(self.robot_id, HandOver())
+
+    def take_back(self) -> None:
+        """Fly the waypoints that the autopilot has not reached ourselves again.
+
+        Raises MissionError if it flies none.
+        """
+        self._environment.command(self.robot_id, TakeBack())
 
     def actuate(self, actuator: str, position: str) -> None:
         """Have an actuator of the environment file take a position now, wherever the drone is.

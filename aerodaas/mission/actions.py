@@ -9,7 +9,7 @@ from aerodaas.types.data import Header
 from aerodaas.types.geometry import Vector
 from aerodaas.types.vehicle import Setpoint
 
-__all__ = ["Action", "Fly", "Hold", "Land", "Return", "TakeOff", "Wait"]
+__all__ = ["Action", "Fly", "Hold", "Land", "Return", "Supervise", "TakeOff", "Wait"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +46,13 @@ class Return:
 
 
 @dataclass(frozen=True, slots=True)
+class Supervise:
+    """Send nothing: the autopilot flies the mission's waypoints, within the drone's limits."""
+
+
+@dataclass(frozen=True, slots=True)
 class Land:
     """Land at the current position."""
 
 
-Action: TypeAlias = Wait | TakeOff | Fly | Hold | Return | Land
+Action: TypeAlias = Wait | TakeOff | Fly | Hold | Supervise | Return | Land

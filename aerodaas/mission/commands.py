@@ -20,6 +20,7 @@ __all__ = [
     "CloseStream",
     "Command",
     "End",
+    "HandOver",
     "OpenStream",
     "Pause",
     "RearrangeNavigation",
@@ -32,6 +33,7 @@ __all__ = [
     "Start",
     "Steer",
     "StreamItem",
+    "TakeBack",
     "TakeControls",
     "initial_commands",
 ]
@@ -151,6 +153,20 @@ class ReleaseControls:
 
 
 @dataclass(frozen=True, slots=True)
+class HandOver:
+    """Have the autopilot fly the waypoints ahead by its own mission mode.
+
+    It flies them until they are taken back: by `TakeBack`, by any command that changes what is to
+    be flown, by a failsafe, or by the guard of the limits.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class TakeBack:
+    """Fly the waypoints that the autopilot has not reached by setpoints again."""
+
+
+@dataclass(frozen=True, slots=True)
 class Actuate:
     """Have an actuator take a position now, wherever the drone is."""
 
@@ -196,6 +212,8 @@ Command: TypeAlias = (
     | TakeControls
     | Steer
     | ReleaseControls
+    | HandOver
+    | TakeBack
     | Actuate
     | ReleaseParachute
     | ReturnHome

@@ -12,7 +12,7 @@ from aerodaas.types.geometry import Vector, body_to_enu, length, wrap_angle
 from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
 from aerodaas.types.waypoints import VelocityCommand
 
-__all__ = ["Leg", "LegPhase", "setpoint_towards", "velocity_setpoint"]
+__all__ = ["Leg", "LegPhase", "setpoint_towards", "unreachable", "velocity_setpoint"]
 
 _TURNING_DISTANCE = 1.0
 """Metres from a place within which the direction to it no longer defines the yaw."""
@@ -40,6 +40,13 @@ def setpoint_towards(
     if yaw is None and math.hypot(way[0], way[1]) > _TURNING_DISTANCE:
         yaw = math.atan2(way[1], way[0])
     return PositionSetpoint(place, yaw, speed)
+
+
+def unreachable(stop: QueuedWaypoint, phase: LegPhase) -> str:
+    """Why a stop is given up in this phase of the flight to it, one sentence."""
+    stalled = phase is LegPhase.STALLED
+    why = "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
+    return f"{stop.id} cannot be reached: {why}"
 
 
 def velocity_setpoint(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:

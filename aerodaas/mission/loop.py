@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.neighbours import Neighbour
@@ -123,9 +123,25 @@ class SetpointLoop:
                 stay = PositionSetpoint(action.position)
             return self._send(stay, state, now, neighbours)
         self.guard.forget()
+        if isinstance(action, Supervise):
+            return self._supervise(state, now, neighbours)
         if not isinstance(action, Wait):
             self._ask(action, state, now)
         return SetpointRecord(now, None, None)
+
+    def _supervise(
+        self, state: VehicleState, now: int, neighbours: Iterable[Neighbour]
+    ) -> SetpointRecord:
+        """Watch the autopilot fly, and stop it at once where it comes too near to a boundary."""
+        others = self._around(state, neighbours)
+        names = self.guard.crossed(state.odometry, others, below=state.below)
+        if not names:
+            return SetpointRecord(now, None, None)
+        self.mission.take_back(f"it came too near to a boundary ({', '.join(names)})")
+        return self._send(VelocitySetpoint(np.zeros(3)), state, now, neighbours)
+
+    def _around(self, state: VehicleState, neighbours: Iterable[Neighbour]) -> list[Neighbour]:
+        return [*neighbours, *traffic_neighbours(state, self.mission.limits.traffic)]
 
     def _ask(self, action: TakeOff | Land | Return, state: VehicleState, now: int) -> None:
         """Request the action once, then every second while the vehicle's mode does not show it."""
@@ -150,7 +166,7 @@ class SetpointLoop:
         cause: Header | None = None,
     ) -> SetpointRecord:
         duration = _PERIOD if self._before is None else seconds(now - self._before)
-        others = [*neighbours, *traffic_neighbours(state, self.mission.limits.traffic)]
+        others = self._around(state, neighbours)
         below = state.below
         clamped = self.guard.clamp(asked, state.odometry, duration, others, below=below)
         sent = self.vehicle.send(clamped.setpoint)

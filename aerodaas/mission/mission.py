@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerodaas.config.model import RobotConfig
-from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.actuation import Actuation
 from aerodaas.mission.command_handler import DONE, CommandHandler
 from aerodaas.mission.commands import (
@@ -24,6 +24,7 @@ from aerodaas.mission.commands import (
     CloseStream,
     Command,
     End,
+    HandOver,
     OpenStream,
     Pause,
     RearrangeNavigation,
@@ -34,11 +35,13 @@ from aerodaas.mission.commands import (
     Start,
     Steer,
     StreamItem,
+    TakeBack,
     TakeControls,
 )
 from aerodaas.mission.forecast import BatteryForecast
-from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, velocity_setpoint
-from aerodaas.mission.log import MissionLog, subject
+from aerodaas.mission.handover.handover import HANDED_OVER, Handover
+from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable, velocity_setpoint
+from aerodaas.mission.log import MissionLog
 from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.photographer import Photographer
@@ -49,7 +52,7 @@ from aerodaas.mission.route import Route
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.mission.safety.motors import Motors, MotorWatch
+from aerodaas.mission.safety.motors import MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
 from aerodaas.types.braking import stopping_point
@@ -66,7 +69,7 @@ __all__ = ["Mission"]
 
 _ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
 _LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
-_NAVIGATION = (AddNavigation, StreamItem, RearrangeNavigation, TakeControls, Steer)
+_NAVIGATION = (AddNavigation, StreamItem, RearrangeNavigation, TakeControls, Steer, HandOver)
 """Commands that a drone does not execute any more once it leaves."""
 _DRIFT = 0.5
 """Ground speed in m/s below which a landing may begin; above it, the drone overshoots home."""
@@ -134,6 +137,7 @@ class Mission:
         )
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
+        self.handover = Handover(payload, robot, self._route, clearance, self._log)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
         self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)
@@ -167,7 +171,8 @@ class Mission:
     def status(self) -> MissionStatus:
         """The mission's complete status."""
         stops = list(self._navigator.queue)
-        served = bool(stops) and self._leg is not None and self._leg.stop is stops[0]
+        leg = None if self._leg is None else self._leg.stop
+        served = bool(stops) and (leg is stops[0] or self.handover.flies)
         waypoints = tuple(stop.waypoint for stop in stops)
         texts = [finding.text for finding in self._assessment.findings]
         return MissionStatus(
@@ -202,7 +207,7 @@ class Mission:
                     return self._command_handler.navigate(command, self._now)
                 case TakeControls() | Steer() | ReleaseControls():
                     return self._control_by_hand(command)
-                case Actuate() | ReleaseParachute():
+                case Actuate() | ReleaseParachute() | HandOver() | TakeBack():
                     return self._act(command)
                 case _:
                     return self._control(command)
@@ -264,7 +269,18 @@ class Mission:
         self._paused = self._paused or (takes and not objection)
         return Answer(not objection, objection)
 
-    def _act(self, command: Actuate | ReleaseParachute) -> Answer:
+    def _hand_over(self, command: HandOver | TakeBack) -> Answer:
+        objection = "the gimbal is kept on a place" if self.photographer.looks else ""
+        queue = list(self._navigator.queue)
+        return self.handover.handle(command, self.state, queue, self._last, self._now, objection)
+
+    def take_back(self, reason: str) -> None:
+        """Fly by setpoints again, if the autopilot flies the waypoints."""
+        self.handover.take_back(reason, self._now)
+
+    def _act(self, command: Actuate | ReleaseParachute | HandOver | TakeBack) -> Answer:
+        if isinstance(command, HandOver | TakeBack):
+            return self._hand_over(command)
         if isinstance(command, Actuate):
             return self.actuation.move(command)
         if self.state in _ON_GROUND:
@@ -355,35 +371,26 @@ class Mission:
 
     def _motors_stopped(self, state: VehicleState) -> bool:
         """Whether the motors have stopped; if so, end the mission."""
-        motors = self._motors.observe(state, self._now)
-        leaving, reason = self.state in _LEAVING, self._machine.reason
-        if motors is Motors.RUNNING:
+        stop = self._motors.judge(
+            state,
+            self._now,
+            leaving=self._machine.reason if self.state in _LEAVING else None,
+            obeyed=self._obeyed,
+        )
+        if stop is None:
             return False
-        if motors in {Motors.IDLE, Motors.NEVER_LIFTED}:
-            grounded = state.mode is VehicleMode.GROUNDED
-            if leaving and grounded:
-                self._to(MissionState.ABORTED, f"{reason} before take-off")
-            return leaving and grounded
-        if motors is Motors.SETTLING:
-            return True
-        if motors is Motors.LANDED and (leaving or not self._obeyed):
-            if leaving:
-                self._to(MissionState.LANDED, reason)
-            return True
-        kind, text = self._motors.story(motors, state.faults)
-        self._to(MissionState.ABORTED, text)
-        self._log.alert(self._now, kind, text)
-        return True
+        if stop.ends is not None:
+            self._to(stop.ends, stop.reason)
+        if stop.alert:
+            self._log.alert(self._now, stop.alert, stop.reason)
+        return stop.known
 
     def _lost_for_good(self) -> bool:
         """Whether the link has been lost for `return_timeout` or longer; if so, end the mission."""
-        silent = self._supervisor.silent_for(self._now)
-        lost = silent >= self.limits.return_timeout
-        if lost:
-            reason = f"the vehicle is lost: no word from it for {silent:.0f} s"
+        if reason := self._supervisor.lost_for_good(self._now):
             self._to(MissionState.ABORTED, reason)
             self._log.alert(self._now, "vehicle_lost", reason)
-        return lost
+        return bool(reason)
 
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
         self._planning.plan(state, self._now)
@@ -407,15 +414,10 @@ class Mission:
         return Wait()
 
     def _protect(self, state: VehicleState) -> None:
-        before = {subject(one.kind, one.text, one.about) for one in self._assessment.findings}
-        self._assessment = self._supervisor.assess(state, self._now)
+        before, self._assessment = self._assessment, self._supervisor.assess(state, self._now)
         demand, reason = self._assessment.demand, self._assessment.gravest.text
-        for finding in self._assessment.findings:
-            # The reason for a takeover or a lost position already names the faults behind it.
-            named = demand is not FailsafeAction.NOTHING and finding.text in reason
-            told = named and finding.kind == "vehicle"
-            if subject(finding.kind, finding.text, finding.about) not in before and not told:
-                self._log.alert(self._now, finding.kind, finding.text, finding.about)
+        for fault in self._assessment.news(before):
+            self._log.alert(self._now, fault.kind, fault.text, fault.about)
         if demand is FailsafeAction.RELEASE:
             self._to(MissionState.ABORTED, reason)
         elif demand is FailsafeAction.LAND and self.state is not MissionState.LANDING:
@@ -443,11 +445,15 @@ class Mission:
         if self._assessment.demand is FailsafeAction.HOLD:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
-        self._planning.plan(state, self._now)
+        if not self.handover.active:
+            self._planning.plan(state, self._now)
         self._forecast_battery(state)
         served = self._navigator.served(self._now)
         if isinstance(served, QueuedWaypoint):
+            if self.handover.turn(list(self._navigator.queue), state, self._now):
+                return self._supervise(state)
             return self._serve(served, state)
+        self.take_back("what is to be flown has changed")
         self._leg = None
         if served is not None:
             return self._follow(served, state)
@@ -462,6 +468,16 @@ class Mission:
             return self._hover(state)
         self._leg = self._anchor = None
         return Fly(velocity_setpoint(velocity, state))
+
+    def _supervise(self, state: VehicleState) -> Action:
+        self._leg = self._anchor = None
+        for stop in self.handover.follow(state, self._now, self._elapsed):
+            self._finish(stop, LegPhase.DONE)
+        head = self._navigator.queue.head
+        if not self.handover.flies or head is None:
+            return self._fly(state)
+        self._to(*self.handover.situation(head))
+        return Supervise()
 
     def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
         holds = self.state is MissionState.HOLDING
@@ -486,10 +502,9 @@ class Mission:
         if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
             self._finish(stop, phase)
             return self._fly(state)
-        if phase is LegPhase.HOVERING:
-            self._to(diverted or MissionState.LOITERING, f"at {stop.id}")
-        else:
-            self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        stays = phase is LegPhase.HOVERING
+        doing = MissionState.LOITERING if stays else MissionState.ENROUTE
+        self._to(diverted or doing, f"{'at' if stays else 'flying to'} {stop.id}")
         self._anchor = None
         place, heading = self.photographer.steer(place, state.odometry, self._now)
         return Fly(self._leg.setpoint(place, position, limits.cruise_speed, heading), stop.cause)
@@ -506,12 +521,7 @@ class Mission:
         if phase is LegPhase.DONE:
             self._log.visit(stop.id)
         else:
-            stalled = phase is LegPhase.STALLED
-            why = (
-                "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
-            )
-            reason = f"{stop.id} cannot be reached: {why}"
-            self._log.give_up(self._now, stop.id, reason)
+            self._log.give_up(self._now, stop.id, unreachable(stop, phase))
         self._navigator.finish(stop)
 
     def _follow(self, live: LiveCommand, state: VehicleState) -> Action:
@@ -579,14 +589,12 @@ class Mission:
         self._leg = None
         return Land()
 
-    @staticmethod
-    def _release(_: VehicleState) -> Action:
-        return Wait()
-
     def _forecast_battery(self, state: VehicleState) -> None:
         grounded = self.state is MissionState.PREFLIGHT
         self._forecast.update(self._now, state, self._navigator.queue, grounded=grounded)
 
     def _to(self, state: MissionState, reason: str = "") -> None:
+        if state not in HANDED_OVER:
+            self.take_back(reason or state.value)
         self._machine.to(state, self._now, reason)
         self.actuation.turn(self._now, home=self.finished or state in _LEAVING)

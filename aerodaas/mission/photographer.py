@@ -74,6 +74,11 @@ class Photographer:
         """How many pictures were asked for and not taken."""
         return self._shutter.lost
 
+    @property
+    def looks(self) -> bool:
+        """Whether gimbal or nose are kept on a place."""
+        return self._gaze.place is not None
+
     def steer(self, place: Vector, odometry: Odometry, now: int) -> tuple[Vector, float | None]:
         """Where to fly for the pictures' sake on the way to `place`, and where the nose looks.
 

@@ -42,6 +42,8 @@ class VehicleMode(str, enum.Enum):
     GUIDED = "guided"
     """Following our setpoints."""
     HOLDING = "holding"
+    MISSION = "mission"
+    """Flying the plan that we have handed over, by its own mission mode."""
     RETURNING = "returning"
     LANDING = "landing"
     MANUAL = "manual"

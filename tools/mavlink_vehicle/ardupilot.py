@@ -48,6 +48,7 @@ class EmulatedArduPilot(Firmware):
             mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
         }
     )
+    wants_numbers: ClassVar[bool] = True
     interval_refused: ClassVar[int] = mavlink.MAV_RESULT_DENIED
     dead_reckoning: ClassVar[float] = 7.4
     version: ClassVar[int] = 0x04070000
@@ -142,9 +143,12 @@ class EmulatedArduPilot(Firmware):
             return _FAILED
         if mode == self._mode:
             return _OK
+        if mode == _AUTO and not self.route.begin():
+            return _FAILED
         self._mode = mode
         self.failsafe = False
-        self.route.leave()
+        if mode != _AUTO:
+            self.route.leave()
         deeds = {
             _RETURN: ("return", self.flight.return_home),
             _LAND: ("land", self.flight.land),

@@ -232,6 +232,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         elif kind in _STORED:
             for answer in _STORED[kind](firmware).handle(message):
                 self._say(answer)
+        elif kind == "MISSION_SET_CURRENT" and firmware.route.select(message.seq):
+            self._say(firmware.route.current())
         elif kind == "HEARTBEAT" and isinstance(firmware, EmulatedArduPilot):
             firmware.hear_heartbeat(message)
 

@@ -51,6 +51,8 @@ class Firmware(ABC):
     """Whether its estimator reports on the ground that it holds its place for fixed."""
     unheard_of: ClassVar[frozenset[int]]
     """Messages that it knows nothing of when it is asked to send them regularly."""
+    wants_numbers: ClassVar[bool] = False
+    """Whether it refuses a mission's item with a yaw that is not a number."""
     interval_refused: ClassVar[int] = mavlink.MAV_RESULT_FAILED
     starting: ClassVar[int] = mavlink.MAV_STATE_STANDBY
     """MAV_STATE of its HEARTBEAT until it is ready."""
@@ -71,7 +73,7 @@ class Firmware(ABC):
         self.flight = flight
         self.parameters = parameters
         parameters.values.update(options.parameters)
-        self.plans = PlanStore()
+        self.plans = PlanStore(wants_numbers=self.wants_numbers)
         self.logs = LogStore()
         self.route = Route(
             flight,
@@ -317,7 +319,7 @@ class Firmware(ABC):
         """Let time pass."""
         self.now += duration
         self.payload.advance()
-        self.route.advance()
+        self.route.advance(self.now)
         self.flight.advance(duration)
         if self._lifted and not self.flight.flying:
             self._lifted = self.armed = self.failsafe = False

@@ -17,7 +17,7 @@ __all__ = ["EmulatedPX4"]
 
 _OK, _LATER = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 _ALTITUDE, _POSITION, _AUTO, _OFFBOARD, _TERMINATION = 2, 3, 4, 6, 10
-_TAKE_OFF, _HOLD, _RETURN, _LAND = 2, 3, 5, 6
+_TAKE_OFF, _HOLD, _MISSION, _RETURN, _LAND = 2, 3, 4, 5, 6
 _NEAR = 0.7
 """Metres below its altitude at which a take-off counts as done, about NAV_MC_ALT_RAD."""
 _CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -172,8 +172,12 @@ class EmulatedPX4(Firmware):
             return _LATER
         if (main, sub) == (self._main, self._sub):
             return _OK
+        if (main, sub) == (_AUTO, _MISSION) and not self.route.begin():
+            return mavlink.MAV_RESULT_DENIED
         self._main, self._sub = main, sub
         self.failsafe = False
+        if (main, sub) != (_AUTO, _MISSION):
+            self.route.leave()
         if main == _AUTO and self.flight.flying:
             deeds = {_HOLD: self.flight.hold, _RETURN: self.flight.return_home}
             deeds[_LAND] = self.flight.land
@@ -185,6 +189,7 @@ class EmulatedPX4(Firmware):
     def take_over(self) -> None:
         """A pilot moves the sticks: position mode."""
         self._main, self._sub = _POSITION, 0
+        self.route.leave()
         self.flight.hold()
 
     def enter_return(self) -> None:

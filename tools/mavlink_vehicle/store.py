@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import Any
 
@@ -95,7 +96,8 @@ class LogStore:
 class PlanStore:
     """Missions and fences, and one transfer at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, wants_numbers: bool = False) -> None:
+        self._wants_numbers = wants_numbers
         self.plans: dict[int, list[Any]] = {}
         self._coming: list[Any] | None = None
         self._expected = 0
@@ -119,6 +121,9 @@ class PlanStore:
             self._coming, self._expected, self._kind = [], message.count, kind
             return self._next(peer)
         if name == "MISSION_ITEM_INT" and self._coming is not None and kind == self._kind:
+            if self._wants_numbers and math.isnan(message.param4):
+                self._coming = None
+                return [_ack(peer, mavlink.MAV_MISSION_INVALID_PARAM4, kind)]
             if message.seq == len(self._coming):
                 self._coming.append(message)
             return self._next(peer)

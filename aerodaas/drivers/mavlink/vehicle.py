@@ -20,13 +20,15 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.completion import ClimbCompletion
 from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.control.mode_change import ModeChange
 from aerodaas.drivers.mavlink.control.permission import flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
 from aerodaas.drivers.mavlink.microservices.airspace import Airspace
-from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
+from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
+from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
@@ -101,11 +103,13 @@ class MavlinkVehicle:
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
+        self._modes: ModeChange | None = None
+        self.mission_mode: MavlinkMissionMode | None = None
+        """Its own mission mode; None before it is connected."""
         self.payload = Payload(self._clock, self._lock)
         """Gimbals and cameras that it carries."""
         self._actuators = MavlinkActuators(self._robot.actuators, self._settings, self._lock)
         self._completion = ClimbCompletion(self._telemetry, self._phase)
-        self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
 
@@ -162,6 +166,14 @@ class MavlinkVehicle:
                     land=lambda: self._change(FlightMode.LAND),
                 )
                 self._report.departure = self._departure
+                self._modes = ModeChange(
+                    found.autopilot,
+                    commander,
+                    self._departure,
+                    self._phase,
+                    words=lambda: self._telemetry.texts.recent(time.monotonic(), REASONS),
+                    tell=self._words.append,
+                )
                 self._commander = commander
             if found.signs and link.key is None:
                 require_answer(commander, self._name, self._pause)
@@ -180,6 +192,15 @@ class MavlinkVehicle:
             self._connection.alignment.require_same_boot()
             self.payload.search(commander)
             self._airspace.begin(link, commander, self._connection.alignment)
+            self.mission_mode = MavlinkMissionMode(
+                self._robot,
+                self._settings,
+                connection=self._connection,
+                telemetry=self._telemetry,
+                phase=self._phase,
+                modes=self._modes,
+                lock=self._lock,
+            )
             self._actuators.use(commander)
         except BaseException:
             self.close()
@@ -214,7 +235,7 @@ class MavlinkVehicle:
         with self._lock:
             if departure.climbs:
                 departure.call_off(time.monotonic())
-            elif self._ours_in_the_air():
+            elif phase.ours:
                 self._change(FlightMode.LAND)
             elif not departure.withdrawing:
                 return
@@ -223,11 +244,6 @@ class MavlinkVehicle:
             if phase.shown is FlightMode.LAND or not (departure.withdrawing or phase.armed):
                 return
             self._pause()
-
-    def _ours_in_the_air(self) -> bool:
-        phase = self._phase
-        landing = phase.wish in {FlightMode.RETURN, FlightMode.LAND}
-        return phase.armed and phase.taken is None and phase.wish is not None and not landing
 
     def _stands(self) -> bool:
         """Whether it stands with still motors, and no take-off is under way; by its last word."""
@@ -354,8 +370,9 @@ class MavlinkVehicle:
             waits=self._phase.shown is not FlightMode.GUIDED,
         )
         connection.link.send(message)
-        before = connection.autopilot.stream_before
-        self._steering.see_to_guidance(self._phase, before, self._change, now)
+        if self.mission_mode is None or not self.mission_mode.starts:
+            before = connection.autopilot.stream_before
+            self._steering.see_to_guidance(self._phase, before, self._change, now)
         return sent
 
     def _knows_place(self, now: float) -> bool:
@@ -395,25 +412,9 @@ class MavlinkVehicle:
                     connection.departure.withdraw(time.monotonic())
 
     def _change(self, wish: FlightMode) -> None:
-        connection, phase = self._connected(), self._phase
-        under_way = connection.commander.under_way(mavlink.MAV_CMD_DO_SET_MODE)
-        asked = under_way is not None and under_way.mode is wish
-        if phase.wish is wish and (asked or phase.shown is wish):
-            return
-        if connection.departure.climbs and wish is not FlightMode.GUIDED:
-            connection.departure.let_go()
-        now = time.monotonic()
-        phase.ask(wish, now)
-        order = connection.autopilot.ask_mode(wish)
-
-        def done(outcome: CommandResult) -> None:
-            if not (outcome.accepted or outcome.replaced) and phase.wish is wish:
-                said = "; ".join(self._telemetry.texts.recent(time.monotonic(), REASONS))
-                self._words.append(f"{order.what}: {outcome.text} {said}".rstrip())
-
-        connection.commander.give(
-            order, done, still=lambda: phase.wish is wish and not phase.seen, now=now
-        )
+        self._connected()
+        assert self._modes is not None  # noqa: S101 - made before the connection
+        self._modes.ask(wish)
 
     def upload_mission(
         self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
@@ -488,6 +489,8 @@ class MavlinkVehicle:
                 self.payload.take(message, now)
             elif kind in MavlinkActuators.messages:
                 self._actuators.take(message)
+            elif self.mission_mode is not None and kind in MavlinkMissionMode.messages:
+                self.mission_mode.take(message, now)
             else:
                 self._moved(kind, now)
 
@@ -541,6 +544,8 @@ class MavlinkVehicle:
             self.payload.turn(now)
             self._airspace.turn(now)
             self._actuators.turn(now)
+            if self.mission_mode is not None:
+                self.mission_mode.turn(now)
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
@@ -568,13 +573,8 @@ class MavlinkVehicle:
 
         An autopilot may follow its last target for ever, and heartbeats alone do not stop it.
         """
-        if self._connection is None or not self._ours_in_the_air() or self._watchdog.healthy(now):
-            self._left_alone = None
-            return
-        step = FlightMode.RETURN if self._watchdog.gone(now) else FlightMode.HOLD
-        steered = self._phase.wish is FlightMode.GUIDED
-        if step is not self._left_alone and (steered or step is FlightMode.RETURN):
-            self._left_alone = step
+        step = None if self._connection is None else self._watchdog.step(now, self._phase)
+        if step is not None:
             self._words.append(f"the control loop is silent: {step.value}")
             self._change(step)
 

@@ -13,8 +13,10 @@ from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
     Command,
+    HandOver,
     RearrangeNavigation,
     ReleaseParachute,
+    TakeBack,
 )
 from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
@@ -44,6 +46,8 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
         return _answer(client.actuate(mission, wanted))
     if isinstance(command, ReleaseParachute):
         raise GraphError(f"{robot} flies at a provider, and no parachute is fired from afar")
+    if isinstance(command, HandOver | TakeBack):
+        raise GraphError(f"{robot} flies at a provider, which hands no waypoints over")
     word = word_for(command)
     if word is None:
         raise GraphError(

@@ -6,13 +6,15 @@ import enum
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.geometry import Vector
+from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
-__all__ = ["MotorWatch", "Motors"]
+__all__ = ["MotorWatch", "Motors", "Standstill"]
 
 _LIFTED = 0.3
 """Metres above the take-off position from which the drone has left the ground."""
@@ -43,6 +45,19 @@ class Motors(enum.Enum):
     LANDED = enum.auto()
     """Stopped after a gentle descent."""
     STOPPED_IN_FLIGHT = enum.auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Standstill:
+    """What follows for the mission of a vehicle whose motors do not run."""
+
+    known: bool = True
+    """Whether there is nothing to be done for it; False: it may yet start them."""
+    ends: MissionState | None = None
+    """The state in which the mission is over; None: it is not."""
+    reason: str = ""
+    alert: str = ""
+    """Kind of the alert about it; empty for none."""
 
 
 _ENDS = {
@@ -85,7 +100,30 @@ class MotorWatch:
             self._state = self._stop(state, now)
         return self._state
 
-    def story(self, motors: Motors, faults: Sequence[str]) -> tuple[str, str]:
+    def judge(
+        self, state: VehicleState, now: int, *, leaving: str | None, obeyed: bool
+    ) -> Standstill | None:
+        """What `state`, read at `now` (ns), means for a mission; None while the motors run.
+
+        `leaving` is the reason for which it returns or lands, None if it does not. `obeyed` is
+        False for a recorded vehicle.
+        """
+        motors = self.observe(state, now)
+        if motors is Motors.RUNNING:
+            return None
+        if motors in {Motors.IDLE, Motors.NEVER_LIFTED}:
+            if leaving is None or state.mode is not VehicleMode.GROUNDED:
+                return Standstill(known=False)
+            return Standstill(ends=MissionState.ABORTED, reason=f"{leaving} before take-off")
+        if motors is Motors.SETTLING:
+            return Standstill()
+        if motors is Motors.LANDED and (leaving is not None or not obeyed):
+            ends = None if leaving is None else MissionState.LANDED
+            return Standstill(ends=ends, reason=leaving or "")
+        kind, text = self._story(motors, state.faults)
+        return Standstill(ends=MissionState.ABORTED, reason=text, alert=kind)
+
+    def _story(self, motors: Motors, faults: Sequence[str]) -> tuple[str, str]:
         """Kind and text of the alert about `motors` that stopped without being asked to."""
         east, north, up = self.place
         where = f"at E {east:.1f}, N {north:.1f}, up {up:.1f} m"

@@ -26,6 +26,10 @@ from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 __all__ = ["FilteredSetpoint", "SetpointFilter"]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
+_LIMITS = frozenset({"max_speed", "max_climb", "max_acceleration", "max_yaw_rate"})
+"""Names of what bounds a setpoint and is no boundary."""
+_NOISE = 0.5
+"""m/s too fast towards a boundary that are no reason to intervene: a hover in wind has them."""
 _FEW = 4
 """Neighbours up to which it takes longer to tell the near ones than to bound by all."""
 _ROUNDING = 1e-3
@@ -108,6 +112,27 @@ class SetpointFilter:
             names.append("max_yaw_rate")
         self._last = velocity
         return FilteredSetpoint(VelocitySetpoint(velocity, yaw_rate), (*names, *bounds))
+
+    def crossed(
+        self,
+        odometry: Odometry,
+        neighbours: Iterable[Neighbour] = (),
+        *,
+        below: float | None = None,
+    ) -> tuple[str, ...]:
+        """Boundaries before which a drone that flies on as it does may not stop in time.
+
+        It is for a drone that follows no setpoints; empty if all is well.
+        """
+        self.forget()
+        onwards = VelocitySetpoint(odometry.velocity, evasive=True)
+        clamped = self.clamp(onwards, odometry, 0.0, neighbours, below=below)
+        self.forget()
+        names = tuple(name for name in clamped.clipped_by if name not in _LIMITS)
+        assert isinstance(clamped.setpoint, VelocitySetpoint)  # noqa: S101 - as it was asked for
+        if length(clamped.setpoint.velocity - odometry.velocity) > _NOISE:
+            return names
+        return () if self.fence.inside(odometry.position) else ("geofence",)
 
     def forget(self) -> None:
         """Start the next acceleration from the measured velocity, after an interruption."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerodaas.config.model import LimitsConfig
+from aerodaas.mission.log import subject
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
@@ -39,7 +40,23 @@ class Assessment:
         """The failsafe action demanded now."""
         return self.gravest.demand
 
+    def news(self, before: Assessment) -> list[Fault]:
+        """The faults that are to be told: those that there were not `before`.
 
+        The reason for a takeover or a lost position already names the faults behind it.
+        """
+        known = {subject(one.kind, one.text, one.about) for one in before.findings}
+        acts, reason = self.demand is not FailsafeAction.NOTHING, self.gravest.text
+        return [
+            one
+            for one in self.findings
+            if subject(one.kind, one.text, one.about) not in known
+            and not (acts and one.kind == "vehicle" and one.text in reason)
+        ]
+
+
+_GUARDED = frozenset({VehicleMode.GUIDED, VehicleMode.MISSION})
+"""Modes in which the drone flies where we want it."""
 _SLACK = 0.5
 """Metres below the clearance from which people are told: a position's noise and lag are less."""
 
@@ -94,6 +111,15 @@ class Supervisor:
     def silent_for(self, now: int) -> float:
         """Seconds since the link was lost, as last assessed; 0 while it is up."""
         return 0.0 if self._lost_since is None else seconds(now - self._lost_since)
+
+    def lost_for_good(self, now: int) -> str:
+        """Why the vehicle counts as lost after `return_timeout` of silence; empty if it does not.
+
+        `now` is the mission clock, nanoseconds.
+        """
+        silent = self.silent_for(now)
+        lost = silent >= self._limits.return_timeout
+        return f"the vehicle is lost: no word from it for {silent:.0f} s" if lost else ""
 
     def objections(self, state: VehicleState) -> list[str]:
         """Reasons against taking off now that waiting will not remove."""
@@ -173,8 +199,8 @@ class Supervisor:
         return None
 
     def _ground(self, state: VehicleState) -> Fault | None:
-        """Tell of a drone that follows setpoints nearer to the ground than it may be."""
-        if self._clearance is None or state.mode is not VehicleMode.GUIDED:
+        """Tell of a drone that is nearer to the ground on its way than it may be."""
+        if self._clearance is None or state.mode not in _GUARDED:
             return None
         if not has_position(state):
             return None

@@ -43,8 +43,9 @@ class Stepped:
         """Connect; `options` of the autopilot, `settings` of the driver."""
         self.now = 1000.0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.advance)
-        services = ("microservices.actuators", "microservices.payload")
-        for module in ("vehicle", "connecting", "control.watchdog", *services):
+        services = (f"microservices.{one}" for one in ("actuators", "mission_mode", "payload"))
+        controls = ("control.mode_change", "control.watchdog")
+        for module in ("vehicle", "connecting", *controls, *services):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 

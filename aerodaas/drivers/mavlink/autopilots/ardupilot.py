@@ -19,12 +19,13 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 __all__ = ["ArduPilot"]
 
-_GUIDED, _LAND, _RETURN, _BRAKE = 4, 9, 6, 17
+_AUTO, _GUIDED, _LAND, _RETURN, _BRAKE = 3, 4, 9, 6, 17
 _ASKED = {
     FlightMode.GUIDED: _GUIDED,
     FlightMode.TAKE_OFF: _GUIDED,
     # Loiter would follow the throttle of a possibly missing remote control, and sink.
     FlightMode.HOLD: _BRAKE,
+    FlightMode.MISSION: _AUTO,
     FlightMode.RETURN: _RETURN,
     FlightMode.LAND: _LAND,
 }
@@ -32,7 +33,7 @@ _NAMES = {
     0: "stabilize",
     1: "acro",
     2: "altitude hold",
-    3: "auto",
+    _AUTO: "auto",
     _GUIDED: "guided",
     5: "loiter",
     _RETURN: "return",
@@ -50,6 +51,7 @@ _NAMES = {
     27: "automatic return",
 }
 _KNOWN = {
+    _AUTO: FlightMode.MISSION,
     _GUIDED: FlightMode.GUIDED,
     _BRAKE: FlightMode.HOLD,
     _RETURN: FlightMode.RETURN,
@@ -87,6 +89,8 @@ class ArduPilot(Autopilot):
     log_suffix: ClassVar[str] = ".bin"
     log_head: ClassVar[bytes] = b"\xa3\x95\x80"
     ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace", "plan"})
+    home_comes_first: ClassVar[bool] = True
+    turns_at_waypoints: ClassVar[bool] = False
     rates: ClassVar[dict[int, float]] = {
         **Autopilot.rates,
         mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,

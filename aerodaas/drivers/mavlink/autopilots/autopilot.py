@@ -105,6 +105,10 @@ class Autopilot(ABC):
     """Of the files of its own logs, and their first bytes."""
     ways_home: ClassVar[frozenset[str]]
     """Those of `return`, `retrace` and `plan` that its own protection can fly."""
+    home_comes_first: ClassVar[bool]
+    """Whether the first item of a mission is its home, whatever is sent."""
+    turns_at_waypoints: ClassVar[bool]
+    """Whether a waypoint of its mission has a yaw."""
     rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20.0,
         mavlink.MAVLINK_MSG_ID_ATTITUDE: 20.0,

@@ -47,6 +47,7 @@ _MODES = {
     FlightMode.GUIDED: (_OFFBOARD, 0),
     FlightMode.TAKE_OFF: (_AUTO, 2),
     FlightMode.HOLD: (_AUTO, 3),
+    FlightMode.MISSION: (_AUTO, 4),
     FlightMode.RETURN: (_AUTO, 5),
     FlightMode.LAND: (_AUTO, 6),
 }
@@ -72,6 +73,8 @@ class PX4(Autopilot):
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     stream_before: ClassVar[float] = 1.2
     stops_short: ClassVar[bool] = True
+    home_comes_first: ClassVar[bool] = False
+    turns_at_waypoints: ClassVar[bool] = True
     rates: ClassVar[dict[int, float]] = {
         **Autopilot.rates,
         mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,

@@ -6,7 +6,10 @@ from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["flight_objection"]
 
-_STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
+_STEERED = {
+    *(VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.MISSION),
+    VehicleMode.RETURNING,
+}
 _WHY = {
     VehicleMode.MANUAL: ": a pilot flies it",
     VehicleMode.FAILSAFE: ": its own protection flies it",

@@ -95,13 +95,18 @@ class Steering:
         change: Callable[[FlightMode], None],
         now: float,
     ) -> None:
-        """Switch to the guided mode, after a stream of setpoints for `stream_before` seconds."""
+        """Switch to the guided mode, after a stream of setpoints for `stream_before` seconds.
+
+        Until then a vehicle that flies a plan is stopped.
+        """
         if phase.wish is FlightMode.GUIDED and phase.seen:
             return
         if now - self._stream_since < stream_before:
+            if phase.wish is FlightMode.MISSION:
+                change(FlightMode.HOLD)
             return
         if phase.shown is FlightMode.GUIDED and phase.wish in {None, FlightMode.TAKE_OFF}:
             phase.ask(FlightMode.GUIDED, now)
-        elif now - self._guided_asked_at > _ASK_AGAIN:
+        elif phase.wish is FlightMode.MISSION or now - self._guided_asked_at > _ASK_AGAIN:
             self._guided_asked_at = now
             change(FlightMode.GUIDED)

@@ -6,6 +6,8 @@ import math
 import threading
 import time
 
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+
 __all__ = ["Watchdog"]
 
 _SILENT = 1.0
@@ -20,6 +22,8 @@ class Watchdog:
     def __init__(self) -> None:
         self._fed_at = -math.inf
         self._loop: int | None = None
+        self._left_alone: FlightMode | None = None
+        """What a vehicle was asked for because the loop hangs."""
 
     def belong(self) -> None:
         """Accept only the calling thread as the loop; other threads read states, too."""
@@ -38,3 +42,16 @@ class Watchdog:
     def gone(self, now: float) -> bool:
         """Whether the loop has stopped for so long that it counts as dead."""
         return now - self._fed_at > _GONE
+
+    def step(self, now: float, phase: FlightPhase) -> FlightMode | None:
+        """What to ask a vehicle in `phase` for because the loop hangs, each mode once."""
+        if not phase.ours or self.healthy(now):
+            self._left_alone = None
+            return None
+        step = FlightMode.RETURN if self.gone(now) else FlightMode.HOLD
+        # Nobody guards a plan either.
+        guarded = phase.wish in {FlightMode.GUIDED, FlightMode.MISSION}
+        if step is self._left_alone or not (guarded or step is FlightMode.RETURN):
+            return None
+        self._left_alone = step
+        return step

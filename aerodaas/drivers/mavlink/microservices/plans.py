@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin
 
-__all__ = ["DEGREE", "MissionItem", "Progress", "download", "item_place", "upload"]
+__all__ = ["DEGREE", "MissionItem", "Progress", "Upload", "download", "item_place", "upload"]
 
 DEGREE = 1e7
 """Units of an item's `x` and `y` in a degree."""
@@ -32,6 +32,10 @@ _RESULTS = {
     mavlink.MAV_MISSION_UNSUPPORTED: "it does not know this command",
     mavlink.MAV_MISSION_NO_SPACE: "it has no room for so many",
     mavlink.MAV_MISSION_INVALID: "an item holds a wrong value",
+    **{
+        mavlink.MAV_MISSION_INVALID_PARAM1 + index: f"parameter {index + 1} of an item is wrong"
+        for index in range(7)
+    },
     mavlink.MAV_MISSION_INVALID_SEQUENCE: "items came out of order",
     mavlink.MAV_MISSION_DENIED: "it is denied at present",
     mavlink.MAV_MISSION_OPERATION_CANCELLED: "it was cancelled",
@@ -63,6 +67,82 @@ def _ignore(_: int, __: int) -> None:
     return
 
 
+class Upload:
+    """Upload of one plan, a message at a time: `take` the vehicle's, and `turn` when it is due."""
+
+    messages: ClassVar[frozenset[str]] = frozenset(
+        {"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"}
+    )
+    """Names of the vehicle's messages that belong to it."""
+
+    def __init__(
+        self,
+        send: Callable[[Any], None],
+        target: tuple[int, int],
+        items: Sequence[MissionItem],
+        kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
+        *,
+        progress: Progress = _ignore,
+        now: float,
+    ) -> None:
+        """Begin to replace the plan of `target` (system, component) by `items`, at `now`."""
+        self.done = False
+        """Whether the vehicle has accepted the plan."""
+        self.failure = ""
+        """Why it has not; empty as long as it may yet."""
+        self.due = now
+        """Monotonic seconds at which `turn` has something to do."""
+        self._send = send
+        self._target = target
+        self._items = items
+        self._kind = kind
+        self._progress = progress
+        self._count: Any = mavlink.MAVLink_mission_count_message(*target, len(items), kind)
+        self._said = self._count
+        self._tries = self._transfers = 0
+        self._whole = False
+        """Whether the last item was sent since something was repeated."""
+        self.turn(now)
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Answer a message of the vehicle."""
+        if self.done or self.failure or message.mission_type != self._kind:
+            return
+        items, name = self._items, _name(self._kind)
+        if message.get_type() == "MISSION_ACK":
+            self.done = message.type == mavlink.MAV_MISSION_ACCEPTED
+            if self.done:
+                self._progress(len(items), len(items))
+            else:
+                why = _RESULTS.get(message.type, f"result {message.type}")
+                self.failure = f"the autopilot refused the {name}: {why}"
+        elif message.seq < len(items):
+            self._tries = 0
+            self._progress(message.seq, len(items))
+            self._said = _message(items[message.seq], message.seq, self._target, self._kind)
+            self._whole |= message.seq == len(items) - 1
+            self._say(now)
+
+    def turn(self, now: float) -> None:
+        """Repeat what was said last, if its answer is overdue."""
+        if self.done or self.failure or now < self.due:
+            return
+        if self._whole:
+            # The acknowledgement was lost; with all items it answers to none of them.
+            self._said = self._count
+        if _TRIES in {self._tries, self._transfers}:
+            self.failure = f"the autopilot stopped answering while taking the {_name(self._kind)}"
+            return
+        self._tries += 1
+        self._transfers += self._said is self._count
+        self._whole = False
+        self._say(now)
+
+    def _say(self, now: float) -> None:
+        self._send(self._said)
+        self.due = now + (_TIMEOUT if self._said is self._count else 4 * _ITEM_TIMEOUT)
+
+
 def upload(
     link: MavlinkLink,
     items: Sequence[MissionItem],
@@ -73,34 +153,15 @@ def upload(
 
     Blocks; not for use in the link's thread.
     """
-    target = link.target
-    count = mavlink.MAVLink_mission_count_message(*target, len(items), kind)
-    names = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
-    with link.listen(*names) as inbox:
-        say: Any = count
-        tries = transfers = 0
-        while tries < _TRIES and transfers < _TRIES:
-            tries += 1
-            transfers += say is count
-            link.send(say)
-            whole = False
-            while reply := _next(inbox, kind, _TIMEOUT if say is count else 4 * _ITEM_TIMEOUT):
-                if reply.get_type() == "MISSION_ACK":
-                    if reply.type == mavlink.MAV_MISSION_ACCEPTED:
-                        progress(len(items), len(items))
-                        return
-                    why = _RESULTS.get(reply.type, f"result {reply.type}")
-                    raise VehicleError(f"the autopilot refused the {_name(kind)}: {why}")
-                if reply.seq < len(items):
-                    tries = 0
-                    progress(reply.seq, len(items))
-                    say = _message(items[reply.seq], reply.seq, target, kind)
-                    link.send(say)
-                    whole |= reply.seq == len(items) - 1
-            if whole:
-                # The acknowledgement was lost; with all items it answers to none of them.
-                say = count
-    raise VehicleError(f"the autopilot stopped answering while taking the {_name(kind)}")
+    with link.listen(*Upload.messages) as inbox:
+        began = time.monotonic()
+        one = Upload(link.send, link.target, items, kind, progress=progress, now=began)
+        while not (one.done or one.failure):
+            if message := _next(inbox, kind, one.due - time.monotonic()):
+                one.take(message, time.monotonic())
+            one.turn(time.monotonic())
+    if one.failure:
+        raise VehicleError(one.failure)
 
 
 def download(

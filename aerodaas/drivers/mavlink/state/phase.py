@@ -23,16 +23,19 @@ class FlightMode(enum.Enum):
     GUIDED = "guided"
     TAKE_OFF = "take off"
     HOLD = "hold"
+    MISSION = "mission"
+    """Flying the plan that it holds, by itself."""
     RETURN = "return"
     LAND = "land"
     OTHER = "other"
-    """Flown by a pilot, or by the autopilot's own mission."""
+    """Flown by a pilot."""
 
 
 _FOLLOWS = {
     FlightMode.GUIDED: frozenset({FlightMode.GUIDED}),
     FlightMode.TAKE_OFF: frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED}),
     FlightMode.HOLD: frozenset({FlightMode.HOLD}),
+    FlightMode.MISSION: frozenset({FlightMode.MISSION}),
     FlightMode.RETURN: frozenset({FlightMode.RETURN, FlightMode.LAND}),
     FlightMode.LAND: frozenset({FlightMode.LAND}),
 }
@@ -44,6 +47,7 @@ _SHOWN = {
     FlightMode.HOLD: VehicleMode.HOLDING,
     FlightMode.RETURN: VehicleMode.RETURNING,
     FlightMode.LAND: VehicleMode.LANDING,
+    FlightMode.MISSION: VehicleMode.MISSION,
     FlightMode.OTHER: VehicleMode.MANUAL,
 }
 
@@ -70,7 +74,21 @@ class FlightPhase:
         """The mode as the vehicle reports it."""
         if not self.armed:
             return VehicleMode.GROUNDED
+        if self.shown is FlightMode.MISSION and not self.flies_plan:
+            return self.taken or VehicleMode.MANUAL
         return self.taken or _SHOWN[self.shown]
+
+    @property
+    def flies_plan(self) -> bool:
+        """Whether it flies the plan that it was asked to fly, or has only just been taken back."""
+        ours = self.wish is FlightMode.MISSION or FlightMode.MISSION in self._before
+        return self.shown is FlightMode.MISSION and self.taken is None and ours
+
+    @property
+    def ours(self) -> bool:
+        """Whether it flies for us, and neither returns nor lands."""
+        landing = self.wish in {FlightMode.RETURN, FlightMode.LAND}
+        return self.armed and self.taken is None and self.wish is not None and not landing
 
     def ask(
         self, wish: FlightMode, now: float, meanwhile: frozenset[FlightMode] = frozenset()

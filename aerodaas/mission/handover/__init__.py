@@ -1,0 +1,1 @@
+"""Waypoints that the autopilot flies by its own mission mode for a while."""

@@ -1,0 +1,226 @@
+"""Hand-over of a mission's waypoints to the autopilot's own mission mode, and their take-back.
+
+The drone flies on by setpoints until the vehicle shows its mission mode. From then on it sends
+none, follows what the vehicle says of its progress, and believes it where the drone was there.
+Whatever else is to be done, by a command, a failsafe or the guard, takes the waypoints back first,
+and the first setpoint, or order to return or land, ends the vehicle's mission mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.config.robot import RobotConfig
+from aerodaas.mission.commands import Answer, HandOver, TakeBack
+from aerodaas.mission.handover.flyable import planned_places, unflyable
+from aerodaas.mission.log import MissionLog
+from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.route import Route
+from aerodaas.mission.safety.ground_clearance import GroundClearance
+from aerodaas.mission.safety.supervisor import has_position
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.mission_mode import MissionMode, MissionModePhase, MissionModeVehicle
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+
+__all__ = ["HANDED_OVER", "Handover"]
+
+HANDED_OVER = frozenset({MissionState.ENROUTE, MissionState.LOITERING, MissionState.DIVERTED})
+"""States of a mission that flies by waypoints, from which and in which they are handed over."""
+_STEERED = frozenset({VehicleMode.GUIDED, VehicleMode.HOLDING})
+"""Modes of a vehicle that follows setpoints, or is about to."""
+_KIND = "handover"
+"""Kind of the alerts."""
+_ROUNDING = 5.0
+"""Metres beyond the arrival radius within which an autopilot may round a waypoint off."""
+_PROGRESS = 0.1
+"""Metres of approach that count as progress: more than the position's noise."""
+_UPLOADS = 3
+"""How often the rest of a plan is uploaded, where waypoints are reached meanwhile."""
+
+
+@dataclass(slots=True)
+class Handover:
+    """Hand-over of one mission, called by it once a turn."""
+
+    vehicle: object
+    """Uses the mission mode of this one, if it has any (see `MissionModeVehicle`)."""
+    robot: RobotConfig
+    route: Route
+    clearance: GroundClearance | None
+    log: MissionLog
+    flies: bool = False
+    """Whether the autopilot flies."""
+    _stops: list[QueuedWaypoint] = field(default_factory=list)
+    """What was uploaded; empty while nothing is handed over."""
+    _places: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    _nearest: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    """Metres from each of them at which the drone was since the autopilot flies."""
+    _hovers: bool = False
+    """Whether it stays at a waypoint."""
+    _done: int = 0
+    _uploads: int = 0
+    _nearer_at: int = 0
+    """Mission clock at which it last came nearer to the next one, nanoseconds."""
+    _approach: float = np.inf
+
+    @property
+    def active(self) -> bool:
+        """Whether waypoints are handed over, or about to be."""
+        return bool(self._stops)
+
+    def handle(
+        self,
+        command: HandOver | TakeBack,
+        mission: MissionState,
+        stops: Sequence[QueuedWaypoint],
+        state: VehicleState | None,
+        now: int,
+        objection: str = "",
+    ) -> Answer:
+        """Begin to hand `stops` over, or take them back; the latter takes effect with this turn.
+
+        `objection` is what the mission itself has against it.
+        """
+        if isinstance(command, TakeBack):
+            if not self.active:
+                return Answer(accepted=False, text="the autopilot flies none of its waypoints")
+            self.take_back("asked to", now)
+            return Answer(accepted=True)
+        if self.active:
+            return Answer(accepted=False, text="its waypoints are handed over already")
+        if mission not in HANDED_OVER or not stops or state is None:
+            text = f"waypoints are handed over in flight to one, and the drone is {mission.value}"
+            return Answer(accepted=False, text=text)
+        self._uploads = 0
+        text = objection or self._upload(list(stops), state)
+        return Answer(not text, text and f"the autopilot cannot fly this: {text}")
+
+    def situation(self, stop: QueuedWaypoint) -> tuple[MissionState, str]:
+        """The state of a mission whose next `stop` the autopilot serves, and its reason."""
+        if self._hovers:
+            return MissionState.LOITERING, f"at {stop.id}, by the autopilot's mission mode"
+        return MissionState.ENROUTE, f"flying to {stop.id} by the autopilot's mission mode"
+
+    def _mode(self) -> MissionMode | None:
+        vehicle = self.vehicle
+        return vehicle.mission_mode if isinstance(vehicle, MissionModeVehicle) else None
+
+    def _upload(self, stops: list[QueuedWaypoint], state: VehicleState) -> str:
+        """Begin to upload `stops`; returns why not, empty if it is under way."""
+        mode, limits = self._mode(), self.robot.limits
+        if mode is None or not isinstance(self.vehicle, MissionModeVehicle):
+            return f"its driver, {self.robot.driver}, knows no mission mode"
+        if state.mode not in _STEERED or not has_position(state):
+            return f"the vehicle is {state.mode.value}"
+        position = state.odometry.position
+        if text := unflyable(stops, position, limits, self.route, self.clearance):
+            return text
+        places = planned_places(stops, limits, self.vehicle.capabilities.max_speed)
+        if text := mode.objection(places):
+            return text
+        try:
+            mode.upload(places)
+        except VehicleError as error:
+            return str(error)
+        self._stops, self._done = stops, 0
+        self._uploads += 1
+        self._places = np.array([place.position for place in places])
+        self._nearest = np.full(len(stops), np.inf)
+        return ""
+
+    def take_back(self, reason: str, now: int) -> None:
+        """Let the drone fly by setpoints again, if the autopilot flies or is about to."""
+        if not self._stops:
+            return
+        if mode := self._mode():
+            mode.leave()
+        what = "the hand-over has ended" if self.flies else "not handed over"
+        self.log.alert(now, _KIND, f"{what}: {reason}")
+        self._stops = []
+        self.flies = self._hovers = False
+
+    def turn(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
+        """Take note of how far it is, with `stops` as they are queued; whether the autopilot flies.
+
+        A plan that has changed on the way is taken back.
+        """
+        mode = self._mode()
+        if not self._stops or mode is None:
+            return False
+        ahead, queued = self._stops[self._done :], list(stops)
+        progress = mode.progress
+        if progress.phase is MissionModePhase.FAILED:
+            self.take_back(progress.fault, now)
+        elif queued == ahead:
+            self._advance(mode, progress.phase, state, now)
+        elif self.flies or queued != ahead[-len(queued) :] or self._uploads == _UPLOADS:
+            self.take_back("what is to be flown has changed", now)
+        elif text := self._upload(queued, state):
+            self.take_back(text, now)
+        return self.flies
+
+    def _advance(
+        self, mode: MissionMode, phase: MissionModePhase, state: VehicleState, now: int
+    ) -> None:
+        if phase is MissionModePhase.READY and state.mode is VehicleMode.GUIDED:
+            try:
+                mode.start()
+            except VehicleError as error:
+                self.take_back(str(error), now)
+        elif phase is MissionModePhase.FLYING and not self.flies:
+            self.flies, self._nearer_at, self._approach = True, now, np.inf
+            count = len(self._stops)
+            some = f"{count} waypoint{'s' if count > 1 else ''}"
+            self.log.alert(now, _KIND, f"handed over to the autopilot: {some}")
+        elif self.flies and (
+            phase is not MissionModePhase.FLYING or state.mode is not VehicleMode.MISSION
+        ):
+            self.take_back("it has left its mission mode", now)
+
+    def follow(self, state: VehicleState, now: int, elapsed: float) -> list[QueuedWaypoint]:
+        """The stops that were reached since the last turn, `elapsed` seconds ago, in order.
+
+        Takes back what is not flown as it should be.
+        """
+        mode = self._mode()
+        if mode is None or not self.flies or not has_position(state):
+            return []
+        progress, radius = mode.progress, self.robot.limits.arrival_radius
+        distances = np.linalg.norm(self._places - state.odometry.position, axis=1)
+        self._nearest = np.minimum(self._nearest, distances)
+        reached: list[QueuedWaypoint] = []
+        while self._done < min(progress.done, len(self._stops)):
+            stop, nearest = self._stops[self._done], float(self._nearest[self._done])
+            if nearest > radius + _ROUNDING:
+                text = (
+                    f"it says that it was at {stop.id}, and was never nearer than {nearest:.0f} m"
+                )
+                self.take_back(text, now)
+                return reached
+            reached.append(stop)
+            self._done += 1
+            self._nearer_at, self._approach = now, np.inf
+        if progress.fault:
+            self.take_back(progress.fault, now)
+        elif self._done == len(self._stops):
+            self.take_back("all waypoints are flown", now)
+        else:
+            self._watch(float(distances[self._done]), radius, now, elapsed)
+        return reached
+
+    def _watch(self, distance: float, radius: float, now: int, elapsed: float) -> None:
+        """Count the stay at the next stop, and miss what does not come nearer to it."""
+        stop, patience = self._stops[self._done], self.robot.mission.stall_timeout
+        self._hovers = distance <= radius and stop.remaining_hover > 0.0
+        if self._hovers:
+            stop.remaining_hover -= elapsed
+        if self._hovers or distance < self._approach - _PROGRESS:
+            self._nearer_at, self._approach = now, min(distance, self._approach)
+        elif seconds(now - self._nearer_at) > patience:
+            self.take_back(f"it has come no nearer to {stop.id} for {patience:g} s", now)
