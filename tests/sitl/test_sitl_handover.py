@@ -117,7 +117,7 @@ def test_a_ground_station_takes_over(autopilot: Autopilot) -> None:
 def test_without_us_it_comes_home(autopilot: Autopilot) -> None:
     """Nobody takes the waypoints back: after the last one it returns and lands by itself."""
     with handed_over(autopilot.url) as flight:
-        flight.vehicle.connection.link.send = lambda _: None  # type: ignore[method-assign]
+        flight.vehicle.connection.link.send = lambda message: None  # type: ignore[method-assign]  # noqa: ARG005
         flight.wait_for_ground(240.0)
         assert float(np.linalg.norm(flight.vehicle.read().odometry.position[:2])) < 2.0
         flight.tell_outcome("nobody takes the waypoints back")
