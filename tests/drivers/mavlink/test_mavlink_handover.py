@@ -12,6 +12,7 @@ from stepped import Stepped
 from stepped_missions import started
 
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.commands import (
     AddNavigation,
@@ -320,6 +321,13 @@ def test_a_pilots_own_mission_is_a_pilots(monkeypatch: pytest.MonkeyPatch) -> No
         )
         flight.until(lambda: flight.mission.finished, 5.0)
         assert flight.mission.state is S.ABORTED, flight.story
+
+
+def test_one_that_is_met_in_its_mission_mode_is_a_pilots() -> None:
+    """We have not asked for it, whoever did: nothing is sent."""
+    phase = FlightPhase()
+    phase.observe(FlightMode.MISSION, 1.0, armed=True, critical=False)
+    assert phase.mode is VehicleMode.MANUAL
 
 
 @pytest.mark.parametrize("family", FAMILIES)
