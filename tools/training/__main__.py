@@ -34,7 +34,13 @@ _Yolox = Annotated[
 ]
 _Seed = Annotated[int, typer.Option(help="Seed of weights and order.")]
 _Start = Annotated[
-    Path | None, typer.Option(help="Weights to begin with (weights.pt of an earlier run).")
+    Path | None,
+    typer.Option(help="Weights to begin with: an earlier run's weights.pt, or a detector.onnx."),
+]
+_Rate = Annotated[float, typer.Option(help="Highest rate of learning.")]
+_Kept = Annotated[
+    float,
+    typer.Option(min=0, max=1, help="Share of a --start that is an .onnx in what is exported."),
 ]
 _Processes = Annotated[
     int, typer.Option(min=1, help="Processes that share each step, one per core at best.")
@@ -73,6 +79,8 @@ def detector(
     batch: _Batch = 96,
     seed: _Seed = 1,
     start: _Start = None,
+    rate: _Rate = 2e-3,
+    kept: _Kept = 0.0,
     processes: _Processes = 1,
     loaders: _Loaders = 0,
     renderers: _Renderers = 1,
@@ -87,7 +95,14 @@ def detector(
     render(work, worlds, renderers=renderers)
     places = pipeline.Places(work, out, photographs, labels, yolox)
     recipe = train.Recipe(
-        steps=steps, batch=batch, seed=seed, start=start, processes=processes, loaders=loaders
+        steps=steps,
+        batch=batch,
+        rate=rate,
+        seed=seed,
+        start=start,
+        kept=kept,
+        processes=processes,
+        loaders=loaders,
     )
     _watch(pipeline.trained(places, recipe), steps)
     _console.print(pipeline.make_detector(places, recipe).figures)

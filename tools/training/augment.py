@@ -7,6 +7,7 @@ compression. Pictures are also cut, scaled, mirrored and patched together.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import cv2
 import numpy as np
@@ -20,6 +21,9 @@ __all__ = ["augmented", "placed", "spoiled"]
 Picture = NDArray[np.uint8]
 
 _GREY = 114
+_GRAIN_SIDE = 1024
+"""Pixels: pictures are smaller."""
+
 _LEAST_SIDE, _LEAST_SHARE = 3.0, 0.3
 """A box cut at the picture's edge stays if this many pixels and this share of it remain."""
 
@@ -165,12 +169,22 @@ def _toned(image: Picture, rng: np.random.Generator) -> Picture:
     return np.asarray(cv2.LUT(result, table), np.uint8)
 
 
+@cache
+def _grain() -> NDArray[np.float32]:
+    """Noise to cut pieces from: to draw it for each picture would take longer than all else."""
+    shape = (_GRAIN_SIDE, _GRAIN_SIDE, 3)
+    return np.random.default_rng(0).standard_normal(shape, dtype=np.float32)
+
+
 def _noisy(image: Picture, rng: np.random.Generator) -> Picture:
     height, width = image.shape[:2]
     coarse = 1 + int(rng.integers(2))
-    grain = rng.standard_normal((height // coarse, width // coarse, 3), dtype=np.float32)
+    rows, columns = height // coarse, width // coarse
+    top, left = rng.integers((_GRAIN_SIDE - rows, _GRAIN_SIDE - columns)).tolist()
+    grain = _grain()[top : top + rows, left : left + columns]
     if rng.integers(2):
-        grain[:] = grain[..., :1]
+        grain = np.repeat(grain[..., :1], 3, axis=2)
     if coarse > 1:
         grain = np.asarray(cv2.resize(grain, (width, height)), np.float32)
-    return np.clip(image + rng.uniform(1, 12) * grain, 0, 255).astype(np.uint8)
+    added = cv2.multiply(grain, rng.uniform(1, 12), dtype=cv2.CV_16S)
+    return np.asarray(cv2.add(image, added, dtype=cv2.CV_8U), np.uint8)

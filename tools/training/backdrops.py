@@ -12,11 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.training.looks import hi_vis
+from tools.training.colours import hi_vis
 
 __all__ = ["backdrop", "compose", "field"]
 
 Picture = NDArray[np.uint8]
+
+_BARRED = 0.65
+"""Share of backdrops with something drawn into them that a lattice might be taken for."""
 
 
 def field(shape: tuple[int, int], cells: float, rng: np.random.Generator) -> NDArray[np.float32]:
@@ -40,8 +43,8 @@ def backdrop(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     kinds = int(rng.integers(5))
     for _ in range(int(rng.integers(10, 120))):
         _leaf(canvas, kinds, rng)
-    for _ in range(int(rng.integers(4)) if rng.integers(2) else 0):
-        (_grid if rng.integers(2) else _twigs)(canvas, rng)
+    for _ in range(int(rng.integers(5)) if rng.random() < _BARRED else 0):
+        _DRAWN[rng.integers(len(_DRAWN))](canvas, rng)
     result = canvas.astype(np.float32)
     for cells in rng.choice([4.0, 12.0, 40.0, 110.0, 250.0], 2, replace=False):
         result *= 1.0 + rng.uniform(0.0, 0.28) * field(shape, cells, rng)[..., None]
@@ -126,6 +129,83 @@ def _twigs(canvas: Picture, rng: np.random.Generator) -> None:
         ends, length = grown, length * 0.7
 
 
+def _letters(canvas: Picture, rng: np.random.Generator) -> None:
+    """Write something: signs, screens, packets, signatures."""
+    height, width = canvas.shape[:2]
+    scale, font = float(np.exp(rng.uniform(-1.2, 1.4))), int(rng.integers(8))
+    thickness = int(rng.integers(1, 2 + max(1, int(2 * scale))))
+    colour, (u, v) = _tone(rng).tolist(), rng.uniform((-0.1, 0.0), (0.8, 1.0))
+    for row in range(int(rng.integers(1, 9))):
+        codes = rng.integers(40, 123, int(rng.integers(2, 16)))
+        place = (int(u * width), int(v * height + 30 * scale * row))
+        text = "".join(map(chr, codes.tolist()))
+        cv2.putText(canvas, text, place, font, scale, colour, thickness, cv2.LINE_AA)
+
+
+def _chessboard(canvas: Picture, rng: np.random.Generator) -> None:
+    """Lay tiles in two colours: floors, cloths, screens."""
+    height, width = canvas.shape[:2]
+    side, rows, columns = rng.uniform(4, 40), int(rng.integers(2, 12)), int(rng.integers(2, 12))
+    u, v = rng.uniform((-0.1, -0.1), (0.9, 0.9)) * (width, height)
+    turn = rng.normal(0.0, 0.5, (2, 2)) * 0.4 + np.eye(2)
+    colours = _tone(rng).tolist(), _tone(rng).tolist()
+    for row in range(rows):
+        for column in range(columns):
+            cell = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) + np.array([column, row])
+            points = ((cell * side) @ turn + (u, v)).astype(np.int32)
+            cv2.fillConvexPoly(canvas, points, colours[(row + column) % 2])
+
+
+def _ribs(canvas: Picture, rng: np.random.Generator) -> None:
+    """Draw spokes from one point, perhaps with rings around: umbrellas, wheels, leaves, webs."""
+    height, width = canvas.shape[:2]
+    middle = rng.uniform((-0.1, -0.1), (1.1, 1.1)) * (width, height)
+    radius = rng.uniform(0.05, 0.7) * width
+    first, fan = rng.uniform(0, 2 * np.pi), rng.choice([2 * np.pi, rng.uniform(0.5, 3.0)])
+    colour, thickness = _tone(rng).tolist(), int(rng.integers(1, 4))
+    for angle in first + np.linspace(0.0, fan, int(rng.integers(5, 24))):
+        end = middle + radius * np.array([np.cos(angle), np.sin(angle)])
+        _line(canvas, middle, end, colour, thickness)
+    place = (int(middle[0]), int(middle[1]))
+    for share in rng.uniform(0.2, 1.0, int(rng.integers(0, 5))):
+        cv2.circle(canvas, place, int(share * radius), colour, thickness, cv2.LINE_AA)
+
+
+def _strands(canvas: Picture, rng: np.random.Generator) -> None:
+    """Draw bent lines side by side or across each other: hair, grass, cables, noodles."""
+    height, width = canvas.shape[:2]
+    middle = rng.uniform((0, 0), (width, height))
+    spread, length = rng.uniform(0.02, 0.25) * width, rng.uniform(0.05, 0.4) * width
+    angle, unruly = rng.uniform(0, 2 * np.pi), rng.choice([0.1, 0.4, 2.0])
+    colours = [_tone(rng).tolist() for _ in range(2)]
+    steps = np.linspace(0.0, 1.0, 8)[:, None]
+    for _ in range(int(rng.integers(10, 70))):
+        start = middle + rng.normal(0.0, spread, 2)
+        along = angle + rng.normal(0.0, unruly)
+        ahead = np.array([np.cos(along), np.sin(along)]) * length * rng.uniform(0.4, 1.0)
+        bend = np.array([-ahead[1], ahead[0]]) * rng.normal(0.0, 0.5)
+        points = start + steps * ahead + steps * (1 - steps) * bend
+        thickness, colour = int(rng.integers(1, 4)), colours[rng.integers(2)]
+        line = [points.astype(np.int32)]
+        cv2.polylines(
+            canvas, line, isClosed=False, color=colour, thickness=thickness, lineType=cv2.LINE_AA
+        )
+
+
+def _pieces(canvas: Picture, rng: np.random.Generator) -> None:
+    """Heap up many pieces of nearly one colour with light and dark sides: food, leaves, gravel."""
+    height, width = canvas.shape[:2]
+    middle, spread = rng.uniform((0, 0), (width, height)), rng.uniform(0.04, 0.3) * width
+    tone, size, slim = _tone(rng), rng.uniform(2.0, 22.0), rng.uniform(0.15, 1.0)
+    for _ in range(int(rng.integers(20, 160))):
+        u, v = (middle + rng.normal(0.0, spread, 2)).astype(int).tolist()
+        axes = (int(size * rng.uniform(0.5, 1.2)) + 1, int(size * slim) + 1)
+        turn, shade = rng.uniform(0, 360), rng.uniform(0.5, 1.2)
+        for side, light in ((0, 0.6), (int(size / 5) + 1, 1.0)):
+            colour = np.clip(tone * shade * light, 0, 255).tolist()
+            cv2.ellipse(canvas, (u - side, v - side), axes, turn, 0, 360, colour, -1, cv2.LINE_AA)
+
+
 def _line(
     canvas: Picture,
     start: NDArray[np.float64],
@@ -135,6 +215,9 @@ def _line(
 ) -> None:
     first, last = (int(start[0]), int(start[1])), (int(end[0]), int(end[1]))
     cv2.line(canvas, first, last, colour, thickness, cv2.LINE_AA)
+
+
+_DRAWN = (_grid, _grid, _twigs, _twigs, _letters, _chessboard, _ribs, _strands, _pieces)
 
 
 def compose(picture: Picture, wanted: NDArray[np.bool_], rng: np.random.Generator) -> Picture:

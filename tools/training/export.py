@@ -12,6 +12,7 @@ from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
 from tools.training.network import STRIDES, DetectorNetwork, anchors_of, decode_boxes
+from tools.training.restart import mix
 from tools.training.yolox import CAR, PERSON, FrozenYolox
 
 __all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "fused", "save_onnx"]
@@ -80,11 +81,16 @@ def fused(module: nn.Module) -> nn.Module:
 
 
 def export_detector(
-    frozen: FrozenYolox, weights: Path, path: Path, thresholds: list[float]
+    frozen: FrozenYolox,
+    weights: Path,
+    path: Path,
+    thresholds: list[float],
+    kept: tuple[Path, float] | None = None,
 ) -> None:
     """Write the detector; `thresholds` are the learnt classes' best scores, made `NOMINAL_SCORE`.
 
-    They do not move the scores of YOLOX's own head.
+    They do not move the scores of YOLOX's own head. `kept` is a detector (.onnx) and its share in
+    the weights that are written. Raises ValueError where that is of another architecture.
     """
     names = dict(enumerate(DETECTOR_CLASSES))
     metadata = {
@@ -96,7 +102,10 @@ def export_detector(
         "imgsz": str(list(SIZE)),
     }
     picture = torch.zeros(1, 3, *SIZE)
-    detector = _Detector(frozen, _load(weights), thresholds)
+    network = _load(weights)
+    if kept is not None:
+        mix(network, *kept)
+    detector = _Detector(frozen, network, thresholds)
     save_onnx(detector, path, ("images", "output0"), picture, metadata)
 
 

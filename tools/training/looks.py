@@ -16,25 +16,12 @@ from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.scene import Looks
 from aerodaas.simulation.scene.textures import Palette, VestCut
 from aerodaas.simulation.world import Thing, World
+from tools.training.colours import any_colour, cloth, hi_vis
+from tools.training.garments import draw_garment
 
-__all__ = ["VariousLooks", "any_colour", "hi_vis"]
-
-Colour = tuple[float, float, float]
+__all__ = ["VariousLooks"]
 
 _SKINS = ((0.97, 0.82, 0.72), (0.82, 0.62, 0.46), (0.58, 0.40, 0.28), (0.33, 0.23, 0.17))
-
-_HUES = (
-    (55.0, 112.0, 0.48),
-    (112.0, 150.0, 0.2),
-    (14.0, 32.0, 0.2),
-    (-8.0, 6.0, 0.07),
-    (325.0, 345.0, 0.05),
-)
-"""Hues of hazard vests in degrees and their shares: lime to yellow, lime as a camera gives it
-whose white balance is off, orange, red, pink."""
-
-_PALEST = 0.22
-"""Saturation of a vest that the sun blows out."""
 
 _CABINS = (
     ((-1.75, 0.90), (-1.30, 1.40), (0.05, 1.43), (0.95, 0.90)),
@@ -45,20 +32,11 @@ _CABINS = (
 )
 """Saloon, estate, hatchback, van, pick-up."""
 
-_GARISH, _BRIGHT = 0.25, 0.25
-"""Shares of people without a vest whose shirt has a vest's colour, or another strong one."""
+_PRINTED, _SLEEVELESS = 0.6, 0.15
+"""Shares of people without a vest whose shirt is no plain one, and who wear no sleeves."""
 
-
-def hi_vis(rng: np.random.Generator) -> Colour:
-    """Colour of a hazard vest."""
-    low, high, _ = _HUES[rng.choice(len(_HUES), p=[share for *_, share in _HUES])]
-    hue = rng.uniform(low, high) % 360.0 / 360.0
-    return colorsys.hsv_to_rgb(hue, rng.uniform(_PALEST, 1.0), rng.uniform(0.72, 1.0))
-
-
-def any_colour(rng: np.random.Generator) -> Colour:
-    """Colour of a thing made by people: greys and dull tones more often than bright ones."""
-    return colorsys.hsv_to_rgb(rng.uniform(), rng.beta(1.0, 2.2), rng.uniform(0.04, 1.0))
+_OPEN, _EDGED = 0.25, 0.2
+"""Shares of vests that are not closed, and whose bands have an edge of another colour."""
 
 
 class _TintedPalette(Palette):
@@ -103,9 +81,11 @@ class VariousLooks(Looks):
             raise TypeError(f"{thing.id} is no person")
         rng = rng_of(thing)
         skin = np.array(_SKINS[rng.integers(len(_SKINS))]) * rng.uniform(0.85, 1.05)
-        shirt = _shirt(rng)
+        shirt = cloth(rng)
         blue = colorsys.hsv_to_rgb(rng.uniform(0.55, 0.65), rng.uniform(0.1, 0.7), rng.uniform())
         trousers = blue if rng.random() < 0.4 else any_colour(rng)  # noqa: PLR2004 - jeans
+        worn = None if thing.spec.vest == "none" else _cut(rng)
+        garment = draw_garment(shirt, rng) if rng.random() < _PRINTED else None
         return Outfit(
             skin=(float(skin[0]), float(skin[1]), float(skin[2])),
             hair=colorsys.hsv_to_rgb(0.08, rng.uniform(0, 0.6), rng.beta(1, 4)),
@@ -113,7 +93,9 @@ class VariousLooks(Looks):
             trousers=trousers,
             shoes=any_colour(rng),
             bare_arms=bool(rng.integers(2)),
-            vest=None if thing.spec.vest == "none" else _cut(rng),
+            bare_shoulders=worn is None and bool(rng.random() < _SLEEVELESS),
+            garment=garment,
+            vest=worn,
             build=rng.uniform(0.85, 1.3),
         )
 
@@ -141,15 +123,6 @@ class VariousLooks(Looks):
         )
 
 
-def _shirt(rng: np.random.Generator) -> Colour:
-    kind = rng.random()
-    if kind < _GARISH:
-        return hi_vis(rng)
-    if kind < _GARISH + _BRIGHT:
-        return colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.6, 1.0), rng.uniform(0.25, 1.0))
-    return any_colour(rng)
-
-
 def _cut(rng: np.random.Generator) -> VestCut:
     """One of the usual patterns: two bands, braces and one or two bands, braces alone."""
     lowest = rng.uniform(0.10, 0.32)
@@ -166,4 +139,6 @@ def _cut(rng: np.random.Generator) -> VestCut:
         open_sides=rng.choice([0.0, rng.uniform(0.0, 0.05)]),
         hem=rng.uniform(0.0, 0.36),
         flare=rng.uniform(0.0, 0.05),
+        open_front=rng.uniform(0.02, 0.09) if rng.random() < _OPEN else 0.0,
+        edging=hi_vis(rng) if rng.random() < _EDGED else None,
     )

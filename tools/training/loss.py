@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import torch
 from torch import Tensor
@@ -21,6 +22,8 @@ _CANDIDATES = 10
 _SCORE_POWER, _OVERLAP_POWER = 0.5, 6.0
 _WORTH = (1.5, 0.5, 1.0, 1.0)
 """Of a vest, a person, a car and a tower: drones are led by vests, and people are the most."""
+_FALSE = (2.0, 0.0, 0.0, 2.0)
+"""What more a cell weighs, times its score, that answers for such a thing where none is."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ def overlaps(one: Tensor, other: Tensor, *, complete: bool = False) -> Tensor:
 def losses(outputs: tuple[Tensor, Tensor], targets: Targets, size: tuple[int, int]) -> Losses:
     """Compare raw outputs for inputs of `size` (height, width) with the labels."""
     raw_boxes, logits = (output.float() for output in outputs)
-    centres, strides = (part.to(raw_boxes.device) for part in anchors_of(size))
+    centres, strides = _anchors(size, raw_boxes.device)
     boxes = decode_boxes(raw_boxes, centres, strides).transpose(1, 2)
     with torch.no_grad():
         owner, quality = _assign(boxes, logits.sigmoid().transpose(1, 2), targets, centres, strides)
@@ -90,11 +93,18 @@ def losses(outputs: tuple[Tensor, Tensor], targets: Targets, size: tuple[int, in
     wanted[batch, cell, kinds] = weight
     normal = weight.sum().clamp(min=1.0)
     worth = torch.tensor(_WORTH, device=logits.device)
+    given = logits.transpose(1, 2)
+    false = torch.tensor(_FALSE, device=logits.device) * given.detach().sigmoid()
     entropy = functional.binary_cross_entropy_with_logits(
-        logits.transpose(1, 2), wanted, worth, reduction="sum"
+        given, wanted, worth * torch.where(wanted > 0, 1.0, 1.0 + false), reduction="sum"
     )
     fit = overlaps(boxes[batch, cell], targets.boxes[batch, thing], complete=True)
     return Losses(((1 - fit) * weight * worth[kinds]).sum() / normal, entropy / normal)
+
+
+@cache
+def _anchors(size: tuple[int, int], device: torch.device) -> tuple[Tensor, ...]:
+    return tuple(part.to(device) for part in anchors_of(size))
 
 
 def _assign(

@@ -72,9 +72,11 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
     path = places.out / "detector.onnx"
     weights = places.run("detector") / "weights.pt"
     frozen = released_weights(places.yolox)
-    export_detector(frozen, weights, path, _UNCALIBRATED)
+    kept = (recipe.start, recipe.kept) if recipe.start is not None and recipe.kept else None
+    export_detector(frozen, weights, path, _UNCALIBRATED, kept)
     chosen = thresholds(path, calibration, _FALSE_PER_PICTURE)
-    export_detector(frozen, weights, path, [min(score, _HIGHEST) for score in chosen.values()])
+    limits = [min(score, _HIGHEST) for score in chosen.values()]
+    export_detector(frozen, weights, path, limits, kept)
     card = Card(
         "Detector",
         "Finds hazard vests, people, cars and lattice towers. Ultralytics layout, detect: "

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from aerodaas.simulation.scene.scene import Looks
-from tools.training.backdrops import compose
+from tools.training.backdrops import backdrop, compose
 from tools.training.clutter import add_clutter
 from tools.training.dataset import Sample, save_shard
 from tools.training.labelling import LabellingRenderer
@@ -32,6 +32,9 @@ _WORLDS_PER_SHARD = 10
 _SHARE = 0.65
 """Of the rendered width, what is kept: a little more than the detector's input."""
 
+_NOTHING = 0.06
+"""Share of pictures of nothing that is looked for."""
+
 _AS_FLOWN = 3
 """One world in so many is left as the simulator shows it in flight."""
 
@@ -50,7 +53,9 @@ def render_world(
         view = draw_view(world, camera, float(step), rng)
         picture = renderer.render(view.time, view.pose)
         labels = renderer.labels(view.time, view.pose)
-        if not plain:
+        if not plain and rng.random() < _NOTHING:
+            picture, labels = backdrop(picture.shape[:2], rng), []
+        elif not plain:
             picture = compose(picture, renderer.numbers() > 0, rng)
         size = (round(_SHARE * camera.width), round(_SHARE * camera.height))
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)

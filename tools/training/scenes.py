@@ -22,12 +22,15 @@ _SHAPES = ((360, 0.55), (480, 0.35), (640, 0.1))
 """Heights of pictures and their shares: 16:9, 4:3, square."""
 
 _WANTED = ("vest", "person", "car", "tower", "tree", "building")
-_SHARES = (0.40, 0.20, 0.21, 0.10, 0.02, 0.07)
+_SHARES = (0.36, 0.24, 0.19, 0.10, 0.05, 0.06)
 """What pictures are taken of; walls and windows, close up, have been taken for vests and cars."""
 
 _AIMLESS = 0.08
 """Share of pictures that a drone takes on its way, of nothing in particular: roads, shadows and
 walls close by have been taken for cars."""
+
+_IN_VESTS = 0.45
+"""Share of the people."""
 
 _EDGE = 45.0
 """Metres from the middle to the edge of what stands around."""
@@ -56,8 +59,8 @@ def draw_world(seed: int) -> World:
         reach, angle = rng.uniform(least, most), rng.uniform(-math.pi, math.pi)
         return reach * math.cos(angle), reach * math.sin(angle)
 
-    for k in range(rng.integers(1, 6)):
-        vest = "any" if rng.random() < 0.6 else "none"  # noqa: PLR2004 - about half
+    for k in range(rng.integers(1, 8)):
+        vest = "any" if rng.random() < _IN_VESTS else "none"
         entities.append({"kind": "person", "id": f"person{k}", "at": place(0, 8), "vest": vest})
     for k in range(rng.integers(0, 4)):
         colour = tuple(rng.uniform(0, 1, 3)) if rng.integers(2) else (rng.uniform(),) * 3

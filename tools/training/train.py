@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from tools.training.dataset import Pictures, Sample
 from tools.training.loop import Course, Progress, learn
 from tools.training.loss import Targets, losses
 from tools.training.network import DetectorNetwork
+from tools.training.restart import learn_on_from
 from tools.training.yolox import FrozenYolox
 
 __all__ = ["Recipe", "feed", "train"]
@@ -40,6 +41,8 @@ class Recipe(Course):
     """Height and width to train at, multiples of 32."""
     loaders: int = 0
     """Processes that draw pictures ahead; with none, each is drawn when its step comes."""
+    kept: float = 0.0
+    """Share, in the detector that is exported, of the one that training started from."""
 
 
 def train(
@@ -67,6 +70,12 @@ def train(
         return parts.total, parts.figures
 
     network = DetectorNetwork()
+    if recipe.start is not None and recipe.start.suffix == ".onnx":
+        images = next(iter(feed(pictures, replace(recipe, loaders=0), 0)))[0]
+        pixels = images.permute(0, 3, 1, 2).flip(1).float() / 255
+        with torch.no_grad():
+            learn_on_from(recipe.start, network, frozen.features(pixels))
+        recipe = replace(recipe, start=None)
     yield from learn(network, loss, recipe, folder)
 
 

@@ -17,7 +17,7 @@ from aerodaas.simulation.scene.textures import Palette, VestCut, vest_texture
 from aerodaas.simulation.skeleton import JOINTS, LIMBS
 from aerodaas.simulation.world import Thing
 
-__all__ = ["Outfit", "PersonFigure"]
+__all__ = ["Garment", "Outfit", "PersonFigure"]
 
 Colour: TypeAlias = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""
@@ -61,6 +61,18 @@ _ABOVE = np.array([0.35, 0.2, 0.91])
 
 
 @dataclass(frozen=True)
+class Garment:
+    """What is worn around the torso, where it is no plain shirt and no vest."""
+
+    texture: Texture
+    """u runs once around from the back, v from the hem to the neck."""
+    hem: float = 0.04
+    """Overhang below the pelvis, as a fraction of the torso."""
+    flare: float = 0.0
+    """Distance of the hem from the body, metres."""
+
+
+@dataclass(frozen=True)
 class Outfit:
     """Appearance of a person."""
 
@@ -71,6 +83,10 @@ class Outfit:
     shoes: Colour = _SHOES
     bare_arms: bool = False
     """Whether the forearms are without sleeves."""
+    bare_shoulders: bool = False
+    """Whether the upper arms are without sleeves."""
+    garment: Garment | None = None
+    """Instead of the plain shirt, of those without a vest."""
     vest: VestCut | None = None
     build: float = 1.0
     """Girth relative to an average adult's."""
@@ -94,7 +110,8 @@ class PersonFigure:
         if not isinstance(spec, Person):
             raise TypeError(f"{thing.id} is no person")
         forearm = wear.skin if wear.bare_arms else wear.shirt
-        clothes = (wear.shirt, forearm, wear.trousers, wear.trousers, wear.shoes)
+        upper_arm = wear.skin if wear.bare_shoulders else wear.shirt
+        clothes = (upper_arm, forearm, wear.trousers, wear.trousers, wear.shoes)
         self._root = parent.attach_new_node(spec.id)
         self._root.set_tag(LABEL, f"{spec.id}/person")
         self._scale = thing.height / _REFERENCE_HEIGHT
@@ -111,13 +128,17 @@ class PersonFigure:
             self._add((upper, lower), limb, plain)
         self._add(("neck", "head"), _head(wear.skin, wear.hair), plain)
         self._add(("pelvis", "neck"), _hips(wear.build).painted(wear.trousers), plain)
-        if wear.vest is None:
-            self._add(("pelvis", "neck"), _torso(wear.build).painted(wear.shirt), plain)
-        else:
+        if wear.vest is not None:
             self._wear(wear.vest, wear)
+        elif wear.garment is not None:
+            around = _around(wear.garment.hem, wear.garment.flare, wear.build)
+            self._add(("pelvis", "neck"), around, wear.garment.texture)
+        else:
+            self._add(("pelvis", "neck"), _torso(wear.build).painted(wear.shirt), plain)
 
     def _wear(self, cut: VestCut, wear: Outfit) -> None:
-        node = self._add(("pelvis", "neck"), _vest(cut, wear.build), vest_texture(cut, wear.shirt))
+        around = _around(cut.hem, cut.flare, wear.build)
+        node = self._add(("pelvis", "neck"), around, vest_texture(cut, wear.shirt))
         node.set_tag(LABEL, f"{self._root.name}/vest")
 
     def _add(self, bone: tuple[str, str], mesh: Mesh, texture: Texture) -> NodePath:
@@ -169,11 +190,11 @@ def _torso(build: float) -> Mesh:
     return tube(_CHEST_RADII * _girth(build), _CHEST_LEVELS, sides=12, flatten=0.62)
 
 
-def _vest(cut: VestCut, build: float) -> Mesh:
-    """The torso in a vest, whose hem stands off the body."""
+def _around(hem: float, flare: float, build: float) -> Mesh:
+    """What is worn around a torso, whose hem stands off the body."""
     radii, levels = _CHEST_RADII * _girth(build), _CHEST_LEVELS.copy()
-    radii[:2] += cut.flare
-    levels[0] = -cut.hem
+    radii[:2] += flare
+    levels[0] = -hem
     return tube(radii, levels, sides=12, flatten=0.62)
 
 

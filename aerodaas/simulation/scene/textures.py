@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from panda3d.core import SamplerState, Texture
 
-__all__ = ["Palette", "VestCut", "noise", "vest_texture"]
+__all__ = ["Palette", "VestCut", "noise", "texture_of", "vest_texture"]
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def _blend(low: ArrayLike, high: ArrayLike, share: Floats) -> Floats:
     return np.asarray(low) * (1.0 - share) + np.asarray(high) * share
 
 
-def _texture(name: str, colours: Floats, alpha: Floats | None = None) -> Texture:
+def texture_of(name: str, colours: Floats, alpha: Floats | None = None) -> Texture:
     """Texture of colours (h, w, 3) in RGB and alpha (h, w), both 0 to 1; row 0 is the bottom."""
     height, width = colours.shape[:2]
     channels = [colours[..., ::-1]] if alpha is None else [colours[..., ::-1], alpha[..., None]]
@@ -75,6 +75,10 @@ class VestCut:
     """Overhang of the vest below the pelvis, as a fraction of the torso."""
     flare: float = 0.0
     """Distance of the hem from the body, metres."""
+    open_front: float = 0.0
+    """Half the width of the gap that shows the shirt where it is not closed, as `strap`."""
+    edging: tuple[float, float, float] | None = None
+    """Colour of a stripe above and below each horizontal band, if there is one."""
 
 
 def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
@@ -83,6 +87,9 @@ def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
     u, v = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size)
     cloth = np.asarray(cut.colour) * (1.0 + 0.05 * noise(size, 1.0, 7))[..., None]
     around = np.zeros_like(u, dtype=bool)
+    if cut.edging is not None:
+        for level in cut.bands:
+            cloth[np.abs(v - level) < 1.6 * cut.band] = np.asarray(cut.edging)
     for level in cut.bands:
         around |= np.abs(v - level) < cut.band
     # u runs once around from the back: 0.25 is the right side, 0.5 the chest, 0.75 the left.
@@ -92,8 +99,8 @@ def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
     cloth[around | over] = np.asarray(cut.silver)
     cloth[(np.abs(u - 0.5) < 0.012) & ~around] *= 0.55
     gap = (np.abs(np.abs(u - 0.5) - 0.25) < cut.open_sides) & (v < 0.9) & ~around
-    cloth[gap] = np.asarray(shirt)
-    return _texture("vest", cloth)
+    cloth[gap | (np.abs(u - 0.5) < cut.open_front)] = np.asarray(shirt)
+    return texture_of("vest", cloth)
 
 
 class Palette:
@@ -115,33 +122,33 @@ class Palette:
         patches = noise(size, 1.4, 2)
         dry = np.clip(0.4 + 0.13 * patches + 0.18 * blades, 0, 1)
         colours = _blend((0.33, 0.44, 0.17), (0.60, 0.60, 0.34), dry)
-        return _texture("grass", colours * (1.0 + 0.17 * blades)[..., None])
+        return texture_of("grass", colours * (1.0 + 0.17 * blades)[..., None])
 
     def _soil(self) -> Texture:
         crumbs, patches = noise(_SIZE, 0.6, 3), noise(_SIZE, 1.3, 4)
         colours = _blend((0.33, 0.24, 0.16), (0.52, 0.41, 0.29), 0.5 + 0.25 * patches)
-        return _texture("soil", colours * (1.0 + 0.13 * crumbs)[..., None])
+        return texture_of("soil", colours * (1.0 + 0.13 * crumbs)[..., None])
 
     def _asphalt(self) -> Texture:
         grain, stains = noise(_SIZE, 0.2, 5), noise(_SIZE, 1.5, 6)
         grey = 0.40 + 0.035 * grain + 0.03 * stains
-        return _texture("asphalt", np.stack([grey, grey, 1.03 * grey], axis=-1))
+        return texture_of("asphalt", np.stack([grey, grey, 1.03 * grey], axis=-1))
 
     def _gravel(self) -> Texture:
         grain, patches = noise(_SIZE, 0.35, 8), noise(_SIZE, 1.3, 9)
         colours = _blend((0.55, 0.50, 0.42), (0.70, 0.66, 0.58), 0.5 + 0.2 * patches)
-        return _texture("gravel", colours * (1.0 + 0.11 * grain)[..., None])
+        return texture_of("gravel", colours * (1.0 + 0.11 * grain)[..., None])
 
     def _bark(self) -> Texture:
         furrows = noise(_SIZE // 4, 0.9, 10, 5.0).T
-        return _texture("bark", np.array([0.38, 0.30, 0.23]) * (1.0 + 0.22 * furrows)[..., None])
+        return texture_of("bark", np.array([0.38, 0.30, 0.23]) * (1.0 + 0.22 * furrows)[..., None])
 
     def _leaves(self) -> Texture:
         size = _SIZE // 2
         leaf, clumps = noise(size, 0.7, 11), noise(size, 1.3, 12)
         light = 0.45 + 0.20 * leaf + 0.15 * clumps
         colours = _blend((0.13, 0.22, 0.08), (0.50, 0.60, 0.26), light)
-        return _texture("leaves", colours, (leaf + 0.4 * clumps > -0.55).astype(np.float64))
+        return texture_of("leaves", colours, (leaf + 0.4 * clumps > -0.55).astype(np.float64))
 
     def _crop(self) -> Texture:
         """Row of young plants: blades that fan out from stems, on a transparent background."""
@@ -160,7 +167,7 @@ class Palette:
                     columns = np.arange(int(place - reach), int(place + reach) + 1) % width
                     colours[row, columns] = green * (0.6 + 0.4 * row / height)
                     alpha[row, columns] = 1.0
-        return _texture("crop", colours, alpha)
+        return texture_of("crop", colours, alpha)
 
     def _brick(self) -> Texture:
         size, rows, columns = _SIZE, 16, 8
@@ -171,11 +178,11 @@ class Palette:
         colours = np.array([0.62, 0.30, 0.22]) * tone[row, across.astype(int) % columns][..., None]
         joint = ((y * rows / size) % 1 < 0.13) | (across % 1 < 0.06)
         colours[joint] = (0.68, 0.65, 0.60)
-        return _texture("brick", colours * (1.0 + 0.05 * noise(size, 0.5, 15))[..., None])
+        return texture_of("brick", colours * (1.0 + 0.05 * noise(size, 0.5, 15))[..., None])
 
     def _plaster(self) -> Texture:
         grey = 0.93 + 0.02 * noise(_SIZE, 0.5, 16) + 0.02 * noise(_SIZE, 1.5, 17)
-        return _texture("plaster", np.repeat(grey[..., None], 3, axis=-1))
+        return texture_of("plaster", np.repeat(grey[..., None], 3, axis=-1))
 
     def _wood(self) -> Texture:
         size, planks = _SIZE, 8
@@ -183,7 +190,7 @@ class Palette:
         tone = np.random.default_rng(18).uniform(0.82, 1.1, planks)[x * planks // size]
         tone = np.where((x * planks / size) % 1 < 0.06, 0.45, tone)
         grain = 1.0 + 0.07 * noise(size, 0.8, 19, 6.0)
-        return _texture("wood", np.array([0.55, 0.42, 0.30]) * (tone * grain)[..., None])
+        return texture_of("wood", np.array([0.55, 0.42, 0.30]) * (tone * grain)[..., None])
 
     def _tiles(self) -> Texture:
         size, rows, columns = _SIZE, 16, 16
@@ -192,13 +199,13 @@ class Palette:
         across = x * columns / size + 0.5 * (row % 2)
         tone = np.random.default_rng(20).uniform(0.85, 1.1, (rows, columns))
         shade = tone[row, across.astype(int) % columns] * (0.7 + 0.3 * ((y * rows / size) % 1))
-        return _texture("tiles", np.array([0.60, 0.33, 0.26]) * shade[..., None])
+        return texture_of("tiles", np.array([0.60, 0.33, 0.26]) * shade[..., None])
 
     def _shadow(self) -> Texture:
         """Dark disc with a soft edge."""
         axis = np.linspace(-1, 1, 64)
         alpha = np.clip(1.6 * (1.0 - np.hypot(*np.meshgrid(axis, axis))), 0.0, 0.5)
-        return _texture("shadow", np.zeros((64, 64, 3)), alpha)
+        return texture_of("shadow", np.zeros((64, 64, 3)), alpha)
 
     def _facade(self) -> Texture:
         """One repeatable bay of a plaster wall with a window."""
@@ -211,7 +218,7 @@ class Palette:
         glass = _blend((0.20, 0.27, 0.34), (0.52, 0.63, 0.72), 0.3 + 0.8 * (y - 0.3))
         colours[pane] = glass[pane]
         colours[(np.abs(x - 0.5) < 0.012) & frame] = 0.96
-        return _texture("facade", colours)
+        return texture_of("facade", colours)
 
     def _plain(self) -> Texture:
-        return _texture("plain", np.ones((4, 4, 3)))
+        return texture_of("plain", np.ones((4, 4, 3)))
