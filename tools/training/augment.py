@@ -186,5 +186,5 @@ def _noisy(image: Picture, rng: np.random.Generator) -> Picture:
         grain = np.repeat(grain[..., :1], 3, axis=2)
     if coarse > 1:
         grain = np.asarray(cv2.resize(grain, (width, height)), np.float32)
-    added = cv2.multiply(grain, rng.uniform(1, 12), dtype=cv2.CV_16S)
+    added = grain * np.float32(rng.uniform(1, 12))
     return np.asarray(cv2.add(image, added, dtype=cv2.CV_8U), np.uint8)
