@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import numpy as np
+
+from aerodaas.recording.reader import Recording
 from tools.browser import Page
 
-__all__ = ["click_map", "until_state"]
+__all__ = ["button", "click_map", "passed", "until_done", "until_state"]
+
+_NEAR = 0.8
+"""Metres from a place at which the drone was there."""
 
 
 def until_state(page: Page, *states: str) -> None:
@@ -25,3 +32,27 @@ def click_map(page: Page, east: float, north: float) -> None:
         "(document.querySelector('[data-testid=map]'))"
     )
     page.click(x, y)
+
+
+def button(name: str) -> str:
+    """Script that presses a button of the commands, which may not be disabled."""
+    return f"document.querySelector('.command.{name}:not(:disabled)').click()"
+
+
+def until_done(page: Page, what: str) -> None:
+    """Wait until the newest order is this one, and was seen to be carried out."""
+    page.until(
+        f"(one => one?.dataset.stage === 'done' && one.innerText.startsWith({json.dumps(what)}))"
+        "(document.querySelector('.orders li'))"
+    )
+
+
+def passed(path: Path, place: tuple[float, float]) -> bool:
+    """Whether the drone was at a place, by the simulator's own truth."""
+    with Recording.open(path) as recording:
+        truths = [
+            (truth["position"]["x"], truth["position"]["y"])
+            for record in recording.records()
+            if isinstance(record.value, dict) and (truth := record.value.get("truth"))
+        ]
+    return bool(np.linalg.norm(np.array(truths) - place, axis=1).min() < _NEAR)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import urllib.parse
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,10 +10,9 @@ import numpy as np
 import pytest
 from flown import Proxy, Watched
 from hovering import console
-from pages import click_map, until_state
+from pages import button, click_map, passed, until_done, until_state
 from required import needs_peer
 
-from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.health import HealthItem, HealthReport, Verdict
@@ -25,7 +23,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BRO
 
 PLACE = (4.0, -5.0)
 """East and north of a waypoint that the survey does not visit."""
-NEAR = 0.8
 
 
 @pytest.fixture
@@ -33,19 +30,6 @@ def browser() -> Iterator[Browser]:
     """A browser of the test's own."""
     with Browser() as browser:
         yield browser
-
-
-def button(name: str) -> str:
-    """Script that presses a button of the commands, which may not be disabled."""
-    return f"document.querySelector('.command.{name}:not(:disabled)').click()"
-
-
-def until_done(page: Page, what: str) -> None:
-    """Wait until the newest order is this one, and was seen to be carried out."""
-    page.until(
-        f"(one => one?.dataset.stage === 'done' && one.innerText.startsWith({json.dumps(what)}))"
-        "(document.querySelector('.orders li'))"
-    )
 
 
 def fly_there(page: Page, **values: float) -> None:
@@ -122,17 +106,6 @@ def test_a_flight_is_watched_commanded_and_found_again(browser: Browser, tmp_pat
         assert flight.ended() == 0
         proxy.close()
     assert passed(flight.recording, PLACE)
-
-
-def passed(path: Path, place: tuple[float, float]) -> bool:
-    """Whether the drone was at a place, by the simulator's own truth."""
-    with Recording.open(path) as recording:
-        truths = [
-            (truth["position"]["x"], truth["position"]["y"])
-            for record in recording.records()
-            if isinstance(record.value, dict) and (truth := record.value.get("truth"))
-        ]
-    return bool(np.linalg.norm(np.array(truths) - place, axis=1).min() < NEAR)
 
 
 def test_boxes_are_drawn_on_their_own_frame(browser: Browser, tmp_path: Path) -> None:

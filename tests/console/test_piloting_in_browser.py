@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from flown import Watched
+from pages import button, click_map, passed, until_done, until_state
 from required import needs_peer
-from test_console_in_browser import button, click_map, passed, until_done, until_state
 
 from aerodaas.recording.reader import Recording
 from tools.browser import Browser, Page
