@@ -65,7 +65,6 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
     each calls this with the same arguments, and the first one keeps the checkpoint.
     """
     cv2.setNumThreads(0)
-    torch.backends.cudnn.benchmark = True
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network.to(device=device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - not among PyTorch's overloads
     if course.start is not None:
@@ -119,11 +118,12 @@ def _schedule(step: int, steps: int) -> float:
 @torch.no_grad()
 def _follow(mean: nn.Module, network: nn.Module, memory: float) -> None:
     """Move the running mean of the weights; `memory` (0 to 1) of it stays."""
-    state, kept = network.state_dict(), mean.state_dict()
-    moved = [name for name, value in kept.items() if value.dtype.is_floating_point]
-    torch._foreach_lerp_([kept[n] for n in moved], [state[n] for n in moved], 1 - memory)
-    for name in kept.keys() - set(moved):
-        kept[name].copy_(state[name])
+    state = network.state_dict()
+    for name, value in mean.state_dict().items():
+        if value.dtype.is_floating_point:
+            value.mul_(memory).add_(state[name], alpha=1 - memory)
+        else:
+            value.copy_(state[name])
 
 
 def _keep(
