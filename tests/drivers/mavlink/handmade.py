@@ -51,7 +51,9 @@ class Handmade:
         self._ear = mavlink.MAVLink(None, 9, 9)
         self._inbox: list[tuple[bytes, tuple[str, int]]] = []
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda _: self.advance())
-        for module in ("vehicle", "connecting", "control.watchdog", "microservices.payload"):
+        controls = ("control.mode_change", "control.watchdog")
+        services = ("microservices.mission_mode", "microservices.payload")
+        for module in ("vehicle", "connecting", *controls, *services):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 

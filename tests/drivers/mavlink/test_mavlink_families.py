@@ -33,7 +33,7 @@ def px4_mode(main: int, sub: int = 0) -> int:
         (6, 9, FlightMode.GUIDED, "offboard"),
         (4, 2, FlightMode.TAKE_OFF, "take-off"),
         (4, 3, FlightMode.HOLD, "hold"),
-        (4, 4, FlightMode.OTHER, "mission"),
+        (4, 4, FlightMode.MISSION, "mission"),
         (4, 5, FlightMode.RETURN, "return"),
         (4, 6, FlightMode.LAND, "land"),
         (4, 99, FlightMode.OTHER, "mode 4/99"),
