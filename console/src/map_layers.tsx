@@ -71,9 +71,13 @@ export function Drone({ name, status, sight, chosen, stale }: DroneProps) {
   const [ve, vn] = status.velocity ?? [];
   const unsure = SIGMAS * (status.position_sigma ?? 0) * sight.view.scale;
   return (
-    <g class={`drone ${chosen ? "chosen" : ""} ${stale ? "stale" : ""}`} data-drone={name}>
+    <>
       {sight.tilted && <Stem place={[east, north, up ?? 0]} sight={sight} />}
-      <g transform={`translate(${sight.x(east)} ${sight.y(north, up ?? 0)})`}>
+      <g
+        class={`drone ${chosen ? "chosen" : ""} ${stale ? "stale" : ""}`}
+        transform={`translate(${sight.x(east)} ${sight.y(north, up ?? 0)})`}
+        data-drone={name}
+      >
         {unsure > 0 && <ellipse class="unsure" rx={px(unsure)} ry={px(unsure * sight.lies)} />}
         {ve != null && vn != null && (
           <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14 * sight.lies}`} />
@@ -88,7 +92,7 @@ export function Drone({ name, status, sight, chosen, stale }: DroneProps) {
           {up != null && <tspan class="small"> {up.toFixed(1)} m</tspan>}
         </text>
       </g>
-    </g>
+    </>
   );
 }
 

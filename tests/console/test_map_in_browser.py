@@ -76,7 +76,7 @@ def test_the_world_below_is_seen_tilted_and_measured(browser: Browser) -> None:
         assert page.run("document.querySelectorAll('.scenery .building .roof').length") == 4
         assert page.run("document.querySelectorAll('.scenery .building .wall').length") >= 4
         stem = page.run(
-            "document.querySelector('.drone .stem').getBBox().height"
+            "document.querySelector('.robot > .stem').getBBox().height"
             " / document.querySelector('[data-testid=map]').dataset.scale"
         )
         assert stem == pytest.approx(3.0 * np.sqrt(1 - 0.55**2), abs=0.05)
