@@ -5,11 +5,9 @@ People and cars are left out, those that stand still, too: where they are is for
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from aerodaas.simulation.boxes import Box
 from aerodaas.simulation.scenario import (
     Building,
     Car,
@@ -27,6 +25,8 @@ __all__ = ["Shape", "ShapeKind", "ground_plan"]
 
 ShapeKind: TypeAlias = Literal["building", "crops", "fence", "road", "rubble", "tower", "tree"]
 _Point: TypeAlias = tuple[float, float]
+_FOOT = [6, 2, 0, 4]
+"""Of a box's corners those on the ground, counter-clockwise."""
 _KINDS: dict[type, ShapeKind] = {
     Building: "building",
     CropRows: "crops",
@@ -66,20 +66,5 @@ def _shape(thing: Thing) -> Shape | None:
     _, width, height = box.size
     if isinstance(spec, Tree):
         return Shape("tree", ((thing.x, thing.y),), height, width)
-    return Shape(_KINDS[type(spec)], _corners(box), height)
-
-
-def _corners(box: Box) -> tuple[_Point, ...]:
-    """Corners of a box's foot, counter-clockwise."""
-    east, north, _ = box.centre
-    length, width, _ = box.size
-    cosine, sine = math.cos(box.yaw), math.sin(box.yaw)
-    return tuple(
-        (east + cosine * ahead - sine * left, north + sine * ahead + cosine * left)
-        for ahead, left in (
-            (length / 2, width / 2),
-            (-length / 2, width / 2),
-            (-length / 2, -width / 2),
-            (length / 2, -width / 2),
-        )
-    )
+    foot = box.corners[_FOOT, :2].tolist()
+    return Shape(_KINDS[type(spec)], tuple((east, north) for east, north in foot), height)
