@@ -67,12 +67,13 @@ def survey(speed: float) -> list[Waypoint]:
     return stops
 
 
-def fly(url: str, speed: float, wind: float, *, own: bool) -> dict[str, float]:
+def fly(url: str, speed: float, wind: float, radius: float, *, own: bool) -> dict[str, float]:
     """Figures of one flight; `own`: by the autopilot's own mission mode."""
     limits = {
         "cruise_speed": speed,
         "max_speed": max(speed, 10.0),
         "max_range": 2000.0,
+        "arrival_radius": radius,
         "takeoff_height": _HEIGHT,
         "takeoff_timeout": 90.0,
         "preflight_timeout": 90.0,
@@ -154,6 +155,7 @@ def main(
     speed: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [5.0, 10.0, 15.0],  # noqa: B006
     wind: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [0.0, 8.0],  # noqa: B006
     who: Annotated[list[str], typer.Option(help="setpoints, mission")] = ["setpoints", "mission"],  # noqa: B006
+    radius: Annotated[float, typer.Option(help="arrival_radius; an ArduCopter's is 2 m.")] = 2.0,
     instance: Annotated[int, typer.Option(help="Number of the simulator among several.")] = 0,
     out: Annotated[Path | None, typer.Option(help="File for the figures as JSON.")] = None,
 ) -> None:
@@ -171,7 +173,7 @@ def main(
                     with SitlProcess("ardupilot", options):
                         host, port = options.heard_at
                         url = f"udpin:{host}:{port}"
-                        figures = fly(url, one, air, own=flown == "mission")
+                        figures = fly(url, one, air, radius, own=flown == "mission")
                 report.row(f"{one:g} m/s, wind {air:g} m/s, {flown}", figures)
                 report.show()
     if out is not None:

@@ -20,7 +20,11 @@ def require_finite(name: str, setpoint: Setpoint) -> None:
         scalars: dict[str, float | None] = {"yaw_rate": setpoint.yaw_rate}
     else:
         vector = setpoint.position
-        scalars = {"yaw": setpoint.yaw, "speed": setpoint.speed}
+        scalars = {
+            "yaw": setpoint.yaw,
+            "speed": setpoint.speed,
+            "passing_speed": setpoint.passing_speed,
+        }
     if np.shape(vector) != (3,) or not is_finite(vector):
         raise InvalidWaypointError(f"{name}: a setpoint needs three finite numbers, not {vector}")
     for key, value in scalars.items():

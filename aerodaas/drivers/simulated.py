@@ -260,8 +260,9 @@ class SimulatedVehicle:
         speed = min(wanted, self._limits.speed)
         yaw = setpoint.yaw
         facing = self._rotor.yaw + self._noise.yaw_drift if yaw is None else float(yaw)
-        self._autopilot.guide(Goto((x, y, z), facing, speed))
-        return PositionSetpoint(np.array([x, y, z]), yaw, speed)
+        passing = min(float(setpoint.passing_speed), speed)
+        self._autopilot.guide(Goto((x, y, z), facing, speed, passing))
+        return PositionSetpoint(np.array([x, y, z]), yaw, speed, passing)
 
     def hold(self) -> None:
         """Brake and hover; raise VehicleError on the ground."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from dataclasses import replace
 
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import seconds
@@ -20,6 +21,8 @@ _FACING = 0.2
 """Yaw error in radians that counts as facing the requested direction."""
 _PROGRESS = 0.1
 """Metres of approach that count as progress: more than the position's noise."""
+_MISSED = 1.0
+"""Seconds without progress after which a waypoint was not met in passing, and is stopped at."""
 
 
 class LegPhase(enum.Enum):
@@ -85,16 +88,28 @@ class Leg:
         stalled = seconds(now - self._nearer_at) > self._stall_timeout
         return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
 
+    def may_pass(self, odometry: Odometry, now: int) -> bool:
+        """Whether the drone, on its way, comes nearer still and looks where it is to at the end."""
+        approaches = seconds(now - self._nearer_at) <= _MISSED
+        return approaches and not self.stop.arrived and self._is_facing(odometry.yaw)
+
     def setpoint(
-        self, place: Vector, position: Vector, cruise_speed: float, heading: float | None = None
+        self,
+        place: Vector,
+        position: Vector,
+        cruise_speed: float,
+        heading: float | None = None,
+        passing_speed: float = 0.0,
     ) -> PositionSetpoint:
         """Fly on to `place`, the waypoint or a corner before it, at the waypoint's speed.
 
-        `heading` is for a waypoint without a yaw; None faces along the path.
+        `heading` is for a waypoint without a yaw; None faces along the path. At `passing_speed`
+        (m/s) the place is passed.
         """
         waypoint = self.stop.waypoint
         yaw = heading if waypoint.yaw is None else waypoint.yaw
-        return setpoint_towards(place, position, yaw, waypoint.speed or cruise_speed)
+        towards = setpoint_towards(place, position, yaw, waypoint.speed or cruise_speed)
+        return replace(towards, passing_speed=passing_speed)
 
     def _is_facing(self, yaw: float) -> bool:
         asked = self.stop.waypoint.yaw

@@ -38,6 +38,7 @@ from aerodaas.mission.commands import (
     TakeBack,
     TakeControls,
 )
+from aerodaas.mission.cornering import Cornering
 from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.handover.handover import HANDED_OVER, Handover
 from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable, velocity_setpoint
@@ -137,6 +138,7 @@ class Mission:
         )
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
+        self._cornering = Cornering(self._navigator, self.photographer, self._route, limits)
         self.handover = Handover(payload, robot, self._route, clearance, self._log)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
@@ -223,12 +225,8 @@ class Mission:
         """Why no command of this kind is executed in the present state; empty if it is."""
         if self.finished:
             return f"the mission is over: {self.state.value}"
-        navigates = isinstance(command, _NAVIGATION)
-        return (
-            f"the drone is {self.state.value} by now"
-            if navigates and self.state in _LEAVING
-            else ""
-        )
+        late = isinstance(command, _NAVIGATION) and self.state in _LEAVING
+        return f"the drone is {self.state.value} by now" if late else ""
 
     def _control(self, command: object) -> Answer:
         match command:
@@ -507,7 +505,9 @@ class Mission:
         self._to(diverted or doing, f"{'at' if stays else 'flying to'} {stop.id}")
         self._anchor = None
         place, heading = self.photographer.steer(place, state.odometry, self._now)
-        return Fly(self._leg.setpoint(place, position, limits.cruise_speed, heading), stop.cause)
+        passing = self._cornering.passing_speed(self._leg, place, state.odometry, self._now)
+        cruise = limits.cruise_speed
+        return Fly(self._leg.setpoint(place, position, cruise, heading, passing), stop.cause)
 
     def _after_failure(self, failure: str, state: VehicleState) -> Action:
         """What follows where an actuator has failed, and the flight is not to go on."""

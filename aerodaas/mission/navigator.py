@@ -179,6 +179,13 @@ class Navigator:
         """Whether a plan for the list being served has been requested and has not arrived."""
         return self._unanswered is not None and self._unanswered.level == self.queue.level
 
+    @property
+    def following(self) -> QueuedWaypoint | None:
+        """The stop that follows the one being served; None where a plan may change that."""
+        planned = self.queue.level not in self._unplanned and not self.waits_for_plan
+        certain = planned and not self._planner.replans_on_arrival
+        return self.queue.following if certain else None
+
     def plan(self, situation: PlanningContext) -> list[str] | None:
         """Request a plan if one is due, and apply one that has arrived.
 

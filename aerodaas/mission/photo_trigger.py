@@ -108,6 +108,12 @@ class PhotoTrigger:
         """Whether a place on this leg has not been passed yet."""
         return self.distance is not None and self._next <= self._length + _ROUNDING
 
+    def ends_with_place(self, radius: float) -> bool:
+        """Whether the last place that is left on this leg lies within `radius` metres of its end."""
+        if self.distance is None or not self.awaits:
+            return False
+        return (self._length + _ROUNDING - self._next) % self.distance <= radius + _ROUNDING
+
     def passed(self, odometry: Odometry, now: int, arrived_at: int | None) -> int:
         """How many pictures have become due since the last call; more than one is too late.
 

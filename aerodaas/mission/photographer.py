@@ -94,6 +94,11 @@ class Photographer:
             return place, heading
         return ahead, task.trigger.bearing if heading is None else heading
 
+    def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
+        """Whether a picture by distance is due within `radius` metres of the end of `stop`'s leg."""
+        task = self._tasks.get(stop.id)
+        return task is not None and task.stop is stop and task.trigger.ends_with_place(radius)
+
     def look(self, now: int) -> None:
         """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
         self._shutter.look(now)

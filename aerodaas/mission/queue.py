@@ -132,6 +132,12 @@ class WaypointQueue:
         return self._levels[min(self._levels)][0] if self._levels else None
 
     @property
+    def following(self) -> QueuedWaypoint | None:
+        """The stop after the head in the same list; None if it is the last one there."""
+        stops = self._ordered_levels()[0] if self._levels else []
+        return stops[1] if len(stops) > 1 else None
+
+    @property
     def interrupted(self) -> bool:
         """Whether a less urgent list with a stop under way waits."""
         return any(stop.under_way for stops in self._ordered_levels()[1:] for stop in stops)

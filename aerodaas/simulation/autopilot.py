@@ -57,6 +57,8 @@ class Goto:
     position: Triple
     yaw: float
     speed: float
+    passing_speed: float = 0.0
+    """m/s at which the position is passed; 0 stops there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +179,7 @@ class Autopilot:
             speed=target.speed,
             climb=self._limits.climb,
             max_acceleration=self._limits.acceleration,
+            passing_speed=target.passing_speed,
         )
         if self.mode in {VehicleMode.LANDING, VehicleMode.FAILSAFE}:
             velocity = (velocity[0], velocity[1], -self._descent())

@@ -6,7 +6,7 @@ import math
 
 from aerodaas.simulation.dynamics import Triple
 
-__all__ = ["approach_speed", "velocity_towards", "yaw_rate_towards"]
+__all__ = ["approach_speed", "braking_distance", "velocity_towards", "yaw_rate_towards"]
 
 _POSITION_GAIN = 1.2
 """Proportional gain close to the target, 1/s."""
@@ -31,19 +31,36 @@ def approach_speed(distance: float, max_acceleration: float) -> float:
     return math.sqrt(2.0 * braking * (distance - 0.5 * linear))
 
 
-def velocity_towards(
-    position: Triple, target: Triple, *, speed: float, climb: float, max_acceleration: float
-) -> Triple:
-    """Velocity (ENU m/s) that leads from `position` straight to `target` and stops there.
+def braking_distance(speed: float, max_acceleration: float) -> float:
+    """Metres within which the vehicle stops from `speed` m/s; the inverse of `approach_speed`."""
+    braking = _BRAKING_SHARE * max_acceleration
+    linear = braking / _POSITION_GAIN**2
+    if speed <= _POSITION_GAIN * linear:
+        return speed / _POSITION_GAIN
+    return speed * speed / (2.0 * braking) + 0.5 * linear
 
-    `speed` bounds it horizontally and `climb` vertically.
+
+def velocity_towards(
+    position: Triple,
+    target: Triple,
+    *,
+    speed: float,
+    climb: float,
+    max_acceleration: float,
+    passing_speed: float = 0.0,
+) -> Triple:
+    """Velocity (ENU m/s) that leads from `position` straight to `target`.
+
+    It stops there, or passes it at `passing_speed` m/s. `speed` bounds it horizontally and `climb`
+    vertically.
     """
     x, y, z = (there - here for here, there in zip(position, target, strict=True))
     across = math.hypot(x, y)
     distance = math.hypot(across, z)
     if distance <= 0.0:
         return 0.0, 0.0, 0.0
-    rate = approach_speed(distance, max_acceleration) / distance
+    room = distance + braking_distance(passing_speed, max_acceleration)
+    rate = approach_speed(room, max_acceleration) / distance
     if across * rate > speed:
         rate = speed / across
     if abs(z) * rate > climb:

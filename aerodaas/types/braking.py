@@ -9,7 +9,13 @@ import numpy as np
 from aerodaas.types.geometry import Vector, length, wrap_angle
 from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
 
-__all__ = ["braking_speed", "limit_length", "stopping_point", "velocity_towards"]
+__all__ = [
+    "braking_distance",
+    "braking_speed",
+    "limit_length",
+    "stopping_point",
+    "velocity_towards",
+]
 
 
 def braking_speed(distance: float, deceleration: float, reaction_time: float) -> float:
@@ -22,6 +28,11 @@ def braking_speed(distance: float, deceleration: float, reaction_time: float) ->
         return 0.0
     lag = deceleration * reaction_time
     return math.sqrt(lag * lag + 2.0 * deceleration * distance) - lag
+
+
+def braking_distance(speed: float, deceleration: float, reaction_time: float) -> float:
+    """Metres in which one stops from `speed` (m/s); the inverse of `braking_speed`."""
+    return speed * reaction_time + speed * speed / (2.0 * deceleration)
 
 
 def stopping_point(position: Vector, velocity: Vector, deceleration: float) -> Vector:
@@ -46,13 +57,14 @@ def velocity_towards(
     reaction_time: float,
     yaw_rate: float,
 ) -> VelocitySetpoint:
-    """The velocity that flies to `target` and stops there without overshooting.
+    """The velocity that flies to `target` and stops there, or passes it at its passing speed.
 
-    At most `speed` m/s (or the target's own) and `yaw_rate` rad/s.
+    At most `speed` m/s (or the target's own) and `yaw_rate` rad/s; it does not overshoot.
     """
     way = target.position - position
     distance = length(way)
-    wanted = min(target.speed or speed, braking_speed(distance, deceleration, reaction_time))
+    room = distance + braking_distance(target.passing_speed, deceleration, reaction_time)
+    wanted = min(target.speed or speed, braking_speed(room, deceleration, reaction_time))
     velocity = way * (wanted / distance) if distance > 0.0 else np.zeros(3)
     gain = 1.5  # 1/s; turns settle in about two seconds
     error = 0.0 if target.yaw is None else wrap_angle(target.yaw - yaw)

@@ -73,6 +73,9 @@ class PositionSetpoint:
     position: Vector
     yaw: float | None = None
     speed: float | None = None
+    passing_speed: float = 0.0
+    """m/s at which the place may be flown through, as another setpoint follows in time; 0 stops
+    there. A driver that knows only stops may ignore it."""
 
 
 @fast_pickle

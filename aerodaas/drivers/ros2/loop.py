@@ -6,7 +6,7 @@ It decides; publishing and threads are the vehicle's.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,7 +119,9 @@ class VelocityLoop:
             return clipped, clipped
         speed = setpoint.speed
         wanted = min(self._limits.cruise if speed is None else speed, self._limits.speed)
-        setpoint = PositionSetpoint(setpoint.position, setpoint.yaw, wanted)
+        setpoint = replace(
+            setpoint, speed=wanted, passing_speed=min(setpoint.passing_speed, wanted)
+        )
         return setpoint, self._towards(setpoint, odometry)
 
     def observe(self, odometry: Odometry, now: float) -> None:

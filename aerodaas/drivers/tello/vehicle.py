@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from dataclasses import replace
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -273,9 +274,9 @@ class TelloVehicle:
             odometry = self._reckoning.odometry
             if isinstance(setpoint, PositionSetpoint):
                 wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
-                setpoint = PositionSetpoint(
-                    setpoint.position, setpoint.yaw, min(wanted, self._speed)
-                )
+                speed = min(wanted, self._speed)
+                passing = min(setpoint.passing_speed, speed)
+                setpoint = replace(setpoint, speed=speed, passing_speed=passing)
                 asked = self._towards(setpoint, odometry.position, odometry.yaw)
                 velocity = self._clip(asked.velocity)
                 yaw_rate = asked.yaw_rate
@@ -386,7 +387,10 @@ class TelloVehicle:
             reaction_time=_REACTION,
             yaw_rate=self._turn,
         )
-        near = float(np.linalg.norm(target.position - position)) < _AT_REST
+        near = (
+            target.passing_speed == 0.0
+            and float(np.linalg.norm(target.position - position)) < _AT_REST
+        )
         faces = target.yaw is None or abs(wrap_angle(target.yaw - yaw)) < _FACING
         return VelocitySetpoint(
             np.zeros(3) if near else asked.velocity, 0.0 if faces else asked.yaw_rate

@@ -159,8 +159,10 @@ class SetpointFilter:
         target = inside
         limits = self.limits
         wished = asked.speed or limits.cruise_speed
+        # At a place that was moved, the way on is another one: the drone stops there.
+        passing = asked.passing_speed if is_close(target, asked.position) else 0.0
         velocity = velocity_towards(
-            replace(asked, position=target),
+            replace(asked, position=target, passing_speed=passing),
             odometry.position,
             odometry.yaw,
             speed=wished,
@@ -177,7 +179,8 @@ class SetpointFilter:
             self._last = bounded
             return FilteredSetpoint(VelocitySetpoint(bounded, velocity.yaw_rate), (*names, *bounds))
         self._last = None
-        return FilteredSetpoint(PositionSetpoint(target, asked.yaw, speed), tuple(names))
+        sent = PositionSetpoint(target, asked.yaw, speed, min(passing, speed))
+        return FilteredSetpoint(sent, tuple(names))
 
     def _blind(self, setpoint: Setpoint) -> FilteredSetpoint:
         """Allow only turning on the spot: without a position no boundary can be kept."""
@@ -385,5 +388,6 @@ def _level(way: Vector) -> Vector:
 def _finite(setpoint: Setpoint) -> bool:
     if isinstance(setpoint, VelocitySetpoint):
         return is_finite(setpoint.velocity) and math.isfinite(setpoint.yaw_rate)
-    scalars = [value for value in (setpoint.yaw, setpoint.speed) if value is not None]
+    figures = (setpoint.yaw, setpoint.speed, setpoint.passing_speed)
+    scalars = [value for value in figures if value is not None]
     return is_finite(setpoint.position) and all(map(math.isfinite, scalars))

@@ -243,6 +243,7 @@ def _setpoint_json(setpoint: Setpoint | None) -> dict[str, Any] | None:
             "position": xyz(setpoint.position),
             "yaw": setpoint.yaw,
             "speed": setpoint.speed,
+            "passing_speed": setpoint.passing_speed,
         }
     return {
         "kind": "velocity",

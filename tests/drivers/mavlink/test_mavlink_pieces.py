@@ -31,7 +31,7 @@ from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, Impairment
 from tools.mavlink_vehicle.store import PlanStore
 
@@ -69,7 +69,12 @@ def test_the_moving_target_keeps_to_its_speed(goal: Any, speed: float, waits: li
     for wait in waits:
         now += wait
         seen = target.towards(
-            goal, None, speed, vehicle=here, velocity=np.zeros(3), facing=0.0, now=now
+            PositionSetpoint(goal),
+            speed,
+            vehicle=here,
+            velocity=np.zeros(3),
+            facing=0.0,
+            now=now,
         )
         if before is not None:
             moved = float(np.linalg.norm(seen.position - before))
@@ -91,8 +96,7 @@ def flown_by_lag(goal: float, speed: float, lag: float) -> NDArray[np.float64]:
     track = []
     for turn in range(round(20 * (goal / speed + 15))):
         seen = target.towards(
-            np.array([goal, 0.0, 0.0]),
-            None,
+            PositionSetpoint(np.array([goal, 0.0, 0.0])),
             speed,
             vehicle=np.array([here, 0.0, 0.0]),
             velocity=np.array([moving, 0.0, 0.0]),
@@ -120,6 +124,15 @@ def test_a_vehicle_that_follows_late_is_slow_where_it_arrives(
     assert track[-1] == pytest.approx([goal, 0.0], abs=0.05)
     near = int(np.argmax(track[:, 0] > goal - 0.3))
     assert track[near, 1] < 0.9
+
+
+@given(st.floats(2.0, 15.0), st.floats(0.1, 0.8))
+def test_a_long_way_is_flown_at_the_speed_asked_for(speed: float, lag: float) -> None:
+    """Once fast, the vehicle stays so until it has to brake: its target does not wait for it."""
+    ramp, goal = 3.0 * speed + 10.0, 40.0 * speed + 100.0
+    track = flown_by_lag(goal, speed, lag)
+    on_the_way = (track[:, 0] > ramp) & (track[:, 0] < 0.5 * goal)
+    assert track[on_the_way, 1].min() > 0.9 * speed
 
 
 MODES = list(FlightMode)

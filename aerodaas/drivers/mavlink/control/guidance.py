@@ -4,6 +4,9 @@ Neither autopilot accepts a speed with a position: PX4 would fly at its own. So 
 moves, a moment's flight ahead of the vehicle, and a velocity is sent along. If the setpoints end,
 the vehicle stops at the target, which is near, instead of flying on to the position.
 
+At a place that is to be passed the target waits for the vehicle, to which the velocity is sent on
+at which it passes.
+
 An autopilot adds the velocity setpoint to its own position control. The setpoint leaves room for
 that, so that both together are the commanded speed, reduced in time before the position: a vehicle
 that lands there must not be fast.
@@ -16,21 +19,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.types.braking import braking_speed
+from aerodaas.types.braking import braking_distance, braking_speed
 from aerodaas.types.geometry import Vector, wrap_angle
+from aerodaas.types.vehicle import PositionSetpoint
 
 __all__ = ["MovingTarget", "Target"]
 
 _PULL = 1.0
 """1/s: the speed that either autopilot adds for each metre that it is behind its target (PX4's
 MPC_XY_P is 0.95, ArduCopter's PSC_POSXY_P is 1.0)."""
-_REACTION = 1.2
+_REACTION = 1.3
 """Seconds from a target's velocity to the vehicle's: PX4's simulated quadrotor takes 0.5 to 1,
 and what it says of itself is a little old."""
 _BRAKING = 1.5
 """Assumed braking of a vehicle in m/s², half of its capability."""
-_LEASH = 1.0
-"""Lead of the target in seconds of flight, plus a metre."""
+_LEAD = 1.5
+"""Metres that the target is ahead at most. Farther away ArduCopter draws by a square root instead
+of `_PULL` (AC_AttitudeControl's sqrt_controller), and the vehicle would be slower than asked."""
+_DELAY = 0.1
+"""Seconds by which the vehicle has flown on since its position was measured, and until the target
+is heard."""
+_TOLERANCE = 0.03
+"""Share of the speed by which a vehicle that has fallen behind may catch up."""
+_CATCH_UP = 2.0
+"""1/s: how quickly the target takes up its full lead."""
 _LONGEST = 0.2
 """Longest step in seconds: a loop that was delayed does not catch up."""
 
@@ -62,8 +74,7 @@ class MovingTarget:
 
     def towards(
         self,
-        place: Vector,
-        yaw: float | None,
+        setpoint: PositionSetpoint,
         speed: float,
         *,
         vehicle: Vector,
@@ -72,7 +83,7 @@ class MovingTarget:
         now: float,
         waits: bool = False,
     ) -> Target:
-        """The target at `now` (seconds), moving to `place` at `speed` (m/s).
+        """The target at `now` (seconds), moving to the place of `setpoint` at `speed` (m/s).
 
         `vehicle`, `velocity` and `facing` are the vehicle's own state; while it `waits` for its
         mode the target stays with it.
@@ -84,23 +95,39 @@ class MovingTarget:
             self._yaw = facing
             if waits:
                 return Target(vehicle, np.zeros(3), facing)
+        place, passing = setpoint.position, setpoint.passing_speed
         way = place - self._position
         left = float(np.linalg.norm(way))
-        direction = way / left if left > 0.0 else np.zeros(3)
+        direction = _unit(way if left > 0.0 or passing == 0.0 else place - vehicle)
         lead = self._position - vehicle
+        along = float(lead @ direction)
+        moving = float(velocity @ direction)
         to_go = float((place - vehicle) @ direction)
-        fastest = min(speed, braking_speed(to_go, self._braking, _REACTION))
-        drawn = _PULL * float(lead @ direction)
-        pace = max(0.0, float(self._velocity @ direction)) + self._acceleration * duration
-        pace = min(speed, pace, braking_speed(left, self._acceleration, 0.0))
-        if drawn > fastest or float(np.linalg.norm(lead)) > 1.0 + _LEASH * speed:
-            pace = 0.0
+        beyond = braking_distance(passing, self._braking, _REACTION)
+        fastest = min(speed, braking_speed(to_go + beyond, self._braking, _REACTION))
+        beyond = braking_distance(passing, self._acceleration, 0.0)
+        ramp = max(0.0, float(self._velocity @ direction)) + self._acceleration * duration
+        ramp = min(speed, ramp, braking_speed(left + beyond, self._acceleration, 0.0))
+        if float(np.linalg.norm(lead)) > 1.0 + speed:
+            ramp = 0.0
+        # The lead settles: a target that stood and waited for the vehicle would have it fly in
+        # bursts.
+        room = min(0.5 * fastest / _PULL, _LEAD) - along
+        pace = min(ramp, max(0.0, moving + _CATCH_UP * room))
         step = min(left, pace * duration)
         self._position = self._position + step * direction
-        self._velocity = pace * direction
-        sent = min(pace, max(0.0, fastest - drawn)) * direction
-        if yaw is not None:
+        self._velocity = ramp * direction
+        drawn = _PULL * along
+        if fastest == speed:
+            drawn -= _PULL * _DELAY * moving + _TOLERANCE * speed
+        sent = min(ramp, max(0.0, fastest - drawn)) * direction
+        if setpoint.yaw is not None:
             most = self._yaw_rate * duration
-            turn = wrap_angle(yaw - self._yaw)
+            turn = wrap_angle(setpoint.yaw - self._yaw)
             self._yaw = wrap_angle(self._yaw + math.copysign(min(abs(turn), most), turn))
         return Target(self._position, sent, self._yaw)
+
+
+def _unit(way: Vector) -> Vector:
+    long = float(np.linalg.norm(way))
+    return way / long if long > 0.0 else np.zeros(3)

@@ -65,9 +65,11 @@ class Steering:
             return self._velocity(setpoint, target, now)
         wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
         speed = min(wanted, self._speed)
+        sent = PositionSetpoint(
+            setpoint.position, setpoint.yaw, speed, min(float(setpoint.passing_speed), speed)
+        )
         moved = self._target.towards(
-            setpoint.position,
-            setpoint.yaw,
+            sent,
             speed,
             vehicle=odometry.position,
             velocity=odometry.velocity,
@@ -75,7 +77,6 @@ class Steering:
             now=now,
             waits=waits,
         )
-        sent = PositionSetpoint(setpoint.position, setpoint.yaw, speed)
         return position_message(moved, frame, target, now), sent
 
     def _velocity(

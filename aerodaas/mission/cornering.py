@@ -1,0 +1,115 @@
+"""Waypoints that are flown through: at what speed, by the turn that follows.
+
+A drone stops where it has something to do, where it is to look elsewhere first, at the end of its
+plan, and where what follows is not certain. At all other waypoints it turns while it flies: what it
+flies across the next leg it has to brake within the arrival radius.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerodaas.config.robot import LimitsConfig
+from aerodaas.mission.leg import Leg
+from aerodaas.mission.navigator import Navigator
+from aerodaas.mission.photographer import Photographer
+from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.route import Route
+from aerodaas.types.braking import braking_distance, braking_speed
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector, length
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["Cornering", "corner_speed"]
+
+_LOOK = 0.1
+"""Seconds in which a drone flies at most the arrival radius, so that two of its positions lie within
+it: the odometry of a slow link comes ten times a second."""
+_ROUNDING = 1e-6
+"""Metres, and the sine of an angle, that count as none."""
+
+
+def corner_speed(arriving: Vector, leaving: Vector, limits: LimitsConfig) -> float:
+    """m/s at which a drone may come to a waypoint along `arriving` and go on along `leaving`.
+
+    Both are unit vectors. The part across the next leg, or all of it at a right angle and more,
+    stops within the arrival radius; it is never faster than its position is looked at.
+    """
+    radius = limits.arrival_radius
+    onwards = float(arriving @ leaving)
+    across = 1.0 if onwards <= 0.0 else math.sqrt(max(0.0, 1.0 - onwards * onwards))
+    stops = braking_speed(radius, limits.max_acceleration, limits.reaction_time)
+    straight = across <= _ROUNDING
+    return min(radius / _LOOK, math.inf if straight else stops / across)
+
+
+def passing_speed(turning: float, limits: LimitsConfig) -> float:
+    """m/s at a waypoint so that a drone that brakes towards it turns at `turning` m/s.
+
+    It turns where it arrives, that is at the arrival radius.
+    """
+    a, t = limits.max_acceleration, limits.reaction_time
+    return braking_speed(braking_distance(turning, a, t) - limits.arrival_radius, a, t)
+
+
+@dataclass(slots=True)
+class Cornering:
+    """Speeds at which the drone of one mission passes its waypoints."""
+
+    navigator: Navigator
+    photographer: Photographer
+    route: Route
+    limits: LimitsConfig
+    _stops: tuple[QueuedWaypoint, QueuedWaypoint] | None = field(default=None, init=False)
+    _leaving: Vector | None = field(default=None, init=False)
+
+    def passing_speed(self, leg: Leg, place: Vector, odometry: Odometry, now: int) -> float:
+        """m/s at which the end of `leg` is passed; 0 where the drone stops there.
+
+        `place` is what it flies to now, ENU metres, and `now` the mission clock.
+        """
+        stop, following = leg.stop, self.navigator.following
+        way = stop.waypoint.position - odometry.position
+        distance = length(way)
+        if (
+            following is None
+            or distance <= _ROUNDING
+            or length(place - stop.waypoint.position) > _ROUNDING
+            or not leg.may_pass(odometry, now)
+            or _stays(stop.waypoint)
+            or following.waypoint.trigger_distance is not None
+            or self.photographer.ends_with_picture(stop, self.limits.arrival_radius)
+        ):
+            return 0.0
+        leaving = self._way_on(stop, following)
+        if leaving is None:
+            return 0.0
+        cruise = self.limits.cruise_speed
+        speeds = [one.waypoint.speed or cruise for one in (stop, following)]
+        return passing_speed(
+            min(*speeds, corner_speed(way / distance, leaving, self.limits)), self.limits
+        )
+
+    def _way_on(self, stop: QueuedWaypoint, following: QueuedWaypoint) -> Vector | None:
+        """Direction in which the drone leaves `stop`, a unit vector; None if no way leads on."""
+        if self._stops is None or self._stops != (stop, following):
+            here, there = stop.waypoint.position, following.waypoint.position
+            place = self.route.towards(there, here, following.above_ground)
+            way = np.zeros(3) if place is None else place - here
+            far = length(way)
+            self._stops = (stop, following)
+            self._leaving = way / far if far > _ROUNDING else None
+        return self._leaving
+
+
+def _stays(waypoint: Waypoint) -> bool:
+    """Whether there is something to do at a waypoint for which the drone stays there."""
+    return bool(
+        waypoint.hover_duration > 0.0
+        or waypoint.photo
+        or waypoint.actuate
+        or waypoint.gimbal is not None
+    )
