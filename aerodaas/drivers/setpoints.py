@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.geometry import Vector, is_finite
+from aerodaas.types.geometry import is_finite
 from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
 
 __all__ = ["require_finite"]
@@ -16,20 +16,29 @@ __all__ = ["require_finite"]
 def require_finite(name: str, setpoint: Setpoint) -> None:
     """Raise InvalidWaypointError unless the numbers of `setpoint` can be flown by robot `name`."""
     if isinstance(setpoint, VelocitySetpoint):
-        vector: Vector = setpoint.velocity
+        vectors = [setpoint.velocity]
         scalars: dict[str, float | None] = {"yaw_rate": setpoint.yaw_rate}
     else:
-        vector = setpoint.position
+        begins = setpoint.line_from
+        vectors = [setpoint.position, *([] if begins is None else [begins])]
         scalars = {
             "yaw": setpoint.yaw,
             "speed": setpoint.speed,
             "passing_speed": setpoint.passing_speed,
         }
-    if np.shape(vector) != (3,) or not is_finite(vector):
-        raise InvalidWaypointError(f"{name}: a setpoint needs three finite numbers, not {vector}")
+    for vector in vectors:
+        if np.shape(vector) != (3,) or not is_finite(vector):
+            raise InvalidWaypointError(
+                f"{name}: a setpoint needs three finite numbers, not {vector}"
+            )
     for key, value in scalars.items():
         if value is not None and not math.isfinite(value):
             raise InvalidWaypointError(f"{name}: a setpoint's {key} must be finite, not {value}")
     speed = scalars.get("speed")
     if speed is not None and speed <= 0:
         raise InvalidWaypointError(f"{name}: a setpoint's speed must be positive, not {speed}")
+    passing = scalars.get("passing_speed")
+    if passing is not None and passing < 0:
+        raise InvalidWaypointError(
+            f"{name}: a setpoint's passing_speed must not be negative, not {passing}"
+        )

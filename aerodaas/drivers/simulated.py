@@ -6,6 +6,7 @@ Its settings in the environment file are those of `aerodaas.simulation.airframe.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -262,7 +263,7 @@ class SimulatedVehicle:
         facing = self._rotor.yaw + self._noise.yaw_drift if yaw is None else float(yaw)
         passing = min(float(setpoint.passing_speed), speed)
         self._autopilot.guide(Goto((x, y, z), facing, speed, passing))
-        return PositionSetpoint(np.array([x, y, z]), yaw, speed, passing)
+        return replace(setpoint, position=np.array([x, y, z]), speed=speed, passing_speed=passing)
 
     def hold(self) -> None:
         """Brake and hover; raise VehicleError on the ground."""

@@ -26,8 +26,8 @@ from aerodaas.types.waypoints import Waypoint
 __all__ = ["Cornering", "corner_speed"]
 
 _LOOK = 0.1
-"""Seconds in which a drone flies at most the arrival radius, so that two of its positions lie within
-it: the odometry of a slow link comes ten times a second."""
+"""Seconds in which a drone flies at most the arrival radius, so that two of its positions lie
+within it: the odometry of a slow link comes ten times a second."""
 _ROUNDING = 1e-6
 """Metres, and the sine of an angle, that count as none."""
 

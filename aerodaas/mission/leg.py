@@ -6,6 +6,8 @@ import enum
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
@@ -62,11 +64,21 @@ class Leg:
     """The flight to one stop of the queue, and the hover there."""
 
     def __init__(
-        self, stop: QueuedWaypoint, now: int, arrival_radius: float, stall_timeout: float
+        self,
+        stop: QueuedWaypoint,
+        now: int,
+        arrival_radius: float,
+        stall_timeout: float,
+        before: Leg | None = None,
     ) -> None:
-        """Start towards `stop` at `now` (ns); radius in metres, time-out in seconds."""
+        """Start towards `stop` at `now` (ns); radius in metres, time-out in seconds.
+
+        From the end of the leg `before`, if the drone has arrived there, it keeps to the line.
+        """
         stop.under_way = True
         self.stop = stop
+        arrived = before is not None and before.stop.arrived
+        self._start = before.stop.waypoint.position if before and arrived else None
         self._arrival_radius = arrival_radius
         self._stall_timeout = stall_timeout
         self._nearest = math.inf
@@ -109,7 +121,9 @@ class Leg:
         waypoint = self.stop.waypoint
         yaw = heading if waypoint.yaw is None else waypoint.yaw
         towards = setpoint_towards(place, position, yaw, waypoint.speed or cruise_speed)
-        return replace(towards, passing_speed=passing_speed)
+        straight = np.array_equal(place, waypoint.position)
+        line_from = self._start if straight else None
+        return replace(towards, passing_speed=passing_speed, line_from=line_from)
 
     def _is_facing(self, yaw: float) -> bool:
         asked = self.stop.waypoint.yaw

@@ -486,7 +486,8 @@ class Mission:
         diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
         if self._leg is None or self._leg.stop is not stop:
             self._navigator.queue.leave_place()
-            self._leg = Leg(stop, self._now, limits.arrival_radius, self._options.stall_timeout)
+            stall = self._options.stall_timeout
+            self._leg = Leg(stop, self._now, limits.arrival_radius, stall, self._leg)
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
@@ -506,8 +507,8 @@ class Mission:
         self._anchor = None
         place, heading = self.photographer.steer(place, state.odometry, self._now)
         passing = self._cornering.passing_speed(self._leg, place, state.odometry, self._now)
-        cruise = limits.cruise_speed
-        return Fly(self._leg.setpoint(place, position, cruise, heading, passing), stop.cause)
+        flown = self._leg.setpoint(place, position, limits.cruise_speed, heading, passing)
+        return Fly(flown, stop.cause)
 
     def _after_failure(self, failure: str, state: VehicleState) -> Action:
         """What follows where an actuator has failed, and the flight is not to go on."""
@@ -564,9 +565,8 @@ class Mission:
 
     def _return(self, state: VehicleState) -> Action:
         self._leg = None
-        if self._assessment.demand in {FailsafeAction.HOLD, FailsafeAction.RETURN} and (
-            state.mode is VehicleMode.LOST or not has_position(state)
-        ):
+        lost = state.mode is VehicleMode.LOST or not has_position(state)
+        if lost and self._assessment.demand in {FailsafeAction.HOLD, FailsafeAction.RETURN}:
             return Return()
         position = state.odometry.position
         way = (above := self._route.above_home(position)) - position

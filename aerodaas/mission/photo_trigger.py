@@ -109,7 +109,7 @@ class PhotoTrigger:
         return self.distance is not None and self._next <= self._length + _ROUNDING
 
     def ends_with_place(self, radius: float) -> bool:
-        """Whether the last place that is left on this leg lies within `radius` metres of its end."""
+        """Whether the last place left on this leg lies within `radius` metres of its end."""
         if self.distance is None or not self.awaits:
             return False
         return (self._length + _ROUNDING - self._next) % self.distance <= radius + _ROUNDING

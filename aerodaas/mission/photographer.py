@@ -95,7 +95,7 @@ class Photographer:
         return ahead, task.trigger.bearing if heading is None else heading
 
     def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
-        """Whether a picture by distance is due within `radius` metres of the end of `stop`'s leg."""
+        """Whether a picture by distance is due within `radius` metres of the end of its leg."""
         task = self._tasks.get(stop.id)
         return task is not None and task.stop is stop and task.trigger.ends_with_place(radius)
 

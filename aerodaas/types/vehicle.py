@@ -76,6 +76,9 @@ class PositionSetpoint:
     passing_speed: float = 0.0
     """m/s at which the place may be flown through, as another setpoint follows in time; 0 stops
     there. A driver that knows only stops may ignore it."""
+    line_from: Vector | None = None
+    """Where the straight line to the place begins, ENU metres, on which the vehicle is to be; None:
+    where it is now. A driver may ignore it, too."""
 
 
 @fast_pickle

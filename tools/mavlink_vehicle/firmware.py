@@ -31,6 +31,10 @@ _OK = mavlink.MAV_RESULT_ACCEPTED
 _IGNORE_PLACE, _IGNORE_VELOCITY, _IGNORE_YAW, _IGNORE_RATE = 0b111, 0b111000, 1 << 10, 1 << 11
 _FORCED = 21196
 """By which a disarming stops the motors in the air, too."""
+_SETTLING = 0.5
+"""Seconds that it stays armed after the simulated flight is over, itself half a second after
+touchdown: ArduPilot's land detector takes a second (LAND_DETECTOR_TRIGGER_SEC), PX4 longer
+(COM_DISARM_LAND)."""
 _DRIFT = np.array([0.3, 1.0, 0.0])
 """NED m/s by which a position without GPS goes astray."""
 
@@ -100,7 +104,7 @@ class Firmware(ABC):
         self.payload = EmulatedPayload(self, say, gimbal=options.gimbal, camera=options.camera)
         self.traffic = EmulatedTraffic(self)
         self.actuators = EmulatedActuators(self)
-        self._armed_at = 0.0
+        self._armed_at = self._flew_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False
         self._breached = False
@@ -321,7 +325,9 @@ class Firmware(ABC):
         self.payload.advance()
         self.route.advance(self.now)
         self.flight.advance(duration)
-        if self._lifted and not self.flight.flying:
+        if self.flight.flying:
+            self._flew_at = self.now
+        if self._lifted and self.now - self._flew_at >= _SETTLING:
             self._lifted = self.armed = self.failsafe = False
         idles = self.armed and not self._lifted and not self.terminated
         if idles and self.now - self._armed_at > self.idle_disarm:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import time
-from dataclasses import replace
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np

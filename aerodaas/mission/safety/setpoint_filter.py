@@ -159,10 +159,11 @@ class SetpointFilter:
         target = inside
         limits = self.limits
         wished = asked.speed or limits.cruise_speed
-        # At a place that was moved, the way on is another one: the drone stops there.
-        passing = asked.passing_speed if is_close(target, asked.position) else 0.0
+        if not is_close(target, asked.position):
+            # At a place that was moved, the way on is another one: the drone stops there.
+            asked = PositionSetpoint(target, asked.yaw, asked.speed)
         velocity = velocity_towards(
-            replace(asked, position=target, passing_speed=passing),
+            asked,
             odometry.position,
             odometry.yaw,
             speed=wished,
@@ -179,7 +180,7 @@ class SetpointFilter:
             self._last = bounded
             return FilteredSetpoint(VelocitySetpoint(bounded, velocity.yaw_rate), (*names, *bounds))
         self._last = None
-        sent = PositionSetpoint(target, asked.yaw, speed, min(passing, speed))
+        sent = replace(asked, speed=speed, passing_speed=min(asked.passing_speed, speed))
         return FilteredSetpoint(sent, tuple(names))
 
     def _blind(self, setpoint: Setpoint) -> FilteredSetpoint:
@@ -390,4 +391,6 @@ def _finite(setpoint: Setpoint) -> bool:
         return is_finite(setpoint.velocity) and math.isfinite(setpoint.yaw_rate)
     figures = (setpoint.yaw, setpoint.speed, setpoint.passing_speed)
     scalars = [value for value in figures if value is not None]
-    return is_finite(setpoint.position) and all(map(math.isfinite, scalars))
+    begins = setpoint.position if setpoint.line_from is None else setpoint.line_from
+    places = is_finite(setpoint.position) and is_finite(begins)
+    return places and all(map(math.isfinite, scalars))

@@ -39,7 +39,7 @@ of `_PULL` (AC_AttitudeControl's sqrt_controller), and the vehicle would be slow
 _DELAY = 0.1
 """Seconds by which the vehicle has flown on since its position was measured, and until the target
 is heard."""
-_TOLERANCE = 0.03
+_TOLERANCE = 0.02
 """Share of the speed by which a vehicle that has fallen behind may catch up."""
 _CATCH_UP = 2.0
 """1/s: how quickly the target takes up its full lead."""
@@ -96,6 +96,8 @@ class MovingTarget:
             if waits:
                 return Target(vehicle, np.zeros(3), facing)
         place, passing = setpoint.position, setpoint.passing_speed
+        if setpoint.line_from is not None:
+            self._come_onto_line(setpoint.line_from, place, speed * duration)
         way = place - self._position
         left = float(np.linalg.norm(way))
         direction = _unit(way if left > 0.0 or passing == 0.0 else place - vehicle)
@@ -126,6 +128,17 @@ class MovingTarget:
             turn = wrap_angle(setpoint.yaw - self._yaw)
             self._yaw = wrap_angle(self._yaw + math.copysign(min(abs(turn), most), turn))
         return Target(self._position, sent, self._yaw)
+
+    def _come_onto_line(self, start: Vector, end: Vector, step: float) -> None:
+        """Move the target aside by at most `step` metres, onto the line from `start` to `end`."""
+        assert self._position is not None  # noqa: S101 - `towards` has set it
+        line = end - start
+        long = float(np.linalg.norm(line))
+        direction = _unit(line)
+        along = min(max(0.0, float((self._position - start) @ direction)), long)
+        aside = start + along * direction - self._position
+        far = float(np.linalg.norm(aside))
+        self._position = self._position + _unit(aside) * min(far, step)
 
 
 def _unit(way: Vector) -> Vector:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,9 +66,8 @@ class Steering:
             return self._velocity(setpoint, target, now)
         wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
         speed = min(wanted, self._speed)
-        sent = PositionSetpoint(
-            setpoint.position, setpoint.yaw, speed, min(float(setpoint.passing_speed), speed)
-        )
+        passing = min(float(setpoint.passing_speed), speed)
+        sent = replace(setpoint, speed=speed, passing_speed=passing)
         moved = self._target.towards(
             sent,
             speed,
