@@ -87,11 +87,10 @@ class Cornering:
         leaving = self._way_on(stop, following)
         if leaving is None:
             return 0.0
+        turning = corner_speed(way / distance, leaving, self.limits)
         cruise = self.limits.cruise_speed
-        speeds = [one.waypoint.speed or cruise for one in (stop, following)]
-        return passing_speed(
-            min(*speeds, corner_speed(way / distance, leaving, self.limits)), self.limits
-        )
+        legs = [one.waypoint.speed or cruise for one in (stop, following)]
+        return min(*legs, passing_speed(turning, self.limits))
 
     def _way_on(self, stop: QueuedWaypoint, following: QueuedWaypoint) -> Vector | None:
         """Direction in which the drone leaves `stop`, a unit vector; None if no way leads on."""

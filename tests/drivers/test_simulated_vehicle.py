@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -208,7 +209,11 @@ def test_commands_are_clipped_and_told_as_sent() -> None:
     where = flight.vehicle.send(PositionSetpoint(np.array([1.0, 1.0, -5.0]), speed=50.0))
     assert isinstance(where, PositionSetpoint)
     assert where.position[2] == 0.0
-    assert where.speed == 5.0
+    assert (where.speed, where.passing_speed) == (5.0, 0.0)
+    passed = PositionSetpoint(np.array([9.0, 1.0, 2.0]), speed=2.0, passing_speed=9.0)
+    assert flight.vehicle.send(passed) == replace(passed, passing_speed=2.0)
+    with pytest.raises(InvalidWaypointError, match="passing_speed must not be negative"):
+        flight.vehicle.send(replace(passed, passing_speed=-1.0))
 
 
 @pytest.mark.parametrize(

@@ -135,6 +135,63 @@ def test_a_long_way_is_flown_at_the_speed_asked_for(speed: float, lag: float) ->
     assert track[on_the_way, 1].min() > 0.9 * speed
 
 
+def flown_along(
+    corners: list[tuple[float, float]], speed: float, passing: float, radius: float, lag: float
+) -> NDArray[np.float64]:
+    """Places and speeds along a path, one row each 10 ms, of an autopilot as in `flown_by_lag`.
+
+    Within `radius` of a corner the next one is its place; the first one is where it begins.
+    """
+    target, here, moving = MovingTarget(3.0, 1.5), np.array([*corners[0], 0.0]), np.zeros(3)
+    places = [np.array([*corner, 0.0]) for corner in corners]
+    leg, sent, track = 1, list[Any](), list[tuple[float, ...]]()
+    for turn in range(4000):
+        if np.linalg.norm(places[leg] - here) <= radius:
+            leg += 1
+            if leg == len(places):
+                break
+        last = leg == len(places) - 1
+        setpoint = PositionSetpoint(
+            places[leg], None, speed, 0.0 if last else passing, places[leg - 1]
+        )
+        state = {"vehicle": here, "velocity": moving, "facing": 0.0, "now": 100.0 + turn / 20}
+        seen = target.towards(setpoint, speed, **state)
+        sent.append(seen)
+        late = sent[max(0, turn - 2)]
+        for _ in range(5):
+            wanted = late.velocity + 0.95 * (late.position - here)
+            change = (wanted - moving) / lag
+            moving = moving + 0.01 * change * min(1.0, 3.0 / max(1e-9, np.linalg.norm(change)))
+            here = here + 0.01 * moving
+            track.append((*here[:2], float(np.linalg.norm(moving))))
+    return np.array(track)
+
+
+@given(st.floats(2.0, 12.0), st.floats(0.1, 0.8), st.floats(0.3, 3.0))
+def test_a_corner_of_a_path_leads_onto_the_next_line(
+    speed: float, lag: float, radius: float
+) -> None:
+    """A target that turned early comes onto the line, and the vehicle after it."""
+    far = 15.0 * speed
+    track = flown_along([(0, 0), (far, 0), (far, far)], speed, 0.0, radius, lag)
+    after = track[track[:, 1] > far / 3]
+    assert len(after) > 0
+    assert np.abs(after[:, 0] - far).max() < 0.15
+    assert track[:, 0].max() < far + 1.0
+    assert track[-1] == pytest.approx([far, far, 0.0], abs=radius + 1.5)
+
+
+@given(st.floats(2.0, 12.0), st.floats(0.1, 0.8), st.floats(0.2, 1.0))
+def test_a_place_is_passed_at_the_speed_asked_for(speed: float, lag: float, share: float) -> None:
+    """Neither a stop nor a burst, and at the end of the path it stops."""
+    far, passing = 15.0 * speed, share * speed
+    track = flown_along([(0, 0), (far, 0), (2 * far, 0)], speed, passing, 0.5, lag)
+    there = track[int(np.argmax(track[:, 0] > far - 0.5)), 2]
+    assert 0.75 * passing - 0.2 < there < passing + 1.2
+    assert track[:, 2].max() < 1.1 * speed
+    assert track[:, 0].max() < 2 * far + 0.3
+
+
 MODES = list(FlightMode)
 
 

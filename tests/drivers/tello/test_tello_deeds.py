@@ -259,6 +259,8 @@ def test_a_place_by_its_sticks(world: World) -> None:
         assert world.steered[-1] == Sticks(ahead=ahead)
     world.vehicle.send(PositionSetpoint(here + np.array([0.07, 0.0, 0.0])))
     assert world.steered[-1] == STILL
+    world.vehicle.send(PositionSetpoint(here + np.array([0.07, 0.0, 0.0]), passing_speed=0.5))
+    assert world.steered[-1].ahead >= 25
     world.vehicle.send(PositionSetpoint(here + np.array([0.0, 50.0, 0.0]), 0.0))
     assert world.steered[-1].right == -25
     world.vehicle.send(PositionSetpoint(here, math.radians(1.9)))

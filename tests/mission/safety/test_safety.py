@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -140,6 +141,8 @@ def test_setpoints_that_are_not_finite_become_standing_still() -> None:
         VelocitySetpoint(np.array([math.nan, 0, 0])),
         PositionSetpoint(np.array([0, math.inf, 0])),
         PositionSetpoint(np.zeros(3), math.nan),
+        PositionSetpoint(np.zeros(3), passing_speed=math.inf),
+        PositionSetpoint(np.zeros(3), line_from=np.array([0, 0, math.nan])),
     ):
         clamped = guard.clamp(setpoint, at(-3.0, -3.0, 5.0), 0.05)
         assert clamped.clipped_by == ("not_finite",)
@@ -184,6 +187,32 @@ def test_what_is_changed_of_a_place_is_named(
     clamped = guard.clamp(PositionSetpoint(np.array(place), None, speed), at(0, 0, 5.0), 0.05)
     assert clamped.clipped_by == names
     assert isinstance(clamped.setpoint, PositionSetpoint)
+
+
+def test_a_place_that_is_passed_is_flown_through_only_where_it_was_asked_for() -> None:
+    """No faster than the way there; one that a boundary moved is stopped at, from anywhere."""
+    guard = SetpointFilter(WIDE, np.zeros(3))
+    here, start = at(0, 0, 5.0), np.array([0.0, -3.0, 5.0])
+    near = PositionSetpoint(np.array([50.0, 0.0, 5.0]), None, 3.0, 2.5, start)
+    sent = guard.clamp(near, here, 0.05).setpoint
+    assert sent == near
+    fast = guard.clamp(replace(near, speed=9.0, passing_speed=9.0), here, 0.05).setpoint
+    assert isinstance(fast, PositionSetpoint)
+    assert (fast.speed, fast.passing_speed) == (4.0, 4.0)
+    beyond = guard.clamp(replace(near, position=np.array([0.0, 2e3, 5.0])), here, 0.05).setpoint
+    assert isinstance(beyond, PositionSetpoint)
+    assert beyond.passing_speed == 0.0
+    assert beyond.line_from is None
+
+
+@pytest.mark.parametrize("passing", [0.0, 1.5])
+def test_a_vehicle_without_position_setpoints_passes_a_place_too(passing: float) -> None:
+    """At the place itself it is as fast as asked, and before it hardly faster."""
+    guard = SetpointFilter(WIDE, np.zeros(3), position_setpoints=False)
+    place = PositionSetpoint(np.array([10.0, 0.0, 5.0]), None, 3.0, passing)
+    sent = guard.clamp(place, at(9.999, 0, 5.0), 0.05).setpoint
+    assert isinstance(sent, VelocitySetpoint)
+    assert sent.velocity[0] == pytest.approx(passing, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.braking import limit_length
 from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
+from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
 
 __all__ = ["Steering"]
 

@@ -1,0 +1,240 @@
+"""Waypoints that are flown through: where the drone stops all the same, and how fast it turns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import PERIOD, Flight, KinematicVehicle, add, flight
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.mission.commands import AddNavigation, Pause, Resume, Start
+from aerodaas.mission.cornering import corner_speed, passing_speed
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.braking import braking_distance, braking_speed
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.status import MissionState as S
+from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.types.waypoints import Waypoint
+
+LIMITS = LimitsConfig(cruise_speed=2.0, arrival_radius=0.5)
+ROW = [Waypoint(f"w{number}", 10.0 * number, 0.0, 2.0) for number in range(1, 4)]
+"""Three on a straight line."""
+EAST = np.array([1.0, 0.0, 0.0])
+
+
+def passed_at(one: Flight, waypoint_id: str) -> float:
+    """The passing speed on the way to a waypoint, where it was highest."""
+    speeds = [0.0]
+    while (current := one.status.target) is None or current.id != waypoint_id:
+        one.turn()
+    while (current := one.status.target) is not None and current.id == waypoint_id:
+        sent = one.turn().sent
+        if isinstance(sent, PositionSetpoint):
+            speeds.append(sent.passing_speed)
+    return max(speeds)
+
+
+def way(angle: float) -> Any:  # noqa: ANN401
+    """A unit vector, `angle` radians from east."""
+    return np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+@given(st.floats(0.0, math.pi), st.floats(0.1, 5.0), st.floats(0.5, 6.0), st.floats(0.0, 1.0))
+def test_what_is_flown_across_the_next_leg_stops_within_the_arrival_radius(
+    angle: float, radius: float, acceleration: float, reaction: float
+) -> None:
+    """All of it counts where the next leg leads back."""
+    limits = LimitsConfig(
+        arrival_radius=radius, max_acceleration=acceleration, reaction_time=max(reaction, 1e-3)
+    )
+    speed = corner_speed(EAST, way(angle), limits)
+    across = speed * (math.sin(angle) if angle < math.pi / 2 else 1.0)
+    room = braking_distance(across, limits.max_acceleration, limits.reaction_time)
+    assert room <= radius * (1 + 1e-6)
+    assert speed <= 10.0 * radius
+    assert speed >= 0.999 * min(10.0 * radius, braking_speed(radius, acceleration, reaction + 1e-3))
+
+
+@given(st.floats(0.0, 20.0), st.floats(0.1, 5.0))
+def test_a_drone_that_brakes_for_the_waypoint_turns_at_the_speed_of_the_turn(
+    turning: float, radius: float
+) -> None:
+    """At the arrival radius, and never faster."""
+    limits = LimitsConfig(arrival_radius=radius)
+    a, t = limits.max_acceleration, limits.reaction_time
+    there = passing_speed(turning, limits)
+    at_radius = braking_speed(radius + braking_distance(there, a, t), a, t)
+    assert there <= turning + 1e-9
+    assert at_radius == pytest.approx(max(turning, braking_speed(radius, a, t)), abs=1e-6)
+
+
+def test_a_waypoint_on_a_straight_line_is_flown_through_at_full_speed() -> None:
+    """The last one is stopped at."""
+    one = flight(add(*ROW), limits=LIMITS)
+    assert passed_at(one, "w1") > 1.5
+    assert passed_at(one, "w2") > 1.5
+    assert passed_at(one, "w3") == 0.0
+    assert tuple(one.status.visited) == ("w1", "w2", "w3")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"hover_duration": 0.1},
+        {"photo": True},
+        {"gimbal_pitch": -0.5},
+    ],
+)
+def test_a_drone_stops_where_it_has_something_to_do(change: dict[str, Any]) -> None:
+    """A stay, a picture, the gimbal."""
+    one = flight(add(ROW[0], replace(ROW[1], **change), ROW[2]), limits=LIMITS)
+    assert passed_at(one, "w1") > 1.5
+    assert passed_at(one, "w2") == 0.0
+
+
+class Stiff(KinematicVehicle):
+    """Never turns."""
+
+    def _wanted(self) -> tuple[Any, float]:
+        return super()._wanted()[0], 0.0
+
+
+def test_a_drone_stops_where_it_has_yet_to_turn() -> None:
+    """However near it comes."""
+    one = flight(add(replace(ROW[0], yaw=1.0), ROW[1]), limits=LIMITS, vehicle=Stiff())
+    one.run_to(S.ENROUTE)
+    one.run(10.0)
+    assert float(np.linalg.norm(one.vehicle.position - ROW[0].position)) < 0.5
+    sent = [record.sent for record in one.records if isinstance(record.sent, PositionSetpoint)]
+    assert sent
+    assert {setpoint.passing_speed for setpoint in sent} == {0.0}
+
+
+def test_a_yaw_that_it_has_is_no_reason_to_stop() -> None:
+    """It looks east already."""
+    one = flight(add(*[replace(stop, yaw=0.0) for stop in ROW]), limits=LIMITS)
+    assert passed_at(one, "w1") > 1.5
+
+
+def test_a_plan_that_may_still_change_is_not_anticipated() -> None:
+    """The nearest neighbour is chosen anew at each arrival."""
+    one = flight(add(*ROW, ordered=False), scheduler=NearestNeighborScheduler(), limits=LIMITS)
+    assert passed_at(one, "w1") == 0.0
+
+
+def test_a_corner_is_turned_at_the_slower_leg_s_speed() -> None:
+    """Neither leg is flown faster than it says."""
+    slow = [ROW[0], replace(ROW[1], speed=0.7), ROW[2]]
+    one = flight(add(*slow), limits=LIMITS)
+    assert 0.3 < passed_at(one, "w1") <= 0.7
+    assert 0.3 < passed_at(one, "w2") <= 0.7
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_right_angle_and_a_turn_back_are_approached_as_a_stop(back: bool) -> None:  # noqa: FBT001
+    """Within the arrival radius the drone can stop from there."""
+    corner = Waypoint("back", 1.0, 0.0, 2.0) if back else Waypoint("aside", 10.0, 9.0, 2.0)
+    one = flight(add(ROW[0], corner), limits=LIMITS)
+    assert passed_at(one, "w1") == pytest.approx(0.0, abs=0.05)
+
+
+def test_a_leg_with_pictures_by_distance_begins_and_ends_at_its_places() -> None:
+    """Where the first is due, and where the last one is."""
+    pictures = replace(ROW[1], trigger_distance=5.0)
+    one = flight(add(ROW[0], pictures, ROW[2]), limits=LIMITS)
+    assert passed_at(one, "w1") == 0.0
+    assert passed_at(one, "w2") == 0.0
+    between = replace(ROW[1], trigger_distance=4.0)
+    assert passed_at(flight(add(ROW[0], between, ROW[2]), limits=LIMITS), "w2") > 1.5
+
+
+class Passing(KinematicVehicle):
+    """Passes where it is told to, beside the waypoint."""
+
+    ASIDE = 0.0
+
+    def send(self, setpoint: Any) -> Any:  # noqa: ANN401
+        """Keep going east at the passing speed once near."""
+        sent = super().send(setpoint)
+        if isinstance(setpoint, PositionSetpoint) and setpoint.passing_speed > 0.0:
+            aside = np.array([0.0, self.ASIDE, 0.0])
+            self._setpoint = replace(setpoint, position=setpoint.position + aside)
+        return sent
+
+
+def test_a_waypoint_that_was_missed_in_passing_is_stopped_at() -> None:
+    """A vehicle that flies past it is told to stop there before long."""
+    vehicle = Passing()
+    vehicle.ASIDE = 0.8
+    one = flight(add(*ROW), limits=LIMITS, vehicle=vehicle)
+    one.run(120.0, until=lambda: one.mission.status.visits == 3)
+    assert tuple(one.status.visited) == ("w1", "w2", "w3")
+
+
+def test_the_line_is_kept_from_where_the_drone_arrived() -> None:
+    """Not on the first leg, and not after it has been elsewhere."""
+    one = flight(add(*ROW), limits=LIMITS)
+    passed_at(one, "w1")
+    sent = one.turn().sent
+    assert isinstance(sent, PositionSetpoint)
+    assert sent.line_from is not None
+    assert sent.line_from.tolist() == [10.0, 0.0, 2.0]
+    one.tell(Pause())
+    one.run_to(S.PAUSED)
+    one.run(2.0)
+    one.tell(Resume())
+    one.run_to(S.ENROUTE)
+    sent = one.turn().sent
+    assert isinstance(sent, PositionSetpoint)
+    assert sent.line_from is None
+    first = flight(add(*ROW), limits=LIMITS)
+    first.run_to(S.ENROUTE)
+    sent = first.turn().sent
+    assert isinstance(sent, PositionSetpoint)
+    assert sent.line_from is None
+
+
+def circled(stops: Sequence[Waypoint], limits: LimitsConfig) -> tuple[Mission, list[float]]:
+    """Fly the simulated drone along `stops`; its speeds between the first and the last."""
+    robot = RobotConfig(id="drone", limits=limits)
+    vehicle = SimulatedVehicle(robot, EnvironmentConfig(robots=[robot]))
+    vehicle.connect()
+    home = vehicle.read().odometry.position
+    mission = Mission(robot, InlinePlanner(OrderedScheduler()), takeoff=home)
+    loop = SetpointLoop(vehicle, mission)
+    mission.handle(AddNavigation(AeroNavigation(data=list(stops))), 0)
+    mission.handle(Start(), 0)
+    now, speeds = 0, list[float]()
+    while mission.status.visits < len(stops) and now < 300 * NANOSECONDS:
+        loop.turn(now)
+        now += PERIOD
+        vehicle.advance_to(now)
+        if 1 < mission.status.visits < len(stops) - 1:
+            speeds.append(float(np.linalg.norm(vehicle.read().odometry.velocity)))
+    return mission, speeds
+
+
+def test_a_simulated_drone_flies_a_circle_without_a_stop() -> None:
+    """Of 24 waypoints, 15 degrees between two legs; it came down to half of its speed at each."""
+    limits = LimitsConfig(cruise_speed=4.0, arrival_radius=1.0)
+    stops = [
+        Waypoint(f"p{i}", 40.0 * math.cos(a), 40.0 * math.sin(a), 5.0)
+        for i, a in enumerate(np.linspace(0.0, 2 * math.pi, 25))
+    ]
+    mission, speeds = circled(stops, limits)
+    assert mission.status.visits == len(stops)
+    assert min(speeds) > 3.4
+    assert max(speeds) < 4.4
