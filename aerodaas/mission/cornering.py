@@ -66,10 +66,10 @@ class Cornering:
     _stops: tuple[QueuedWaypoint, QueuedWaypoint] | None = field(default=None, init=False)
     _leaving: Vector | None = field(default=None, init=False)
 
-    def passing_speed(self, leg: Leg, place: Vector, odometry: Odometry, now: int) -> float:
+    def passing_speed(self, leg: Leg, place: Vector, odometry: Odometry) -> float:
         """m/s at which the end of `leg` is passed; 0 where the drone stops there.
 
-        `place` is what it flies to now, ENU metres, and `now` the mission clock.
+        `place` is what it flies to now, ENU metres.
         """
         stop, following = leg.stop, self.navigator.following
         way = stop.waypoint.position - odometry.position
@@ -78,7 +78,7 @@ class Cornering:
             following is None
             or distance <= _ROUNDING
             or length(place - stop.waypoint.position) > _ROUNDING
-            or not leg.may_pass(odometry, now)
+            or not leg.is_facing(odometry.yaw)
             or _stays(stop.waypoint)
             or following.waypoint.trigger_distance is not None
             or self.photographer.ends_with_picture(stop, self.limits.arrival_radius)

@@ -23,8 +23,6 @@ _FACING = 0.2
 """Yaw error in radians that counts as facing the requested direction."""
 _PROGRESS = 0.1
 """Metres of approach that count as progress: more than the position's noise."""
-_MISSED = 1.0
-"""Seconds without progress after which a waypoint was not met in passing, and is stopped at."""
 
 
 class LegPhase(enum.Enum):
@@ -91,7 +89,7 @@ class Leg:
         if stop.arrived:
             stop.remaining_hover -= elapsed
         stop.arrived = stop.arrived or (
-            distance <= self._arrival_radius and self._is_facing(odometry.yaw)
+            distance <= self._arrival_radius and self.is_facing(odometry.yaw)
         )
         if stop.arrived:
             return LegPhase.DONE if stop.remaining_hover <= 0.0 else LegPhase.HOVERING
@@ -99,11 +97,6 @@ class Leg:
             self._nearest, self._nearer_at = distance, now
         stalled = seconds(now - self._nearer_at) > self._stall_timeout
         return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
-
-    def may_pass(self, odometry: Odometry, now: int) -> bool:
-        """Whether the drone, on its way, comes nearer still and looks where it is to at the end."""
-        approaches = seconds(now - self._nearer_at) <= _MISSED
-        return approaches and not self.stop.arrived and self._is_facing(odometry.yaw)
 
     def setpoint(
         self,
@@ -125,6 +118,7 @@ class Leg:
         line_from = self._start if straight else None
         return replace(towards, passing_speed=passing_speed, line_from=line_from)
 
-    def _is_facing(self, yaw: float) -> bool:
+    def is_facing(self, yaw: float) -> bool:
+        """Whether a drone at `yaw` (radians) looks where the waypoint asks for."""
         asked = self.stop.waypoint.yaw
         return asked is None or abs(wrap_angle(asked - yaw)) < _FACING

@@ -506,7 +506,7 @@ class Mission:
         self._to(diverted or doing, f"{'at' if stays else 'flying to'} {stop.id}")
         self._anchor = None
         place, heading = self.photographer.steer(place, state.odometry, self._now)
-        passing = self._cornering.passing_speed(self._leg, place, state.odometry, self._now)
+        passing = self._cornering.passing_speed(self._leg, place, state.odometry)
         flown = self._leg.setpoint(place, position, limits.cruise_speed, heading, passing)
         return Fly(flown, stop.cause)
 

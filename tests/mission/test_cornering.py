@@ -13,20 +13,21 @@ from flights import PERIOD, Flight, KinematicVehicle, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
+from aerodaas.config.actuators import ServoConfig
+from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.mission.commands import AddNavigation, Pause, Resume, Start
 from aerodaas.mission.cornering import corner_speed, passing_speed
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.planner import InlinePlanner, Plan
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.braking import braking_distance, braking_speed
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint
 from aerodaas.types.waypoints import Waypoint
 
 LIMITS = LimitsConfig(cruise_speed=2.0, arrival_radius=0.5)
@@ -161,27 +162,90 @@ def test_a_leg_with_pictures_by_distance_begins_and_ends_at_its_places() -> None
     assert passed_at(flight(add(ROW[0], between, ROW[2]), limits=LIMITS), "w2") > 1.5
 
 
-class Passing(KinematicVehicle):
-    """Passes where it is told to, beside the waypoint."""
+def test_a_waypoint_that_is_missed_in_passing_is_stopped_at() -> None:
+    """A vehicle that passes beside it finds it behind, from where the next leg turns back."""
 
-    ASIDE = 0.0
+    class Aside(KinematicVehicle):
+        def send(self, setpoint: Setpoint) -> Setpoint:
+            sent = super().send(setpoint)
+            if isinstance(setpoint, PositionSetpoint) and setpoint.passing_speed > 0.0:
+                beside = setpoint.position + np.array([0.0, 0.8, 0.0])
+                self._setpoint = replace(setpoint, position=beside)
+            return sent
 
-    def send(self, setpoint: Any) -> Any:  # noqa: ANN401
-        """Keep going east at the passing speed once near."""
-        sent = super().send(setpoint)
-        if isinstance(setpoint, PositionSetpoint) and setpoint.passing_speed > 0.0:
-            aside = np.array([0.0, self.ASIDE, 0.0])
-            self._setpoint = replace(setpoint, position=setpoint.position + aside)
-        return sent
-
-
-def test_a_waypoint_that_was_missed_in_passing_is_stopped_at() -> None:
-    """A vehicle that flies past it is told to stop there before long."""
-    vehicle = Passing()
-    vehicle.ASIDE = 0.8
-    one = flight(add(*ROW), limits=LIMITS, vehicle=vehicle)
+    one = flight(add(*ROW), limits=LIMITS, vehicle=Aside())
     one.run(120.0, until=lambda: one.mission.status.visits == 3)
     assert tuple(one.status.visited) == ("w1", "w2", "w3")
+
+
+def test_what_lies_in_the_same_place_is_not_passed() -> None:
+    """There is no direction in which to go on."""
+    one = flight(add(ROW[0], replace(ROW[0], id="again"), ROW[1]), limits=LIMITS)
+    assert passed_at(one, "w1") == 0.0
+
+
+def test_an_actuator_at_a_waypoint_has_the_drone_stop() -> None:
+    """It is moved there."""
+    hook = ServoConfig.model_validate(
+        {"type": "servo", "id": "hook", "channel": 9, "positions": {"open": 1900}}
+    )
+    there = replace(ROW[1], actuate={"hook": "open"})
+    one = flight(add(ROW[0], there, ROW[2]), limits=LIMITS, actuators=[hook])
+    assert passed_at(one, "w2") == 0.0
+
+
+def test_a_corner_of_the_fence_is_neither_passed_nor_on_the_line() -> None:
+    """On the way around a zone only what is left of the leg may be passed."""
+    zone = [(13.0, -2.0), (16.0, -2.0), (16.0, 3.0), (13.0, 3.0)]
+    limits = LIMITS.model_copy(update={"geofence": GeofenceConfig(no_fly=[zone], margin=0.5)})
+    one = flight(add(*ROW), limits=limits)
+    around = 0
+    one.run_to(S.ENROUTE)
+    while one.status.visits < 2:
+        sent = one.turn().sent
+        target = one.status.target
+        assert isinstance(sent, PositionSetpoint)
+        if target is not None and target.id == "w2" and abs(sent.position[1]) > 0.1:
+            around += 1
+            assert sent.passing_speed == 0.0
+            assert sent.line_from is None
+    assert around > 20
+
+
+def test_a_stop_that_was_left_for_a_more_urgent_one_begins_no_line() -> None:
+    """The drone has not been there."""
+    one = flight(add(*ROW), limits=LIMITS)
+    one.run_to(S.ENROUTE)
+    one.run(2.0)
+    one.tell(add(Waypoint("urgent", 0.0, 10.0, 2.0, priority=1)))
+    one.run_to(S.DIVERTED)
+    sent = one.turn().sent
+    assert isinstance(sent, PositionSetpoint)
+    assert sent.position.tolist() == [0.0, 10.0, 2.0]
+    assert sent.line_from is None
+
+
+class Slow(InlinePlanner):
+    """Answers once it is let."""
+
+    answers = True
+
+    def poll(self) -> Plan | None:
+        """The plan, or nothing yet."""
+        return super().poll() if self.answers else None
+
+
+def test_a_plan_that_is_awaited_is_not_anticipated() -> None:
+    """What follows is known once it is there."""
+    planner = Slow(OrderedScheduler())
+    one = flight(add(*ROW), limits=LIMITS, planner=planner)
+    one.run_to(S.ENROUTE)
+    planner.answers = False
+    one.tell(add(Waypoint("w4", 40.0, 0.0, 2.0)))
+    assert passed_at(one, "w1") == 0.0
+    planner.answers = True
+    one.turn()
+    assert passed_at(one, "w2") > 1.5
 
 
 def test_the_line_is_kept_from_where_the_drone_arrived() -> None:

@@ -6,6 +6,7 @@ import contextlib
 import math
 import queue
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,11 @@ from hypothesis import strategies as st
 from mavlink_flights import flight
 from numpy.typing import NDArray
 
-from aerodaas.config.model import GeofenceConfig
+from aerodaas.config.model import GeofenceConfig, RobotConfig
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.control.guidance import MovingTarget
+from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.microservices import plans
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
@@ -27,9 +29,11 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 )
 from aerodaas.drivers.mavlink.microservices.fence import fence_items
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, Impairment
@@ -190,6 +194,43 @@ def test_a_place_is_passed_at_the_speed_asked_for(speed: float, lag: float, shar
     assert 0.75 * passing - 0.2 < there < passing + 1.2
     assert track[:, 2].max() < 1.1 * speed
     assert track[:, 0].max() < 2 * far + 0.3
+
+
+def test_a_vehicle_at_its_limit_is_asked_for_little_more_than_it_does() -> None:
+    """Against the wind it flies at 6 m/s, whatever it is told."""
+    target, here, moving = MovingTarget(3.0, 1.5), np.zeros(3), np.array([6.0, 0.0, 0.0])
+    far = PositionSetpoint(np.array([900.0, 0.0, 0.0]))
+    for turn in range(400):
+        here = here + moving * 0.05
+        seen = target.towards(
+            far, 10.0, vehicle=here, velocity=moving, facing=0.0, now=100.0 + turn / 20
+        )
+    assert float(seen.velocity[0]) <= 8.0
+    assert 0.5 < float(seen.position[0] - here[0]) < 2.5
+
+
+def test_a_vehicle_that_was_blown_far_away_is_waited_for() -> None:
+    """Its target stands and is not flown on from."""
+    target, far = MovingTarget(3.0, 1.5), PositionSetpoint(np.array([900.0, 0.0, 0.0]))
+    state = {"velocity": np.zeros(3), "facing": 0.0}
+    first = target.towards(far, 5.0, vehicle=np.zeros(3), now=100.0, **state)
+    blown = first.position + np.array([0.0, 6.5, 0.0])
+    seen = target.towards(far, 5.0, vehicle=blown, now=100.05, **state)
+    assert seen.position.tolist() == first.position.tolist()
+    assert not seen.velocity.any()
+
+
+def test_a_setpoint_is_told_as_it_was_clipped() -> None:
+    """A place is passed no faster than the way there is flown."""
+    robot = RobotConfig.model_validate(
+        {"id": "drone", "driver": "mavlink", "settings": {}, "limits": {"max_speed": 4.0}}
+    )
+    steering = Steering(robot, MavlinkSettings(url="udpin:127.0.0.1:14540"))
+    asked = PositionSetpoint(np.array([50.0, 0.0, 5.0]), None, 9.0, 8.0, np.zeros(3))
+    frame = LocalFrame.standing_at(np.zeros(3), np.zeros(3))
+    here = Odometry(np.zeros(3), np.zeros(3), 0.0)
+    _, sent = steering.message(asked, here, frame, (1, 1), 10.0, waits=False)
+    assert sent == replace(asked, speed=4.0, passing_speed=4.0)
 
 
 MODES = list(FlightMode)

@@ -41,6 +41,9 @@ _DELAY = 0.1
 is heard."""
 _TOLERANCE = 0.02
 """Share of the speed by which a vehicle that has fallen behind may catch up."""
+_REACH = 2.0
+"""m/s faster than the vehicle flies that it is told to fly. One that is as fast as it can be, as
+against the wind, leans for its speed alone where more is asked of it, and is blown off its line."""
 _CATCH_UP = 2.0
 """1/s: how quickly the target takes up its full lead."""
 _LONGEST = 0.2
@@ -110,6 +113,7 @@ class MovingTarget:
         beyond = braking_distance(passing, self._acceleration, 0.0)
         ramp = max(0.0, float(self._velocity @ direction)) + self._acceleration * duration
         ramp = min(speed, ramp, braking_speed(left + beyond, self._acceleration, 0.0))
+        ramp = min(ramp, max(0.0, moving) + _REACH)
         if float(np.linalg.norm(lead)) > 1.0 + speed:
             ramp = 0.0
         # The lead settles: a target that stood and waited for the vehicle would have it fly in
