@@ -18,6 +18,7 @@ from aerodaas.types.geometry import Vector
 from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
 from tools.mavlink_vehicle.components import EmulatedComponent
+from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
@@ -31,7 +32,7 @@ _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
 _ROUNDING = 1e-6
-_STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore]] = {
+_STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore | FileServer]] = {
     **dict.fromkeys(
         ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"),
         lambda firmware: firmware.parameters,
@@ -47,6 +48,7 @@ _STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore]] 
         lambda firmware: firmware.plans,
     ),
     **dict.fromkeys(("LOG_REQUEST_DATA", "LOG_REQUEST_LIST"), lambda firmware: firmware.logs),
+    "FILE_TRANSFER_PROTOCOL": lambda firmware: firmware.files,
 }
 """What answers to a message."""
 

@@ -16,6 +16,7 @@ from aerodaas.types.vehicle import VehicleMode
 from tools.mavlink_vehicle.actuators import EmulatedActuators
 from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras
+from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
@@ -74,7 +75,7 @@ class Firmware(ABC):
         self.parameters = parameters
         parameters.values.update(options.parameters)
         self.plans = PlanStore(wants_numbers=self.wants_numbers)
-        self.logs = LogStore()
+        self.logs, self.files = LogStore(), FileServer()
         self.route = Route(
             flight,
             lambda: self.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []),
@@ -268,6 +269,7 @@ class Firmware(ABC):
         self.stop_motors()
         self.now, self._setpoint_at, self.gps_lost_at = 0.0, -math.inf, None
         self.rates = dict(self.default_rates)
+        self.files.restart()
         self.flight.begin_frame_here()
         self.home = self.flight.ned
         self.forget_mode()

@@ -435,9 +435,9 @@ class MavlinkVehicle:
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
     ) -> Path:
         """Fetch one of them into `folder`; blocks, raises VehicleError, in flight always."""
-        return fetch_log(
-            self._grounded_link("fetch logs"), self.connection.autopilot, log, folder, progress
-        )
+        link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
+        files = self._telemetry.serves_files
+        return fetch_log(link, autopilot, log, folder, progress, serves_files=files)
 
     def _grounded_link(self, deed: str) -> MavlinkLink:
         connection = self._connected()
