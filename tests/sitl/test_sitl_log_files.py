@@ -23,6 +23,9 @@ from aerodaas.types.vehicle_log import LogEntry
 from sitl.flights import robot_at
 from sitl.relay import Relay
 
+STEPS = 0.01
+"""Seconds by which a simulator's clock, which goes in steps of 2.5 ms, may be beside ours."""
+
 pytestmark = [
     *(pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock),
     needs_peer("AERODAAS_ARDUPILOT"),
@@ -34,7 +37,7 @@ def relayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[s
     """An ArduCopter that logs from its start on, in the test's own folder, behind a relay."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "journals"))
     parameters = tmp_path / "logs.parm"
-    parameters.write_text("LOG_DISARMED 1\nLOG_FILE_DSRMROT 0\n")
+    parameters.write_text("LOG_DISARMED 1\nLOG_FILE_DSRMROT 0\nLOG_BITMASK 2\n")
     source = Path(peer("AERODAAS_ARDUPILOT"))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
@@ -51,7 +54,27 @@ def relayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[s
 def is_burst(message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
     """Whether it asks for many packets of a file."""
     burst = mavlink.MAV_FTP_OPCODE_BURSTREADFILE
-    return message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == burst
+    return bool(message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == burst)
+
+
+def around_a_change(vehicle: MavlinkVehicle) -> tuple[float, float]:
+    """Seconds of its clock, by TIMESYNC, between which it changes a parameter."""
+    deadline = time.monotonic() + 30.0
+    while vehicle.read().extra.get("autopilot_time_error", 1.0) > 0.1:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    before, error = own_time(vehicle)
+    vehicle.parameters.set("WP_YAW_BEHAVIOR", 0.0)
+    after, _ = own_time(vehicle)
+    print(f"\nTIMESYNC within {1e3 * error:.1f} ms")  # noqa: T201
+    return before - error - STEPS, after + error + STEPS
+
+
+def own_time(vehicle: MavlinkVehicle) -> tuple[float, float]:
+    """What its clock reads now, and by how much that may be wrong."""
+    told = vehicle.telemetry.boot_clock.reading(time.monotonic())
+    assert told is not None
+    return told
 
 
 def at_rest(vehicle: MavlinkVehicle) -> LogEntry:
@@ -69,19 +92,28 @@ def at_rest(vehicle: MavlinkVehicle) -> LogEntry:
 def test_a_log_comes_down_byte_for_byte(
     relayed: tuple[str, Relay], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Cut half way and gone on with; over a link that loses, doubles and shuffles packets, too."""
+    """Cut half way and gone on with; over a link that loses, doubles and shuffles packets, too.
+
+    Its own times in it are those that TIMESYNC tells.
+    """
     url, relay = relayed
     robot = robot_at(url, {"failsafes": "ignore", "fallback": "ignore", "ready_timeout": 60.0})
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(60.0)
     try:
         assert vehicle.telemetry.serves_files
+        began, ended = around_a_change(vehicle)
         vehicle.parameters.set("LOG_DISARMED", 0.0)
         log = at_rest(vehicle)
         (original,) = (tmp_path / "state" / "logs").glob("*.BIN")
         link, sent = vehicle.connection.link, list[Any]()
         send = link.send
-        monkeypatch.setattr(link, "send", lambda message: (sent.append(message), send(message)))
+
+        def record(message: Any) -> None:  # noqa: ANN401
+            sent.append(message)
+            send(message)
+
+        monkeypatch.setattr(link, "send", record)
 
         def cut(done: int, size: int) -> None:
             if done > size / 2:
@@ -103,5 +135,11 @@ def test_a_log_comes_down_byte_for_byte(
     finally:
         vehicle.close()
     reader = DFReader.DFReader_binary(str(file))
-    assert reader.recv_match(type="PARM") is not None
-    print(f"\n{file.name}: {file.stat().st_size} bytes by MAVLink FTP")  # noqa: T201
+    changes = []
+    while (message := reader.recv_match(type="PARM")) is not None:
+        changes += [message.TimeUS / 1e6] if message.Name == "WP_YAW_BEHAVIOR" else []
+    assert began <= changes[-1] <= ended
+    print(  # noqa: T201
+        f"\n{file.name}: {file.stat().st_size} bytes by MAVLink FTP; a change between {began:.4f} "
+        f"and {ended:.4f} s of its clock by TIMESYNC is in it at {changes[-1]:.4f} s"
+    )

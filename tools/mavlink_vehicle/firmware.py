@@ -21,7 +21,7 @@ from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 from tools.mavlink_vehicle.route import Route
-from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore, TimeKeeper
 
 __all__ = ["Firmware", "Result"]
 
@@ -76,6 +76,7 @@ class Firmware(ABC):
         parameters.values.update(options.parameters)
         self.plans = PlanStore(wants_numbers=self.wants_numbers)
         self.logs, self.files = LogStore(), FileServer()
+        self.time_keeper = TimeKeeper(lambda: self.now)
         self.route = Route(
             flight,
             lambda: self.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []),

@@ -549,6 +549,8 @@ class MavlinkVehicle:
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
+                if request := self._telemetry.boot_clock.request(self._connection.target[0]):
+                    self._connection.link.send(request)
             self._mind_the_loop(now)
         self._log()
 

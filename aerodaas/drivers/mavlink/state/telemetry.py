@@ -10,6 +10,7 @@ import numpy as np
 
 from aerodaas.drivers.mavlink.microservices.events import EventReader
 from aerodaas.drivers.mavlink.microservices.texts import Texts
+from aerodaas.drivers.mavlink.state.boot_clock import BootClock
 from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
@@ -94,7 +95,7 @@ class Telemetry:
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
         self.rangefinder = Rangefinder() if measures_ground else None
-        self.texts, self.events = Texts(), EventReader()
+        self.texts, self.events, self.boot_clock = Texts(), EventReader(), BootClock()
         self._takers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -105,6 +106,7 @@ class Telemetry:
             "EXTENDED_SYS_STATE": self._landed,
             "HOME_POSITION": self._home,
             "SYSTEM_TIME": self._time,
+            "TIMESYNC": lambda message, _: self.boot_clock.take(message),
             "AUTOPILOT_VERSION": self._version,
             "MISSION_CURRENT": self._mission,
             "MISSION_ITEM_REACHED": self._reached,
@@ -257,7 +259,7 @@ class Telemetry:
         self.home = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
         self.sensors = self.on_ground = None
-        self.health, self.events = Health(), EventReader()
+        self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock()
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
         if self.rangefinder is not None:
