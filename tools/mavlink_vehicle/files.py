@@ -19,6 +19,8 @@ _PAGE = 4
 """Entries of a listing in one packet."""
 _POLYNOMIAL = 0xEDB88320
 _SEQUENCES = 0x10000
+_SESSION = 3
+"""The server's to choose, as PX4's does; ArduPilot's takes the client's."""
 
 
 class _Request(NamedTuple):
@@ -43,6 +45,10 @@ class _Request(NamedTuple):
     ) -> bytes:
         """The answer, `count` packets after the first."""
         return self._packed(mavlink.MAV_FTP_OPCODE_ACK, content, count, at, complete=complete)
+
+    def open(self, size: int) -> bytes:
+        """The answer that names the session and the file's size."""
+        return self._replace(session=_SESSION).reply(struct.pack("<I", size))
 
     def refuse(self, *code: int, count: int = 0) -> bytes:
         """The refusal, `count` packets after the first."""
@@ -115,7 +121,7 @@ class FileServer:
         if request.path not in self.files:
             return [request.refuse(mavlink.MAV_FTP_ERR_FILENOTFOUND)]
         self._open = self.files[request.path]
-        return [request.reply(struct.pack("<I", self.size(request.path)))]
+        return [request.open(self.size(request.path))]
 
     def _summed(self, request: _Request) -> list[bytes]:
         if request.path not in self.files:
@@ -123,7 +129,7 @@ class FileServer:
         return [request.reply(struct.pack("<I", self.checksum(request.path)))]
 
     def _read(self, request: _Request) -> list[bytes]:
-        if self._open is None:
+        if self._open is None or request.session != _SESSION:
             return [request.refuse(mavlink.MAV_FTP_ERR_INVALIDSESSION)]
         content = self._open[request.offset : request.offset + request.size]
         if not content:
@@ -131,7 +137,7 @@ class FileServer:
         return [request.reply(content, at=request.offset)]
 
     def _burst(self, request: _Request) -> list[bytes]:
-        if self._open is None:
+        if self._open is None or request.session != _SESSION:
             return [request.refuse(mavlink.MAV_FTP_ERR_INVALIDSESSION)]
         end = min(request.offset + _BURST * request.size, len(self._open))
         starts = range(request.offset, end, request.size)

@@ -41,8 +41,10 @@ class World:
         answer: Callable[[bytes], list[bytes]],
         bad: Impairment | None = None,
         seed: int = 0,
+        pace: float = 0.0,
     ) -> None:
-        bad = bad or Impairment()
+        bad = bad or Impairment(delay=STEP)
+        self._pace = pace
         self.client = FtpClient()
         self.now = 0.0
         self.sent: list[FtpPacket] = []
@@ -52,8 +54,8 @@ class World:
         self._down = Channel(bad, f"{seed}/down", lambda content, _: self._inbox.append(content))
 
     def _serve(self, payload: bytes) -> None:
-        for answer in self._answer(payload):
-            self._down.send(answer, PEER, self.now)
+        for count, answer in enumerate(self._answer(payload)):
+            self._down.send(answer, PEER, self.now + count * self._pace)
 
     def run(self, script: FtpScript[T]) -> T:
         """What a script ends with."""
@@ -160,6 +162,79 @@ def test_gaps_are_asked_for_by_themselves() -> None:
     assert world.read(len(CONTENT)) == CONTENT
     assert [(one.offset, one.size) for one in world.sent if one.opcode == 5] == [(2390, 239)]
     assert [one.offset for one in world.sent if one.opcode == 15] == [0, 23_900, 47_800]
+    assert world.now < 1.0
+
+
+def test_a_slow_link_is_given_its_time() -> None:
+    """Nothing is asked for again while anything new comes, and no round counts that brought it."""
+    world = World(serving(CONTENT[:5_000]).answer, pace=0.3)
+    assert world.read(5_000) == CONTENT[:5_000]
+    assert [one.opcode for one in world.sent] == [4, 15]
+    assert world.now > 5.0
+
+    large = random.Random(2).randbytes(300_000)
+    assert World(serving(large).answer).read(len(large)) == large
+
+
+def test_what_comes_far_ahead_is_not_kept() -> None:
+    """Of a vehicle that sends an end without a beginning nothing fills our memory."""
+    size = 400_000
+    server = serving(bytes(size))
+
+    def answer(payload: bytes) -> list[bytes]:
+        if payload[3] != mavlink.MAV_FTP_OPCODE_BURSTREADFILE:
+            return server.answer(payload)
+        sequence, session = struct.unpack_from("<HB", payload)
+        end = FtpPacket(128, sequence + 1, session, 200, 15, offset=size - 200, content=bytes(200))
+        return [end.pack()]
+
+    world = World(answer)
+    with pytest.raises(VehicleError, match="at byte 0 of 400000"):
+        world.read(size)
+    assert not [one for one in world.sent if one.opcode == 5]
+
+
+def test_answers_to_others_are_none_to_us() -> None:
+    """Other sessions' data, other requests' answers by the same number, ends of older requests."""
+    server = serving()
+
+    def answer(payload: bytes) -> list[bytes]:
+        sequence, _, opcode = struct.unpack_from("<HBB", payload)
+        lies = [
+            FtpPacket(128, sequence + 1, 9, 239, opcode, content=bytes(239)),
+            FtpPacket(129, sequence + 77, 3, 1, 5, content=b"\6"),
+            FtpPacket(128, sequence + 1, 3, 4, 3, content=bytes(4)),
+        ]
+        lied = [one.pack() for one in lies if opcode in {5, 15} or one.request == 3]
+        return [*lied, *server.answer(payload)][: None if opcode != 15 else 50]
+
+    assert World(answer).read(len(CONTENT)) == CONTENT
+
+
+pieces = st.tuples(st.integers(0, 3_000), st.integers(0, 239), st.booleans(), st.booleans())
+
+
+@given(st.lists(pieces, max_size=60), st.integers(1, 2_500))
+@settings(max_examples=60, deadline=None)
+def test_true_pieces_of_any_size_make_the_file(
+    told: list[tuple[int, int, bool, bool]], size: int
+) -> None:
+    """In any order, one over another, by either kind of answer; beyond the end they are cut off."""
+    server = serving(CONTENT[:size])
+    left = deque(told)
+
+    def answer(payload: bytes) -> list[bytes]:
+        sequence, _, opcode = struct.unpack_from("<HBB", payload)
+        made: list[bytes] = []
+        while left and len(made) < 5 and opcode in {5, 15}:
+            at, count, burst, complete = left.popleft()
+            content = CONTENT[at : at + count]
+            kind = 15 if burst else 5
+            packet = FtpPacket(128, sequence, 3, len(content), kind, complete, at, content)
+            made.append(packet.pack())
+        return [*made, *(server.answer(payload) if len(made) < 5 else ())]
+
+    assert World(answer).read(size) == CONTENT[:size]
 
 
 def test_a_server_that_stalls_is_told_with_the_byte() -> None:
@@ -280,6 +355,22 @@ def test_any_listing_can_be_read(told: list[bytes]) -> None:
         assert size is None or size >= 0
 
 
+def test_a_listing_may_end_by_an_empty_page() -> None:
+    """As older ones of PX4 do."""
+    server = FileServer()
+    server.files = {"/logs/1.bin": b"1"}
+
+    def answer(payload: bytes) -> list[bytes]:
+        sequence, _, opcode = struct.unpack_from("<HBB", payload)
+        if struct.unpack_from("<I", payload, 8)[0] == 0:
+            return server.answer(payload)
+        return [FtpPacket(128, sequence + 1, 0, 0, opcode).pack()]
+
+    world = World(answer)
+    assert world.run(world.client.entries("/logs")) == [FtpEntry("1.bin", 1)]
+    assert len(world.sent) == 2
+
+
 def test_a_folder_without_end_is_given_up() -> None:
     """Rather than filling our memory."""
 
@@ -293,20 +384,31 @@ def test_a_folder_without_end_is_given_up() -> None:
         world.run(world.client.entries("/logs"))
 
 
-@given(st.lists(st.binary(max_size=30), max_size=60), st.integers(0, 2000))
-@settings(max_examples=60, deadline=None)
-def test_nonsense_ends_in_time(noise: list[bytes], size: int) -> None:
+noise = st.lists(
+    st.builds(
+        lambda opcode, sequence, request, complete, offset, content: FtpPacket(
+            opcode, sequence, 3, len(content), request, complete, offset, content
+        ),
+        st.sampled_from([128, 129]),
+        st.integers(0, 20),
+        st.sampled_from([3, 4, 5, 14, 15]),
+        st.booleans(),
+        st.one_of(st.integers(0, 3_000), st.integers(0, 0xFFFFFFFF)),
+        st.binary(max_size=60),
+    ),
+    max_size=60,
+)
+
+
+@given(noise, st.integers(0, 2000))
+@settings(max_examples=100, deadline=None)
+def test_nonsense_ends_in_time(told: list[FtpPacket], size: int) -> None:
     """Whatever comes beside the answers: no other error, no byte too many, no endless wait."""
     server = serving(CONTENT[:size])
-    heads = deque(noise)
+    left = deque(told)
 
     def answer(payload: bytes) -> list[bytes]:
-        made: list[bytes] = []
-        while heads and len(made) < 3:
-            head = bytearray(heads.popleft().ljust(30, b"\0"))
-            head[:2] = struct.pack("<H", (struct.unpack_from("<H", payload)[0] + 1) % 0x10000)
-            head[3], head[5] = 128 + head[3] % 2, payload[3]
-            made.append(bytes(head))
+        made = [left.popleft().pack() for _ in range(min(3, len(left)))]
         return [*made, *server.answer(payload)]
 
     world = World(answer)
@@ -314,7 +416,7 @@ def test_nonsense_ends_in_time(noise: list[bytes], size: int) -> None:
     try:
         world.run(world.client.read(PATH, size, content.extend))
     except VehicleError:
-        assert noise
+        assert told
     assert len(content) <= size
 
 

@@ -75,8 +75,7 @@ class BootClock:
         if self._asked and now < self._due:
             return None
         self._asked += 1
-        settled = self._asked >= _FIRST and self._doubt is None
-        self._due = now + (_SELDOM if settled else _OFTEN)
+        self._due = now + (_SELDOM if self._asked >= _FIRST else _OFTEN)
         # Every vehicle on a wire answers: its own number tells whose answer it is.
         self._pending = (int(now * NANOSECONDS) // _SYSTEMS - 1) * _SYSTEMS + system
         return mavlink.MAVLink_timesync_message(0, self._pending)
@@ -99,7 +98,7 @@ class BootClock:
         elif self._doubt is not None and sample.agrees(self._doubt):
             self._best, self._doubt = sample, None
         else:
-            self._doubt = sample
+            self._doubt, self._due = sample, now + _OFTEN
 
     def reading(self, at: float) -> tuple[float, float] | None:
         """What it reads at the second `at` of ours, and by how much that may be wrong, in seconds.
