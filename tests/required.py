@@ -47,6 +47,10 @@ PEERS = {
     "AERODAAS_SITL_ARDUPILOT": Peer(
         "an ArduCopter in simulation, by a URL such as tcp:127.0.0.1:5760 or `start command => URL`"
     ),
+    "AERODAAS_ARDUPILOT": Peer(
+        "ArduCopter's program for simulation, with its source tree around it or beside it",
+        ("arducopter",),
+    ),
     "AERODAAS_MAVSDK": Peer("a Python with MAVSDK: tests/testing/test_mavsdk.py"),
     "AERODAAS_DJITELLOPY": Peer("a Python with djitellopy: tests/testing/test_djitellopy.py"),
     "AERODAAS_BROWSER": Peer("a Chromium or Chrome", BROWSERS),

@@ -7,7 +7,7 @@ import selectors
 import socket
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
@@ -18,11 +18,12 @@ from aerodaas.types.geometry import Vector
 from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
 from tools.mavlink_vehicle.components import EmulatedComponent
+from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.px4 import EmulatedPX4
-from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore, TimeKeeper
 from tools.mavlink_vehicle.transmitter import EmulatedTransmitter
 
 __all__ = ["EmulatedAutopilot"]
@@ -31,7 +32,8 @@ _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
 _ROUNDING = 1e-6
-_STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore]] = {
+_Answerer: TypeAlias = ParameterStore | PlanStore | LogStore | FileServer | TimeKeeper
+_STORED: dict[str, Callable[[Firmware], _Answerer]] = {
     **dict.fromkeys(
         ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"),
         lambda firmware: firmware.parameters,
@@ -47,6 +49,8 @@ _STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore]] 
         lambda firmware: firmware.plans,
     ),
     **dict.fromkeys(("LOG_REQUEST_DATA", "LOG_REQUEST_LIST"), lambda firmware: firmware.logs),
+    "FILE_TRANSFER_PROTOCOL": lambda firmware: firmware.files,
+    "TIMESYNC": lambda firmware: firmware.time_keeper,
 }
 """What answers to a message."""
 

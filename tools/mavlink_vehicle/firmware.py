@@ -16,11 +16,12 @@ from aerodaas.types.vehicle import VehicleMode
 from tools.mavlink_vehicle.actuators import EmulatedActuators
 from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras
+from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 from tools.mavlink_vehicle.route import Route
-from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore, TimeKeeper
 
 __all__ = ["Firmware", "Result"]
 
@@ -78,7 +79,8 @@ class Firmware(ABC):
         self.parameters = parameters
         parameters.values.update(options.parameters)
         self.plans = PlanStore(wants_numbers=self.wants_numbers)
-        self.logs = LogStore()
+        self.logs, self.files = LogStore(), FileServer()
+        self.time_keeper = TimeKeeper(lambda: self.now)
         self.route = Route(
             flight,
             lambda: self.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []),
@@ -272,6 +274,7 @@ class Firmware(ABC):
         self.stop_motors()
         self.now, self._setpoint_at, self.gps_lost_at = 0.0, -math.inf, None
         self.rates = dict(self.default_rates)
+        self.files.restart()
         self.flight.begin_frame_here()
         self.home = self.flight.ned
         self.forget_mode()

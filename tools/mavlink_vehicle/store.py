@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from typing import Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
-__all__ = ["LogStore", "ParameterStore", "PlanStore"]
+__all__ = ["LogStore", "ParameterStore", "PlanStore", "TimeKeeper"]
 
 _PACKET = 90
 """Bytes of a LOG_DATA."""
@@ -91,6 +92,19 @@ class LogStore:
             )
             for begin in range(0, len(wanted), _PACKET)
         ]
+
+
+class TimeKeeper:
+    """Tells its clock since its start, in seconds, by TIMESYNC."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401
+        """The answer to a request; none to an answer."""
+        if message.tc1 != 0:
+            return []
+        return [mavlink.MAVLink_timesync_message(int(self._now() * 1e9), message.ts1)]
 
 
 class PlanStore:

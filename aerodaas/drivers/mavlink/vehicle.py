@@ -435,9 +435,9 @@ class MavlinkVehicle:
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
     ) -> Path:
         """Fetch one of them into `folder`; blocks, raises VehicleError, in flight always."""
-        return fetch_log(
-            self._grounded_link("fetch logs"), self.connection.autopilot, log, folder, progress
-        )
+        link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
+        files = self._telemetry.serves_files
+        return fetch_log(link, autopilot, log, folder, progress, serves_files=files)
 
     def _grounded_link(self, deed: str) -> MavlinkLink:
         connection = self._connected()
@@ -549,6 +549,8 @@ class MavlinkVehicle:
             if self._connection is not None:
                 self._connection.departure.turn(now)
                 self._climb_on(self._connection, now)
+                if request := self._telemetry.boot_clock.request(self._connection.target[0]):
+                    self._connection.link.send(request)
             self._mind_the_loop(now)
         self._log()
 

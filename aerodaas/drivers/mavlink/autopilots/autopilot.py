@@ -103,6 +103,8 @@ class Autopilot(ABC):
     log_suffix: ClassVar[str]
     log_head: ClassVar[bytes]
     """Of the files of its own logs, and their first bytes."""
+    log_folders: ClassVar[tuple[str, ...]]
+    """Where they may lie: on its card, and in its simulator's folder."""
     ways_home: ClassVar[frozenset[str]]
     """Those of `return`, `retrace` and `plan` that its own protection can fly."""
     home_comes_first: ClassVar[bool]

@@ -1,8 +1,9 @@
-"""List and download of the autopilot's own logs (LOG_REQUEST_LIST, LOG_REQUEST_DATA)."""
+"""List and download of the autopilot's own logs: by MAVLink FTP, or else by LOG_REQUEST_DATA."""
 
 from __future__ import annotations
 
 import contextlib
+import logging
 import queue
 import time
 from collections.abc import Callable, Iterator
@@ -11,12 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.microservices.log_files import FileTransfer, fetch_file, find_log
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle_log import LogEntry
 
 __all__ = ["fetch_log", "list_logs"]
+
+_log = logging.getLogger(__name__)
 
 _TIMEOUT = 1.0
 """Seconds of silence after which is asked again."""
@@ -54,20 +58,39 @@ def list_logs(link: MavlinkLink) -> list[LogEntry]:
 
 
 def fetch_log(
-    link: MavlinkLink,
+    grounded: Callable[[], MavlinkLink],
     autopilot: Autopilot,
     log: LogEntry,
     folder: Path,
     progress: Progress = lambda _, __: None,
+    *,
+    serves_files: bool = False,
 ) -> Path:
     """Fetch a log into a file of `folder`, whole or not at all; raises VehicleError.
 
-    Packets that are lost are asked for again. Not for use in the link's thread.
+    By MAVLink FTP where the vehicle `serves_files`, and this log among them. Packets that are lost
+    are asked for again. `grounded` is the link of a vehicle that stands, and raises VehicleError
+    for one that does not: it is asked again and again. Not for use in the link's thread.
     """
+
+    def told(done: int, size: int) -> None:
+        grounded()
+        progress(done, size)
+
+    link = grounded()
+    if not 0 < log.size <= _LARGEST:
+        raise VehicleError(f"log {log.number} has {log.size} bytes, which is none to be fetched")
     file = folder / f"log-{log.number}{_when(log.began)}{autopilot.log_suffix}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        _write(link, log, file, progress)
+        transfer = FileTransfer(link)
+        path = _path(transfer, autopilot, log) if serves_files else None
+        if path is not None:
+            # Not by its time: of the log that is written last, ArduPilot tells the present one.
+            part = folder / f"log-{log.number}-{log.size}.part"
+            fetch_file(transfer, path, log.size, file, part, told)
+        else:
+            _write(link, log, file, told)
         with file.open("rb") as written:
             head = written.read(len(autopilot.log_head))
     except OSError as error:
@@ -80,9 +103,16 @@ def fetch_log(
     return file
 
 
+def _path(transfer: FileTransfer, autopilot: Autopilot, log: LogEntry) -> str | None:
+    """Its path for MAVLink FTP; None where it is to be fetched by its number."""
+    try:
+        return find_log(transfer, autopilot, log)
+    except VehicleError as error:
+        _log.warning("%s: its log is fetched by LOG_REQUEST_DATA", error)
+        return None
+
+
 def _write(link: MavlinkLink, log: LogEntry, file: Path, progress: Progress) -> None:
-    if not 0 < log.size <= _LARGEST:
-        raise VehicleError(f"log {log.number} has {log.size} bytes, which is none to be fetched")
     part = file.with_name(f"{file.name}.part")
     try:
         with part.open("wb") as output, link.listen("LOG_DATA") as inbox:

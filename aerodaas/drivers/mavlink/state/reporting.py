@@ -88,7 +88,7 @@ class VehicleReport:
             telemetry.gps,
             faults=(*self._faults(now), *reports),
             extra={
-                "autopilot_time": telemetry.boot_time,
+                **self._autopilot_time(now - age),
                 "autopilot_clock": telemetry.clock,
                 "damaged_packets": counts.damaged,
                 "foreign_packets": counts.strangers,
@@ -115,6 +115,13 @@ class VehicleReport:
         if telemetry.rangefinder is None:
             return None
         return telemetry.rangefinder.below(telemetry.attitude, now)
+
+    def _autopilot_time(self, at: float) -> dict[str, float]:
+        """Its clock since its start: by TIMESYNC at the second `at`, else by its newest stamp."""
+        told = self._telemetry.boot_clock.reading(at)
+        if told is None:
+            return {"autopilot_time": self._telemetry.boot_time}
+        return {"autopilot_time": told[0], "autopilot_time_error": told[1]}
 
     def _mission(self) -> dict[str, float]:
         """Items of the vehicle's own mission, where it has told any."""

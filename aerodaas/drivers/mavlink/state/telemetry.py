@@ -10,6 +10,7 @@ import numpy as np
 
 from aerodaas.drivers.mavlink.microservices.events import EventReader
 from aerodaas.drivers.mavlink.microservices.texts import Texts
+from aerodaas.drivers.mavlink.state.boot_clock import BootClock
 from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
@@ -85,15 +86,16 @@ class Telemetry:
         has reached."""
         self.reboots = 0
         self._booting: bool | None = None
-        self.software = ""
-        """Its version; empty before AUTOPILOT_VERSION has come."""
-        self.hardware = ""
-        """Its board's own number, in hexadecimal digits; empty if it has none."""
+        self.software = self.hardware = ""
+        """Its version, and its board's own number in hexadecimal digits; empty before
+        AUTOPILOT_VERSION has come, the latter also if it has none."""
+        self.serves_files = False
+        """Whether it said that it has MAVLink FTP."""
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
         self.rangefinder = Rangefinder() if measures_ground else None
-        self.texts, self.events = Texts(), EventReader()
+        self.texts, self.events, self.boot_clock = Texts(), EventReader(), BootClock()
         self._takers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -104,6 +106,7 @@ class Telemetry:
             "EXTENDED_SYS_STATE": self._landed,
             "HOME_POSITION": self._home,
             "SYSTEM_TIME": self._time,
+            "TIMESYNC": lambda message, _: self.boot_clock.take(message),
             "AUTOPILOT_VERSION": self._version,
             "MISSION_CURRENT": self._mission,
             "MISSION_ITEM_REACHED": self._reached,
@@ -256,7 +259,7 @@ class Telemetry:
         self.home = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
         self.sensors = self.on_ground = None
-        self.health, self.events = Health(), EventReader()
+        self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock()
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
         if self.rangefinder is not None:
@@ -267,6 +270,7 @@ class Telemetry:
         self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
         number = bytes(message.uid2)
         self.hardware = number.rstrip(b"\0").hex() or (f"{message.uid:x}" if message.uid else "")
+        self.serves_files = bool(message.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP)
 
     def _mission(self, message: Any, _: float) -> None:  # noqa: ANN401
         self.mission_item = float(message.seq)

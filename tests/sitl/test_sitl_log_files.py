@@ -1,0 +1,145 @@
+"""A real ArduCopter's own log by MAVLink FTP, as it lies on the simulator's disk."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink import DFReader
+from required import needs_peer, peer
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.drivers.mavlink.sitl.process import SitlProcess
+from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.testing.channel import Impairment
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle_log import LogEntry
+from sitl.flights import robot_at
+from sitl.relay import Relay
+
+STEPS = 0.01
+"""Seconds by which a simulator's clock, which goes in steps of 2.5 ms, may be beside ours."""
+
+pytestmark = [
+    *(pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock),
+    needs_peer("AERODAAS_ARDUPILOT"),
+]
+
+
+@pytest.fixture
+def relayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, Relay]]:
+    """An ArduCopter that logs from its start on, in the test's own folder, behind a relay."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "journals"))
+    parameters = tmp_path / "logs.parm"
+    parameters.write_text("LOG_DISARMED 1\nLOG_FILE_DSRMROT 0\nLOG_BITMASK 2\n")
+    source = Path(peer("AERODAAS_ARDUPILOT"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    options = SitlOptions(tmp_path / "state", source, port=port, instance=3, defaults=[parameters])
+    with SitlProcess("ardupilot", options) as simulator:
+        relay = Relay(simulator.url)
+        try:
+            yield relay.url, relay
+        finally:
+            relay.close()
+
+
+def is_burst(message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
+    """Whether it asks for many packets of a file."""
+    burst = mavlink.MAV_FTP_OPCODE_BURSTREADFILE
+    return bool(message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == burst)
+
+
+def around_a_change(vehicle: MavlinkVehicle) -> tuple[float, float]:
+    """Seconds of its clock, by TIMESYNC, between which it changes a parameter."""
+    deadline = time.monotonic() + 30.0
+    while vehicle.read().extra.get("autopilot_time_error", 1.0) > 0.1:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    before, error = own_time(vehicle)
+    vehicle.parameters.set("WP_YAW_BEHAVIOR", 0.0)
+    after, _ = own_time(vehicle)
+    print(f"\nTIMESYNC within {1e3 * error:.1f} ms")  # noqa: T201
+    return before - error - STEPS, after + error + STEPS
+
+
+def own_time(vehicle: MavlinkVehicle) -> tuple[float, float]:
+    """What its clock reads now, and by how much that may be wrong."""
+    told = vehicle.telemetry.boot_clock.reading(time.monotonic())
+    assert told is not None
+    return told
+
+
+def at_rest(vehicle: MavlinkVehicle) -> LogEntry:
+    """Its log, once it grows no more."""
+    before = 0
+    for _ in range(30):
+        (log,) = vehicle.logs()
+        if log.size == before:
+            return log
+        before = log.size
+        time.sleep(2.0)
+    raise AssertionError("it goes on writing")
+
+
+def test_a_log_comes_down_byte_for_byte(
+    relayed: tuple[str, Relay], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Cut half way and gone on with; over a link that loses, doubles and shuffles packets, too.
+
+    Its own times in it are those that TIMESYNC tells.
+    """
+    url, relay = relayed
+    robot = robot_at(url, {"failsafes": "ignore", "fallback": "ignore", "ready_timeout": 60.0})
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    vehicle.connect(60.0)
+    try:
+        assert vehicle.telemetry.serves_files
+        began, ended = around_a_change(vehicle)
+        vehicle.parameters.set("LOG_DISARMED", 0.0)
+        log = at_rest(vehicle)
+        (original,) = (tmp_path / "state" / "logs").glob("*.BIN")
+        link, sent = vehicle.connection.link, list[Any]()
+        send = link.send
+
+        def record(message: Any) -> None:  # noqa: ANN401
+            sent.append(message)
+            send(message)
+
+        monkeypatch.setattr(link, "send", record)
+
+        def cut(done: int, size: int) -> None:
+            if done > size / 2:
+                raise VehicleError("cut")
+
+        with pytest.raises(VehicleError, match="cut; the next fetch goes on from"):
+            vehicle.fetch_log(log, tmp_path, cut)
+        sent.clear()
+        file = vehicle.fetch_log(log, tmp_path)
+        assert file.read_bytes() == original.read_bytes()
+        begins = [bytes(one.payload[8:12]) for one in sent if is_burst(one)]
+        assert int.from_bytes(begins[0], "little") > log.size / 2
+
+        bad = Impairment(loss=0.02, duplicates=0.02, jitter=0.01)
+        relay.spoil(bad)
+        again = vehicle.fetch_log(log, tmp_path / "again")
+        assert again.read_bytes() == original.read_bytes()
+        assert not [one for one in sent if one.get_type() == "LOG_REQUEST_DATA"]
+    finally:
+        vehicle.close()
+    reader = DFReader.DFReader_binary(str(file))
+    changes = []
+    while (message := reader.recv_match(type="PARM")) is not None:
+        changes += [message.TimeUS / 1e6] if message.Name == "WP_YAW_BEHAVIOR" else []
+    assert began <= changes[-1] <= ended
+    print(  # noqa: T201
+        f"\n{file.name}: {file.stat().st_size} bytes by MAVLink FTP; a change between {began:.4f} "
+        f"and {ended:.4f} s of its clock by TIMESYNC is in it at {changes[-1]:.4f} s"
+    )
