@@ -87,7 +87,7 @@ class SimulatedVehicle:
         for sensor in robot.sensors:
             if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
                 settings = camera_settings(sensor)
-                self._camera = SimulatedPhotoCamera()
+                self._camera = SimulatedPhotoCamera(settings)
                 if settings.gimbal is not None:
                     self._gimbal = SimulatedGimbal(settings.gimbal, settings)
                 break

@@ -89,7 +89,8 @@ class Photographer:
         if task is None:
             return place, heading
         straight = np.array_equal(place, task.stop.waypoint.position)
-        ahead = task.trigger.place_ahead(odometry, now) if straight else None
+        turns = heading is None and task.stop.waypoint.yaw is None
+        ahead = task.trigger.place_ahead(odometry, now, turns=turns) if straight else None
         if ahead is None:
             return place, heading
         return ahead, task.trigger.bearing if heading is None else heading

@@ -452,8 +452,11 @@ export interface SurveyIn {
    */
   area: [[number, number], [number, number], [number, number], ...[number, number][]];
   around?: boolean;
+  camera?: string | null;
   field_of_view?: number | null;
-  height: number;
+  front_overlap?: number;
+  ground_resolution?: number | null;
+  height?: number | null;
   name?: string;
   overlap?: number;
   robot: string;
@@ -467,7 +470,9 @@ export interface SurveyOut {
   angle: number;
   available: number | null;
   battery: number;
+  height: number;
   length: number;
+  photos: SurveyPhotosOut | null;
   seconds: number;
   /**
    * @minItems 3
@@ -477,4 +482,15 @@ export interface SurveyOut {
   sweeps: number;
   waypoints: WaypointEntry[];
   width: number;
+}
+/**
+ * Pictures of a survey as they would be taken.
+ */
+export interface SurveyPhotosOut {
+  interval: number;
+  line_spacing: number;
+  places: [number, number][];
+  resolution: number | null;
+  spacing: number;
+  warning: string;
 }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flights import PERIOD, Flight, KinematicVehicle
 
-from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.mission.commands import AddNavigation, Start
@@ -26,7 +27,7 @@ from aerodaas.types.payload import (
 from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import Waypoint
 
-__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated"]
+__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated", "surveying"]
 
 
 class Clock:
@@ -119,11 +120,22 @@ def lost(made: Flight) -> list[str]:
     return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
 
 
+def surveying(
+    driver: str = "simulated", *cameras: Mapping[str, object], **limits: object
+) -> RobotConfig:
+    """A robot with cameras of these settings; by default one that hangs from a gimbal."""
+    sensors = [
+        {"id": f"cam{n}", "type": "camera", "rate": 2, "settings": settings}
+        for n, settings in enumerate(cameras or ({"gimbal": {}},))
+    ]
+    fast = {"max_speed": 8, "cruise_speed": 5, **limits}
+    content = {"id": "drone", "driver": driver, "sensors": sensors, "limits": fast}
+    return RobotConfig.model_validate(content)
+
+
 def simulated(*waypoints: Waypoint, noise: float, wind: float) -> Mission:
     """A flight of the simulated drone, in its own time."""
-    sensor = {"id": "cam", "type": "camera", "rate": 2, "settings": {"gimbal": {}}}
-    limits = LimitsConfig(max_speed=8, cruise_speed=5)
-    robot = RobotConfig.model_validate({"id": "drone", "sensors": [sensor], "limits": limits})
+    robot = surveying()
     world = {"sensor_noise": noise, "wind": (wind, wind, 0.0), "gust": wind / 3}
     environment = EnvironmentConfig.model_validate({"robots": [robot], "simulation": world})
     vehicle = SimulatedVehicle(robot, environment)
