@@ -17,6 +17,7 @@ from aerodaas.types.geometry import CameraModel, angles_of_rotation, rotation_fr
 from aerodaas.types.records import fast_pickle
 
 __all__ = [
+    "CameraStatus",
     "Gimbal",
     "GimbalAttitude",
     "GimbalTarget",
@@ -99,6 +100,47 @@ class PhotoFailure:
     """That of `PhotoCamera.take_photo`."""
     reason: str
     """In a few words."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraStatus:
+    """What a camera says that it is and does; what is not told is None."""
+
+    name: str
+    """By which people know it, such as `camera (component 100)`."""
+    model: str = ""
+    pixels: tuple[int, int] | None = None
+    """Width and height of its pictures."""
+    view: float | None = None
+    """Degrees across its picture."""
+    free: float | None = None
+    """MiB that its card has left."""
+    trouble: str = ""
+    """Why it keeps no pictures, or soon will not; empty if it does."""
+    taken: int | None = None
+    """Pictures by its own count."""
+    interval: float | None = None
+    """Seconds between pictures that it takes by itself, 0 where it does not say; None while it
+    takes none."""
+    recording: float | None = None
+    """Seconds for which it has been recording video; None while it records none."""
+
+    def __str__(self) -> str:
+        """One line for people, without its name."""
+        said = [self.model]
+        if self.pixels is not None:
+            said.append(f"{self.pixels[0]}x{self.pixels[1]}")
+        if self.view is not None:
+            said.append(f"sees {self.view:.0f} degrees across")
+        if self.free is not None:
+            said.append(f"{self.free:.0f} MiB free")
+        if self.taken is not None:
+            said.append(f"{self.taken} pictures taken")
+        if self.interval is not None:
+            said.append(f"takes one every {self.interval:g} s" if self.interval else "takes more")
+        if self.recording is not None:
+            said.append(f"has been recording for {self.recording:.0f} s")
+        return ", ".join(one for one in said if one) or "tells nothing of itself"
 
 
 PhotoOutcome: TypeAlias = Photo | PhotoFailure
