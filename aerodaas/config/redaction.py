@@ -14,7 +14,7 @@ __all__ = ["catalogue", "redacted"]
 
 _CALIBRATION = (
     *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
-    *("gimbal", "photo_interval"),
+    *("gimbal", "photo_interval", "zoom"),
 )
 """Settings of a sensor that anybody may know."""
 _NOWHERE = "http://{}.invalid"

@@ -204,6 +204,9 @@ class CameraConfig(Strict):
     """The gimbal that it hangs from, pitched and turned as above at first; None: it is bolted to
     the body. A simulated camera's is simulated; of another one it says that there is a gimbal, for
     surveys that are planned."""
+    zoom: Annotated[float, Field(ge=1, le=200)] = 1.0
+    """How many times narrower than `horizontal_fov` a simulated camera sees at most, by its focal
+    length; 1: its lens has no zoom."""
     photo_interval: Positive | None = None
     """Seconds that it needs from one picture to the next; None: 0.5 in simulation, and otherwise
     not known."""

@@ -174,6 +174,7 @@ class SimulatedVehicle:
             tuple(self._faults()),
             ended=self._autopilot.ended,
             gimbal=None if self._gimbal is None else self._gimbal.attitude,
+            zoom=None if self._camera is None else self._camera.zoom,
             actuators=dict(self._actuators.positions),
         )
 

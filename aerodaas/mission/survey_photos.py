@@ -94,6 +94,7 @@ def survey_camera(
         side_overlap,
         gimbal=settings.gimbal is not None,
         pixels=width,
+        zooms=settings.zoom > 1.0,
         interval=settings.photo_interval or (SIMULATED_INTERVAL if simulated else None),
     )
 

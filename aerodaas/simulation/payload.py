@@ -12,7 +12,15 @@ import math
 from aerodaas.config.model import CameraConfig, GimbalConfig
 from aerodaas.config.robot import SIMULATED_INTERVAL
 from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.payload import GimbalAttitude, GimbalTarget, Photo, PhotoOutcome, PhotoPlace
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.payload import (
+    GimbalAttitude,
+    GimbalTarget,
+    LensTarget,
+    Photo,
+    PhotoOutcome,
+    PhotoPlace,
+)
 from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["SimulatedGimbal", "SimulatedPhotoCamera"]
@@ -62,6 +70,10 @@ class SimulatedPhotoCamera:
         )
         self._storing_time = round(interval * NANOSECONDS)
         """Nanoseconds from exposure until the camera says that it has the picture."""
+        self.zoom: float | None = 0.0 if settings.zoom > 1.0 else None
+        """Percent; None for a lens without."""
+        self.adjusted = True
+        self.lens_fault = ""
         self._taken = 0
         self._asked: list[tuple[int, str]] = []
         self._storing: list[Photo] = []
@@ -72,6 +84,14 @@ class SimulatedPhotoCamera:
         self._taken += 1
         self._asked.append((self._taken, label))
         return self._taken
+
+    def adjust(self, target: LensTarget) -> None:
+        """Zoom at once; everything is in focus to it. Raises VehicleError without a zoom."""
+        if target.zoom is None:
+            return
+        if self.zoom is None:
+            raise VehicleError("the camera has no zoom")
+        self.zoom = target.zoom
 
     def outcomes(self) -> list[PhotoOutcome]:
         """Pictures that are stored by now."""
@@ -101,6 +121,7 @@ class SimulatedPhotoCamera:
                 state.odometry,
                 state.gimbal,
                 state.truth,
+                zoom=state.zoom,
             )
             for number, label in self._asked
         ]

@@ -10,7 +10,7 @@ horizon while the vehicle tilts; only its yaw turns along.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel, angles_of_rotation, rotation_from_rpy
@@ -21,12 +21,15 @@ __all__ = [
     "Gimbal",
     "GimbalAttitude",
     "GimbalTarget",
+    "LensCamera",
+    "LensTarget",
     "Photo",
     "PhotoCamera",
     "PhotoFailure",
     "PhotoOutcome",
     "PhotoPlace",
     "levelled",
+    "zoomed",
 ]
 
 
@@ -39,6 +42,17 @@ class GimbalTarget:
     """Negative looks down."""
     yaw: float = 0.0
     """From the vehicle's nose, counter-clockwise."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class LensTarget:
+    """What a camera's lens is to be set to; percent of its range."""
+
+    zoom: float | None = None
+    """0 sees most, 100 least; None leaves it."""
+    focus: float | None = None
+    """0 is the nearest place that it can focus on, 100 the farthest; None leaves it."""
 
 
 @fast_pickle
@@ -89,6 +103,8 @@ class Photo:
     """The simulator's exact state at exposure, by which the picture is rendered."""
     file: str = ""
     """Name or URL by which the camera itself keeps it; empty where it tells none."""
+    zoom: float | None = None
+    """Percent of the lens's range; None where it is not known, and for a lens without."""
 
 
 @fast_pickle
@@ -182,6 +198,33 @@ class PhotoCamera(Protocol):
     def outcomes(self) -> list[PhotoOutcome]:
         """Pictures taken, by request or not, and requests that failed, since the last call."""
         ...
+
+
+@runtime_checkable
+class LensCamera(PhotoCamera, Protocol):
+    """A camera whose lens zooms or focuses; every method returns at once."""
+
+    def adjust(self, target: LensTarget) -> None:
+        """Have the lens set to `target`.
+
+        The driver repeats what is not acknowledged. Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether the last target was acknowledged."""
+        ...
+
+    @property
+    def lens_fault(self) -> str:
+        """Why the last target was not taken, in a few words; empty if nothing is known."""
+        ...
+
+
+def zoomed(camera: CameraModel, factor: float) -> CameraModel:
+    """`camera` with a lens of `factor` times its focal length."""
+    return replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
 
 
 def levelled(camera: CameraModel, attitude: GimbalAttitude, vehicle: Odometry) -> CameraModel:

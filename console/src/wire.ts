@@ -261,6 +261,7 @@ export interface WaypointEntry {
     [k: string]: string;
   };
   deadline?: number | null;
+  focus?: number | null;
   gimbal_pitch?: number | null;
   gimbal_yaw?: number | null;
   hover_duration?: number;
@@ -276,6 +277,7 @@ export interface WaypointEntry {
   y: number;
   yaw?: number | null;
   z: number;
+  zoom?: number | null;
 }
 /**
  * How far a recording has been read, and the flight once it was.

@@ -121,6 +121,7 @@ def cover(
             speed=speed,
             gimbal_pitch=down,
             trigger_distance=distance,
+            zoom=0.0 if camera is not None and camera.zooms else None,
         )
         for number, ((x, y), distance) in enumerate(zip(way.places, spacings, strict=True), start=1)
     )

@@ -40,6 +40,9 @@ class SurveyCamera:
     interval: float | None = None
     """Seconds that it needs from one picture to the next; None where that is not known."""
 
+    zooms: bool = False
+    """Whether its lens has to be set to its widest, which `horizontal_fov` is."""
+
     def __post_init__(self) -> None:
         """Check the numbers."""
         if not (0.0 < self.horizontal_fov < _HALF_TURN and self.aspect > 0.0):

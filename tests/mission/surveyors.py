@@ -20,6 +20,7 @@ from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.payload import (
     GimbalAttitude,
     GimbalTarget,
+    LensTarget,
     Photo,
     PhotoFailure,
     PhotoOutcome,
@@ -76,6 +77,9 @@ class Camera:
     gimbal: Gimbal | None
     refuses: str = ""
     silent: bool = False
+    lens_refuses: str = ""
+    lens_hangs: bool = False
+    lens: list[LensTarget] = field(default_factory=list)
     lies: bool = False
     """Answers with other numbers."""
     asked: list[str] = field(default_factory=list)
@@ -92,6 +96,20 @@ class Camera:
             told = number + 100 if self.lies else number
             self._ready.append(Photo(told, self.clock.now, label, gimbal=attitude))
         return number
+
+    def adjust(self, target: LensTarget) -> None:
+        """Set the lens."""
+        self.lens.append(target)
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether it is set."""
+        return not self.lens_hangs
+
+    @property
+    def lens_fault(self) -> str:
+        """Why it is not."""
+        return self.lens_refuses
 
     def outcomes(self) -> list[PhotoOutcome]:
         """What came of it."""

@@ -61,6 +61,14 @@ def test_pictures_are_taken_where_they_were_planned(wind: float, speed: float) -
         assert 0.58 < 1.0 - (high - low) / across < 0.65
 
 
+def test_a_lens_that_zooms_is_set_to_what_was_planned_with() -> None:
+    """Whatever it was left at; without a zoom nothing is set."""
+    for settings, zoom in (({**DOWN, "zoom": 4}, 0.0), (DOWN, None)):
+        camera = survey_camera(surveying("simulated", settings))
+        survey = plan_survey(surveying(), FIELD, SurveySettings(10.0, camera=camera))
+        assert {one.zoom for one in survey.waypoints} == {zoom}
+
+
 def test_a_robot_has_its_camera() -> None:
     """View, aspect and pixels of the file; its own gimbal or its mount."""
     hung = survey_camera(surveying())

@@ -22,6 +22,7 @@ _AXES = (
     mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
 )
 _YAW_AXIS = mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
+_LENS = {mavlink.MAV_CMD_SET_CAMERA_ZOOM: "zoom", mavlink.MAV_CMD_SET_CAMERA_FOCUS: "focus"}
 _SHUTTER = 0.3
 """Seconds from a request to the word of its picture."""
 
@@ -53,6 +54,9 @@ class EmulatedPayload:
         """Targets that came without a command."""
         self.nonsense = False
         """Its attitude is not a number."""
+        self.lens: dict[str, float] = {}
+        """Percent of zoom and focus, as set."""
+        self.lens_refuses = False
         self.mute = False
         """Pictures are taken, and not told."""
         self.interval: float | None = None
@@ -84,7 +88,15 @@ class EmulatedPayload:
                 return mavlink.MAV_RESULT_DENIED
             self._turn_to(*(math.radians(value) for value in values[:2]))
             return _OK
-        if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE and self.has_camera:
+        return self._obey_camera(number, values) if self.has_camera else None
+
+    def _obey_camera(self, number: int, values: tuple[float, ...]) -> Any | None:  # noqa: ANN401
+        if number in _LENS:
+            if self.lens_refuses or values[0] != mavlink.ZOOM_TYPE_RANGE:
+                return mavlink.MAV_RESULT_DENIED
+            self.lens[_LENS[number]] = values[1]
+            return _OK
+        if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE:
             if self.camera_refuses:
                 return mavlink.MAV_RESULT_FAILED
             if not self.blind:

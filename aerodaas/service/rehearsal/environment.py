@@ -15,7 +15,7 @@ __all__ = ["rehearsal_config"]
 
 _LENS = (
     *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
-    *("gimbal", "photo_interval"),
+    *("gimbal", "photo_interval", "zoom"),
 )
 """Settings of a camera that its simulated twin has as well."""
 _CELL_VOLTS = 3.9

@@ -22,8 +22,9 @@ from aerodaas.drivers.mavlink.microservices.camera_status import (
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import HealthItem, Verdict
-from aerodaas.types.payload import CameraStatus, Photo, PhotoFailure
+from aerodaas.types.payload import CameraStatus, LensCamera, LensTarget, Photo, PhotoFailure
 from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
@@ -250,3 +251,51 @@ def test_what_is_not_told_is_not_known() -> None:
     assert capture_status(told) == CaptureStatus(3, None, None, None)
     assert str(CameraStatus("camera")) == "tells nothing of itself"
     assert str(CameraStatus("camera", interval=0.0)) == "takes more"
+
+
+ABLE = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
+
+
+def lens_of(ends: Stepped) -> LensCamera:
+    """The camera, whose lens can be set."""
+    camera = ends.vehicle.photo_camera
+    assert isinstance(camera, LensCamera)
+    return camera
+
+
+def test_zoom_and_focus_are_set_in_percent(ends: Stepped) -> None:
+    """Acknowledged before it counts; what the camera says that it has not is refused at once."""
+    with ends:
+        payload(ends).flags = ABLE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS
+        found(ends)
+        camera = lens_of(ends)
+        camera.adjust(LensTarget(40.0, 100.0))
+        assert not camera.adjusted
+        wait(ends, lambda: camera.adjusted)
+        assert payload(ends).lens == {"zoom": 40.0, "focus": 100.0}
+        payload(ends).lens_refuses = True
+        camera.adjust(LensTarget(10.0))
+        wait(ends, lambda: camera.lens_fault)
+        assert (camera.adjusted, camera.lens_fault) == (False, "zoom: denied")
+        payload(ends).lens_refuses = False
+        camera.adjust(LensTarget(20.0))
+        wait(ends, lambda: camera.adjusted)
+        assert payload(ends).lens["zoom"] == 20.0
+
+
+def test_a_lens_without_zoom_or_focus_is_told(ends: Stepped) -> None:
+    """By the flags of its CAMERA_INFORMATION; the drone flies on."""
+    with ends:
+        payload(ends).flags = ABLE
+        found(ends)
+        with pytest.raises(VehicleError, match="focus of the camera cannot be set"):
+            lens_of(ends).adjust(LensTarget(focus=3.0))
+        stop = Waypoint("a", 3, 0, 2, zoom=30.0, focus=5.0, photo=True)
+        mission = fly_to(ends, [stop], MissionConfig(photo_timeout=4.0))
+        assert mission.status.photos == (0, 1)
+        assert told(mission) == ["a: no picture: the focus of the camera cannot be set"]
+        camera = lens_of(ends)
+        ends.autopilot.components[CAMERA].vanished = True
+        ends.watch(6.0)
+        with pytest.raises(VehicleError, match="no camera answers"):
+            camera.adjust(LensTarget(30.0))

@@ -22,6 +22,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
 from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
@@ -179,7 +180,8 @@ class PayloadComponent:
         self._informed = True
         self._model = camera_model_told(information)
         if self.camera is None and _takes_pictures(information):
-            self.camera = MavlinkCamera(self.commander, self._moment, self._count)
+            lens = MavlinkLens(self.commander, int(information.flags))
+            self.camera = MavlinkCamera(self.commander, lens, self._moment, self._count)
         films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
         wanted = [_STORAGE, _CAPTURE] if self.camera is not None else []
         for message in [*wanted, _VIDEO] if films else wanted:

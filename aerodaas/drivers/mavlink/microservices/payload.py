@@ -30,6 +30,7 @@ from aerodaas.types.payload import (
     Gimbal,
     GimbalAttitude,
     GimbalTarget,
+    LensTarget,
     PhotoCamera,
     PhotoOutcome,
 )
@@ -238,6 +239,28 @@ class _Cameras:
             if camera is None:
                 raise VehicleError("no camera answers any more")
             return camera.take_photo(label, time.monotonic())
+
+    def adjust(self, target: LensTarget) -> None:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            if camera is None:
+                raise VehicleError("no camera answers any more")
+            camera.lens.adjust(target, time.monotonic())
+
+    @property
+    def adjusted(self) -> bool:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            return camera is not None and camera.lens.adjusted
+
+    @property
+    def lens_fault(self) -> str:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            return "" if camera is None else camera.lens.fault
 
     def outcomes(self) -> list[PhotoOutcome]:
         """See `PhotoCamera`."""

@@ -19,6 +19,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     CommandResult,
     PendingCommand,
 )
+from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.data import Odometry
@@ -56,10 +57,12 @@ class MavlinkCamera:
     def __init__(
         self,
         commander: Commander,
+        lens: MavlinkLens,
         moment: Moment,
         count: Iterator[int],
     ) -> None:
         """Command it by `commander`; `count` numbers the pictures of all cameras."""
+        self.lens = lens
         self._commander = commander
         self._moment = moment
         self._count = count
