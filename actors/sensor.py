@@ -7,7 +7,14 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.stream_names import end_stream
-from aerodaas.cameras.base import Camera, GimballedCamera, Picture, ToldCamera, most_memory
+from aerodaas.cameras.base import (
+    Camera,
+    GimballedCamera,
+    Picture,
+    ToldCamera,
+    ZoomingCamera,
+    most_memory,
+)
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
@@ -55,6 +62,7 @@ class SensorActor(StreamActor):
         self._camera.open()
         self._told_camera = self._camera if isinstance(self._camera, ToldCamera) else None
         self._gimballed = self._camera if isinstance(self._camera, GimballedCamera) else None
+        self._zooming = self._camera if isinstance(self._camera, ZoomingCamera) else None
         self._frames = self.publisher(self._stream)
         self._commands = self.publisher(end_stream(self._stream))
 
@@ -84,6 +92,8 @@ class SensorActor(StreamActor):
         vehicle = self._vehicle
         if self._gimballed is not None and vehicle is not None:
             self._gimballed.follow_gimbal(vehicle.gimbal)
+        if self._zooming is not None and vehicle is not None:
+            self._zooming.follow_zoom(vehicle.zoom)
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
         # Before the frame: mission time may wait for the frame's readers, and then advance.

@@ -13,7 +13,7 @@ from aerodaas.types.geometry import CameraModel
 from aerodaas.types.payload import GimbalAttitude
 from aerodaas.types.records import valued
 
-__all__ = ["Camera", "GimballedCamera", "Picture", "most_memory"]
+__all__ = ["Camera", "GimballedCamera", "Picture", "ToldCamera", "ZoomingCamera", "most_memory"]
 
 
 @valued
@@ -84,6 +84,15 @@ class GimballedCamera(Camera, Protocol):
 
     def follow_gimbal(self, attitude: GimbalAttitude | None) -> None:
         """Look as the gimbal does at the next image; None: as mounted."""
+        ...
+
+
+@runtime_checkable
+class ZoomingCamera(Camera, Protocol):
+    """A camera whose view the vehicle's lens narrows."""
+
+    def follow_zoom(self, percent: float | None) -> None:
+        """See as the lens does at the next image, percent of its range; None: as calibrated."""
         ...
 
 

@@ -13,7 +13,7 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import CameraModel
-from aerodaas.types.payload import GimbalAttitude, levelled
+from aerodaas.types.payload import GimbalAttitude, levelled, zoomed
 
 if TYPE_CHECKING:
     from aerodaas.simulation.renderer import Renderer
@@ -22,7 +22,7 @@ __all__ = ["SimulatedCamera"]
 
 
 class SimulatedCamera:
-    """A pinhole camera in the simulated world: a `aerodaas.cameras.base.GimballedCamera`.
+    """A pinhole camera in the simulated world: a `GimballedCamera` and a `ZoomingCamera`.
 
     Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
     environment's world is invalid.
@@ -43,13 +43,15 @@ class SimulatedCamera:
             pitch=math.radians(config.pitch),
             yaw=math.radians(config.yaw),
         )
+        self._most_zoom = config.zoom
         self._gimbal: GimbalAttitude | None = None
+        self._zoom = 1.0
         self._depth_range = config.depth_range
         self._renderer: Renderer | None = None
 
     @property
     def model(self) -> CameraModel:
-        """Calibration and mount; on a gimbal, as it held the camera at the newest image."""
+        """Calibration and mount, as lens and gimbal had the camera at the newest image."""
         return self._model
 
     @property
@@ -74,6 +76,10 @@ class SimulatedCamera:
         """Look as the gimbal does at the next image."""
         self._gimbal = attitude
 
+    def follow_zoom(self, percent: float | None) -> None:
+        """See as the lens is set at the next image; None: as calibrated."""
+        self._zoom = 1.0 + (self._most_zoom - 1.0) * (percent or 0.0) / 100.0
+
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Render at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
 
@@ -83,8 +89,9 @@ class SimulatedCamera:
             raise SourceError(f"{self._name} is not open; call open first")
         if pose is None:
             return None
-        if self._gimbal is not None:
-            self._model = levelled(self._mounted, self._gimbal, pose)
+        if self._gimbal is not None or self._most_zoom > 1.0:
+            model = zoomed(self._mounted, self._zoom)
+            self._model = model if self._gimbal is None else levelled(model, self._gimbal, pose)
             self._renderer.turn(self._model)
         image = self._renderer.render(seconds(stamp), pose)
         return Picture(image, stamp, depth=self._renderer.depth())

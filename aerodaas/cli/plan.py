@@ -73,6 +73,9 @@ def _pictures(waypoint: Waypoint) -> str:
     elif waypoint.gimbal is not None:
         pitch, yaw = map(math.degrees, (waypoint.gimbal.pitch, waypoint.gimbal.yaw))
         said.append(f", gimbal at pitch {pitch:.0f}, yaw {yaw:.0f} degrees")
+    for name, percent in (("zoom", waypoint.zoom), ("focus", waypoint.focus)):
+        if percent is not None:
+            said.append(f", {name} at {percent:g} %")
     return "".join([*said, ", a picture" if waypoint.photo else ""])
 
 

@@ -46,6 +46,8 @@ class PreflightConfig(Strict):
     """Whether it comes home by itself once this process is gone."""
     remote_id: PreflightLevel = "warn"
     """Whether a Remote ID transmitter says that it is ready."""
+    camera: PreflightLevel = "warn"
+    """Whether each camera that tells of its card has room on it."""
     cell_voltage: Positive = 3.5
     """Volts of a cell at least."""
     cell_spread: Positive = 0.15

@@ -12,7 +12,10 @@ from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 
 __all__ = ["catalogue", "redacted"]
 
-_CALIBRATION = ("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range")
+_CALIBRATION = (
+    *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
+    *("gimbal", "photo_interval", "zoom"),
+)
 """Settings of a sensor that anybody may know."""
 _NOWHERE = "http://{}.invalid"
 """An address that leads nowhere, for whatever has one at its owner's (RFC 2606, section 2)."""

@@ -16,6 +16,7 @@ from aerodaas.config.traffic import TrafficConfig
 from aerodaas.types.identifiers import Identifier
 
 __all__ = [
+    "SIMULATED_INTERVAL",
     "CameraConfig",
     "GeofenceConfig",
     "GimbalConfig",
@@ -25,7 +26,8 @@ __all__ = [
     "SensorConfig",
 ]
 
-
+SIMULATED_INTERVAL = 0.5
+"""Seconds from one picture to the next of a simulated camera whose settings say nothing of it."""
 T = TypeVar("T")
 Personal = Annotated[T, PlainSerializer(lambda _: None, return_type=None, when_used="json")]
 """A setting about a person, which no recording and no other JSON has."""
@@ -172,7 +174,7 @@ class SensorConfig(Strict):
 
 
 class GimbalConfig(Strict):
-    """The gimbal of a simulated camera, which keeps it to the horizon."""
+    """The gimbal of a camera, which keeps it to the horizon."""
 
     max_rate: Positive = 60.0
     """Degrees per second at which it turns."""
@@ -199,8 +201,15 @@ class CameraConfig(Strict):
     depth_range: Annotated[float, Field(ge=3, le=60)] | None = None
     """Metres up to which a simulated camera measures depth as well; None: it measures none."""
     gimbal: GimbalConfig | None = None
-    """The gimbal that a simulated camera hangs from, pitched and turned as above at first; None:
-    it is bolted to the body."""
+    """The gimbal that it hangs from, pitched and turned as above at first; None: it is bolted to
+    the body. A simulated camera's is simulated; of another one it says that there is a gimbal, for
+    surveys that are planned."""
+    zoom: Annotated[float, Field(ge=1, le=200)] = 1.0
+    """How many times narrower than `horizontal_fov` a simulated camera sees at most, by its focal
+    length; 1: its lens has no zoom."""
+    photo_interval: Positive | None = None
+    """Seconds that it needs from one picture to the next; None: 0.5 in simulation, and otherwise
+    not known."""
     path: SecretUrl | None = None
     """Folder of pictures, video file or URL, for the drivers that read one; `mavlink` for where a
     MAVLink vehicle itself says that its video is. User, password and parameters of a URL are shown,

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.mission.survey import SurveySettings, plan_survey
-from aerodaas.protocol.piloting import SurveyIn, SurveyOut
+from aerodaas.mission.survey_photos import SurveyPhotos, survey_camera
+from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
 from aerodaas.schedulers.trajectory.coverage import footprint
 from aerodaas.types.errors import MissionError
 
@@ -38,13 +39,7 @@ class SurveyPlanner:
         robot = next((one for one in config.robots if one.id == wanted.robot), None)
         if robot is None or status is None:
             raise MissionError(f"{wanted.robot} does not fly in this mission")
-        width = wanted.width
-        if width is None:
-            assert wanted.field_of_view is not None  # noqa: S101 - checked by the model
-            width, _ = footprint(wanted.height, wanted.field_of_view)
-        settings = SurveySettings(
-            wanted.height, width, wanted.overlap, wanted.angle, wanted.speed, wanted.around
-        )
+        settings = _settings(robot, wanted)
         start, wind = _start(status, robot.start), np.array(config.simulation.wind)
         if not self._busy.acquire(timeout=_PATIENCE):
             raise MissionError("other surveys are being planned: ask again in a moment")
@@ -58,7 +53,8 @@ class SurveyPlanner:
         reserve = robot.limits.battery_land
         return SurveyOut(
             waypoints=[WaypointEntry.of(one) for one in named],
-            width=width,
+            height=settings.height,
+            width=settings.strips[0],
             angle=survey.angle,
             sweeps=survey.sweeps,
             length=survey.length,
@@ -66,7 +62,48 @@ class SurveyPlanner:
             battery=survey.battery,
             available=None if status.battery is None else max(0.0, status.battery - reserve),
             start=start,
+            photos=_photos(survey.photos),
         )
+
+
+def _settings(robot: RobotConfig, wanted: SurveyIn) -> SurveySettings:
+    """How the survey is flown; raises SchedulerError for a camera that cannot survey."""
+    if wanted.camera is not None:
+        camera = survey_camera(
+            robot,
+            wanted.camera,
+            front_overlap=wanted.front_overlap,
+            side_overlap=wanted.overlap,
+        )
+        return SurveySettings.by_camera(
+            camera,
+            height=wanted.height,
+            ground_resolution=wanted.ground_resolution,
+            angle=wanted.angle,
+            speed=wanted.speed,
+            around=wanted.around,
+        )
+    assert wanted.height is not None  # noqa: S101 - checked by the model
+    width = wanted.width
+    if width is None:
+        assert wanted.field_of_view is not None  # noqa: S101 - checked by the model
+        width, _ = footprint(wanted.height, wanted.field_of_view)
+    return SurveySettings(
+        wanted.height, width, wanted.overlap, wanted.angle, wanted.speed, wanted.around
+    )
+
+
+def _photos(photos: SurveyPhotos | None) -> SurveyPhotosOut | None:
+    if photos is None:
+        return None
+    return SurveyPhotosOut(
+        places=[(round(east, 2), round(north, 2)) for east, north in photos.places],
+        spacing=photos.spacing,
+        interval=photos.interval,
+        line_spacing=photos.line_spacing,
+        resolution=photos.resolution,
+        warning=photos.warning,
+    )
 
 
 def _start(status: StatusOut, takeoff: tuple[float, float, float]) -> tuple[float, float, float]:

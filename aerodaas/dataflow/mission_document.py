@@ -36,6 +36,7 @@ __all__ = [
 ]
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
+_Percent = Annotated[float, Field(ge=0, le=100)]
 _HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
@@ -113,6 +114,9 @@ class WaypointEntry(BaseModel):
     """Seconds between pictures on the way there and during the stay."""
     look_at: Annotated[tuple[_Number, _Number, _Number], Strict(strict=False)] | None = None
     """Place that is looked at, counted as x, y and z are."""
+    zoom: _Percent | None = None
+    """Of the camera's zoom, set on the way there; 0 sees most."""
+    focus: _Percent | None = None
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:

@@ -88,7 +88,7 @@ class SimulatedVehicle:
         for sensor in robot.sensors:
             if sensor.type == "camera" and environment.camera_driver(sensor) == "simulated":
                 settings = camera_settings(sensor)
-                self._camera = SimulatedPhotoCamera()
+                self._camera = SimulatedPhotoCamera(settings)
                 if settings.gimbal is not None:
                     self._gimbal = SimulatedGimbal(settings.gimbal, settings)
                 break
@@ -175,6 +175,7 @@ class SimulatedVehicle:
             tuple(self._faults()),
             ended=self._autopilot.ended,
             gimbal=None if self._gimbal is None else self._gimbal.attitude,
+            zoom=None if self._camera is None else self._camera.zoom,
             actuators=dict(self._actuators.positions),
         )
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from aerodaas.config.actuators import actuator_objection, parachute_objection
 from aerodaas.config.model import RobotConfig
@@ -23,6 +25,8 @@ from aerodaas.mission.commands import (
     Resume,
     TakeBack,
 )
+from aerodaas.mission.survey import Survey, SurveySettings, plan_survey
+from aerodaas.mission.survey_photos import survey_camera
 from aerodaas.types.errors import GraphError, UnknownIdError
 
 if TYPE_CHECKING:
@@ -61,6 +65,53 @@ class Robot(PaperNames, IRobot):
         """Return True if the robot is navigable: its driver takes setpoints."""
         capabilities = load_vehicle(self.config, self._environment.config).capabilities
         return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
+
+    def plan_survey(
+        self,
+        area: Sequence[tuple[float, float]],
+        *,
+        height: float | None = None,
+        ground_resolution: float | None = None,
+        camera: str | None = None,
+        front_overlap: float = 0.75,
+        side_overlap: float = 0.65,
+        angle: float | None = None,
+        speed: float | None = None,
+        around: bool = False,
+    ) -> Survey:
+        """Plan the survey of an area by one of this robot's cameras; nothing is flown.
+
+        Its `waypoints` are flown by `navigate`, and its `photos` say what is taken where.
+
+        Args:
+            area: 3 to 30 corners, metres east and north of the environment's home.
+            height: Metres above home; or else `ground_resolution`.
+            ground_resolution: Metres of ground in one pixel, from which the height follows.
+            camera: Id of a camera that looks straight down or hangs from a gimbal; None for the
+                first one.
+            front_overlap: Share of a picture, 0 to less than 1, in common with the next one.
+            side_overlap: The same with the one beside it on the next line.
+            angle: Direction of the lines, radians counter-clockwise from east; None for the
+                shortest path.
+            speed: m/s; None for the robot's cruise speed.
+            around: Whether no-fly zones within the area are flown around, and not refused.
+
+        Raises:
+            SchedulerError: If the camera cannot survey, or the area cannot be flown over.
+        """
+        lens = survey_camera(
+            self.config, camera, front_overlap=front_overlap, side_overlap=side_overlap
+        )
+        settings = SurveySettings.by_camera(
+            lens,
+            height=height,
+            ground_resolution=ground_resolution,
+            angle=angle,
+            speed=speed,
+            around=around,
+        )
+        wind = np.array(self._environment.config.simulation.wind)
+        return plan_survey(self.config, area, settings, wind=wind)
 
     def navigate(self, data: IAeroData[Any]) -> None:
         """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.

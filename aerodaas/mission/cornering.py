@@ -111,4 +111,5 @@ def _stays(waypoint: Waypoint) -> bool:
         or waypoint.photo
         or waypoint.actuate
         or waypoint.gimbal is not None
+        or waypoint.lens is not None
     )

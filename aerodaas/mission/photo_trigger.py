@@ -13,7 +13,7 @@ import numpy as np
 
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length
+from aerodaas.types.geometry import Vector, length, wrap_angle
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["PhotoTrigger"]
@@ -30,8 +30,11 @@ _ASIDE = 0.2
 """Metres beside the line within which a drone flies on it."""
 _ACROSS = 0.4
 """m/s across the line at which it would leave it."""
+_ALONG = 0.1
+"""Radians from the line within which its nose looks along it: a picture that is turned by as much
+loses a tenth of its overlap at the edges."""
 _ALIGNING = 4 * NANOSECONDS
-"""Nanoseconds that a drone gets to come onto the line before its pictures begin."""
+"""Nanoseconds that a drone gets to come onto the line, and to turn, before its pictures begin."""
 _AHEAD = (8.0, 3.0)
 """Metres on the line that a drone aims ahead at least, and seconds of its flight: twice the way in
 which it would brake, so that the point ahead never slows it down."""
@@ -83,10 +86,11 @@ class PhotoTrigger:
         level = self.distance is not None and math.hypot(east, north) > _ROUNDING
         return math.atan2(north, east) if level else None
 
-    def place_ahead(self, odometry: Odometry, now: int) -> Vector | None:
+    def place_ahead(self, odometry: Odometry, now: int, *, turns: bool = True) -> Vector | None:
         """Where to fly so that the drone is on the line, ENU metres; None for straight to its end.
 
-        At first that is the line itself: a drone that comes round a corner has slid beside it.
+        At first that is the line itself: a drone that comes round a corner has slid beside it, and
+        its nose, where it `turns` along the line, is not there yet.
         """
         if self.distance is None or self._length < _ROUNDING or not _is_finite(odometry):
             return None
@@ -97,11 +101,19 @@ class PhotoTrigger:
             across = odometry.velocity - along * float(np.dot(odometry.velocity, along))
             slid = length(offset - along * max(progress, 0.0))
             on_line = slid <= _ASIDE and length(across) <= _ACROSS
-            self._aligned = on_line or now - self._begin > _ALIGNING
+            ready = on_line and not (turns and self._looks_aside(odometry))
+            self._aligned = ready or now - self._begin > _ALIGNING
         least, moment = _AHEAD
         lead = max(least, moment * length(odometry.velocity)) if self._aligned else 0.0
         ahead = min(max(progress, 0.0) + lead, self._length)
         return self._start + along * ahead
+
+    def _looks_aside(self, odometry: Odometry) -> bool:
+        """Whether the nose is known to look elsewhere than along the line."""
+        bearing, yaw = self.bearing, odometry.yaw
+        if bearing is None or not math.isfinite(yaw):
+            return False
+        return abs(wrap_angle(yaw - bearing)) > _ALONG
 
     @property
     def awaits(self) -> bool:
@@ -113,6 +125,15 @@ class PhotoTrigger:
         if self.distance is None or not self.awaits:
             return False
         return (self._length + _ROUNDING - self._next) % self.distance <= radius + _ROUNDING
+
+    def pass_all(self) -> list[Vector]:
+        """Places by distance that are not passed yet, ENU metres in order; they are from now on."""
+        places: list[Vector] = []
+        while self.distance is not None and self.awaits:
+            share = self._next / self._length if self._length > _ROUNDING else 0.0
+            places.append(self._start + self._way * share)
+            self._next += self.distance
+        return places
 
     def passed(self, odometry: Odometry, now: int, arrived_at: int | None) -> int:
         """How many pictures have become due since the last call; more than one is too late.

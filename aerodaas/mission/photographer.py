@@ -21,7 +21,7 @@ from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import VehicleError, failure_line
 from aerodaas.types.geometry import Vector
-from aerodaas.types.payload import Gimbal, GimbalTarget, Photo
+from aerodaas.types.payload import Gimbal, GimbalTarget, LensCamera, LensTarget, Photo
 from aerodaas.types.vehicle import PayloadVehicle
 
 __all__ = ["Photographer"]
@@ -63,6 +63,8 @@ class Photographer:
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
         self._served: _Task | None = None
+        self._lens: LensTarget | None = None
+        """What the camera's lens was last told."""
 
     @property
     def photos(self) -> list[Photo]:
@@ -89,7 +91,8 @@ class Photographer:
         if task is None:
             return place, heading
         straight = np.array_equal(place, task.stop.waypoint.position)
-        ahead = task.trigger.place_ahead(odometry, now) if straight else None
+        turns = heading is None and task.stop.waypoint.yaw is None
+        ahead = task.trigger.place_ahead(odometry, now, turns=turns) if straight else None
         if ahead is None:
             return place, heading
         return ahead, task.trigger.bearing if heading is None else heading
@@ -139,7 +142,7 @@ class Photographer:
             earlier = before.trigger if before and follows else None
             trigger = PhotoTrigger(waypoint, start, now, earlier)
             task = self._tasks[stop.id] = _Task(stop, waypoint.gimbal, trigger)
-            task.over = waypoint.gimbal is None and not waypoint.photo
+            task.over = waypoint.gimbal is None and waypoint.lens is None and not waypoint.photo
         self._served = task
         if waypoint.look_at is not None:
             self._gaze.at(np.array(waypoint.look_at))
@@ -177,14 +180,15 @@ class Photographer:
             raise VehicleError("the vehicle has no gimbal, or none that answers")
         if task.stop.waypoint.photo and self._shutter.camera is None:
             raise VehicleError(NO_CAMERA)
+        lens = self._lens_set(task)
         there = self._gaze.place is None or self._gaze.there
         if gimbal is not None and task.aim is not None:
             there = self._aims(task, gimbal, now)
         if task.began is None:
             return
         if seconds(now - task.began) > self._timeout:
-            raise VehicleError(self._lateness(gimbal, now))
-        if not there or self._shutter.busy:
+            raise VehicleError(self._lateness(gimbal, now, lens=lens))
+        if not (there and lens) or self._shutter.busy:
             return
         if task.stop.waypoint.photo:
             task.request = self._shutter.take(task.stop.id, now)
@@ -210,10 +214,33 @@ class Photographer:
             task.aim = gimbal.aim(task.aim)
         return there and not untold
 
-    def _lateness(self, gimbal: Gimbal | None, now: int) -> str:
+    def _lens_set(self, task: _Task) -> bool:
+        """Whether the camera's lens is as it is to be; tells it if not, raises what it objects."""
+        target = task.stop.waypoint.lens
+        if target is None:
+            return True
+        camera = self._shutter.camera
+        if camera is None:
+            raise VehicleError(NO_CAMERA)
+        if not isinstance(camera, LensCamera):
+            raise VehicleError("the camera has neither zoom nor focus that could be set")
+        if target != self._lens:
+            self._lens = None
+            camera.adjust(target)
+            self._lens = target
+            return False
+        if camera.lens_fault:
+            # The same waypoint may ask for it again.
+            self._lens = None
+            raise VehicleError(f"the camera's lens: {camera.lens_fault}")
+        return camera.adjusted
+
+    def _lateness(self, gimbal: Gimbal | None, now: int, *, lens: bool) -> str:
         """What was missing when time was up."""
         if self._shutter.busy:
             return f"the camera was busy for {self._timeout:g} s"
+        if not lens:
+            return f"the lens was not set within {self._timeout:g} s"
         if gimbal is None:
             return f"the nose did not turn to the place within {self._timeout:g} s"
         attitude = fresh(gimbal.attitude, now)
@@ -231,7 +258,8 @@ class Photographer:
         if task.stop.waypoint.photo:
             self._shutter.lose(task.stop.id, reason, now)
         else:
-            self._log.alert(now, "photo", f"{task.stop.id}: gimbal not aimed: {reason}")
+            what = "gimbal not aimed" if task.aim is not None else "lens not set"
+            self._log.alert(now, "photo", f"{task.stop.id}: {what}: {reason}")
 
     def _gimbal(self) -> Gimbal | None:
         return None if self._vehicle is None else self._vehicle.gimbal

@@ -12,7 +12,9 @@ import shapely
 
 from aerodaas.config.model import LimitsConfig, RobotConfig
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.survey_photos import SurveyPhotos, planned_photos
 from aerodaas.schedulers.trajectory.coverage import cover
+from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import SchedulerError
 from aerodaas.types.free_path import Place
@@ -35,8 +37,8 @@ class SurveySettings:
 
     height: float
     """Metres above home."""
-    width: float
-    """Metres of ground that the camera sees across the sweep; see `coverage.footprint`."""
+    width: float | None = None
+    """Metres of ground that is seen across the sweep; see `coverage.footprint`. None: `camera`."""
     overlap: float = 0.2
     """Share of it, 0 to less than 1, that neighbouring strips have in common."""
     angle: float | None = None
@@ -45,6 +47,44 @@ class SurveySettings:
     """m/s; None for the robot's cruise speed."""
     around: bool = False
     """Fly around no-fly zones within the area, which stay unseen; otherwise they are refused."""
+    camera: SurveyCamera | None = None
+    """Who takes pictures on the strips, in the place of `width` and `overlap`, which it knows; see
+    `survey_photos.survey_camera`."""
+
+    @classmethod
+    def by_camera(
+        cls,
+        camera: SurveyCamera,
+        *,
+        height: float | None = None,
+        ground_resolution: float | None = None,
+        angle: float | None = None,
+        speed: float | None = None,
+        around: bool = False,
+    ) -> SurveySettings:
+        """Survey with `camera` from `height`, or from where a pixel is `ground_resolution` metres.
+
+        Raises SchedulerError unless one of the two is given, and for a resolution that is none.
+        """
+        if (height is None) == (ground_resolution is None):
+            raise SchedulerError("a survey needs a height or a ground resolution: give it one")
+        if ground_resolution is not None:
+            height = camera.height(ground_resolution)
+        assert height is not None  # noqa: S101 - given, or by the resolution
+        return cls(height, angle=angle, speed=speed, around=around, camera=camera)
+
+    @property
+    def strips(self) -> tuple[float, float]:
+        """Metres of ground seen across the sweep, and the share that neighbours have in common.
+
+        Raises SchedulerError unless there is either a width or a camera.
+        """
+        if (self.width is None) == (self.camera is None):
+            raise SchedulerError("a survey needs a width or a camera: give it one of them")
+        if self.camera is not None:
+            return self.camera.footprint(self.height)[0], self.camera.side_overlap
+        assert self.width is not None  # noqa: S101 - or there is a camera
+        return self.width, self.overlap
 
 
 @dataclass(frozen=True)
@@ -62,6 +102,8 @@ class Survey:
     """From the start to the last waypoint, the way to the first one included."""
     battery: float
     """Charge, 0 to 1, from the start through the survey home, by the energy model."""
+    photos: SurveyPhotos | None = None
+    """Of a survey with a camera."""
 
 
 def plan_survey(
@@ -85,16 +127,20 @@ def plan_survey(
         SchedulerError: If the area leaves the fence, enters a no-fly zone or is out of range, or
             the settings make no survey that can be flown.
     """
+    width, overlap = settings.strips
     limits, home = robot.limits, np.array(robot.start, dtype=np.float64)
     here = home if start is None else start
     speed = min(settings.speed or limits.cruise_speed, limits.max_speed)
-    _check(outline, settings, limits, home)
+    _check(outline, settings.height, limits, home)
+    _check_zones(outline, limits, around=settings.around)
+    _check_strips(outline, width * (1.0 - overlap))
     fence = limits.geofence
     plan = cover(
         outline,
         height=settings.height,
         width=settings.width,
-        overlap=settings.overlap,
+        overlap=overlap,
+        camera=settings.camera,
         no_fly=fence.no_fly,
         clearance=fence.margin + _TOLERANCE,
         start=(float(here[0]), float(here[1])),
@@ -107,6 +153,9 @@ def plan_survey(
             "flown: draw a smaller area, or make the strips wider"
         )
     _check_path(plan.waypoints, limits)
+    camera, photos = settings.camera, None
+    if camera is not None:
+        photos = planned_photos(plan.waypoints, camera, height=settings.height, speed=speed)
     model = EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
     return Survey(
         plan.waypoints,
@@ -115,19 +164,18 @@ def plan_survey(
         plan.length,
         _seconds([here, *(one.position for one in plan.waypoints)], speed, limits),
         model.route(here, plan.waypoints, home, speed),
+        photos,
     )
 
 
-def _check(
-    outline: Sequence[Place], settings: SurveySettings, limits: LimitsConfig, home: Vector
-) -> None:
+def _check(outline: Sequence[Place], height: float, limits: LimitsConfig, home: Vector) -> None:
     """Raise SchedulerError for an area that must not be flown over, before it is planned."""
     least = 3
     if not least <= len(outline) <= MOST_CORNERS:
         raise SchedulerError(f"an area has {least} to {MOST_CORNERS} corners, not {len(outline)}")
     outer = Geofence(limits.geofence.model_copy(update={"no_fly": []}))
     for east, north in outline:
-        corner = np.array([east, north, settings.height])
+        corner = np.array([east, north, height])
         away = float(np.linalg.norm(corner - home))
         if away > limits.max_range:
             raise SchedulerError(
@@ -143,19 +191,28 @@ def _check(
         )
     if outer.inner is not None and not outer.inner.buffer(_TOLERANCE).covers(area):
         raise SchedulerError("the area leaves the fence between two of its corners")
-    for zone in limits.geofence.no_fly:
+
+
+def _check_zones(outline: Sequence[Place], limits: LimitsConfig, *, around: bool) -> None:
+    """Raise SchedulerError for an area with a no-fly zone that is not to be flown around."""
+    area = shapely.Polygon(outline)
+    for zone in () if around else limits.geofence.no_fly:
         shared = area.intersection(shapely.Polygon(zone).buffer(limits.geofence.margin))
-        if not settings.around and shared.area > 0.0:
+        if shared.area > 0.0:
             place = shared.representative_point()
             raise SchedulerError(
                 f"the area enters a no-fly zone at ({place.x:.1f}, {place.y:.1f}): draw it "
                 "beside, or have it flown around"
             )
+
+
+def _check_strips(outline: Sequence[Place], apart: float) -> None:
+    """Raise SchedulerError for an area of more strips, `apart` metres from one another, than go."""
     longest = float(np.linalg.norm(np.ptp(np.asarray(outline), axis=0)))
-    if longest > _MOST_STRIPS * settings.width * (1.0 - settings.overlap):
+    if longest > _MOST_STRIPS * apart:
         raise SchedulerError(
-            f"{longest:.0f} m are more than {_MOST_STRIPS} strips of {settings.width:.2g} m: draw "
-            "a smaller area, or make the strips wider"
+            f"{longest:.0f} m are more than {_MOST_STRIPS} strips that lie {apart:.2g} m apart: "
+            "draw a smaller area, or make the strips wider"
         )
 
 

@@ -31,6 +31,7 @@ __all__ = [
     "SteerIn",
     "SurveyIn",
     "SurveyOut",
+    "SurveyPhotosOut",
 ]
 
 _MOST_WAYPOINTS = 1000
@@ -49,14 +50,20 @@ class SurveyIn(RequestModel):
     robot: Word
     area: Annotated[list[tuple[_Corner, _Corner]], Field(min_length=3, max_length=MOST_CORNERS)]
     """Corners, metres east and north."""
-    height: Annotated[float, Field(gt=0, le=_MOST_METRES, allow_inf_nan=False)]
-    """Metres above home."""
+    height: _Length | None = None
+    """Metres above home; with a camera, `ground_resolution` may be given instead."""
     width: _Length | None = None
-    """Metres of ground that the camera sees across the sweep; None takes `field_of_view`."""
+    """Metres of ground that are seen across the sweep."""
     field_of_view: Annotated[float, Field(gt=0.02, lt=3.1)] | None = None
-    """Of a camera that looks straight down, horizontally, radians."""
+    """In the place of a width: of a camera that looks straight down, horizontally, radians."""
+    camera: Word | None = None
+    """In the place of both: the robot's camera that takes pictures on the way, by its id."""
     overlap: Annotated[float, Field(ge=0, le=0.9)] = 0.2
     """Share of a strip that its neighbour sees, too."""
+    front_overlap: Annotated[float, Field(ge=0, le=0.95)] = 0.75
+    """Share of a camera's picture that the next one on the same strip shows, too."""
+    ground_resolution: Annotated[float, Field(gt=0, le=10)] | None = None
+    """Metres of ground in one pixel of the camera's picture, from which the height follows."""
     angle: Number | None = None
     """Direction of the sweeps, counter-clockwise from east; None for the shortest path."""
     speed: Annotated[float, Field(ge=0.1, le=100)] | None = None
@@ -68,15 +75,39 @@ class SurveyIn(RequestModel):
 
     @model_validator(mode="after")
     def _wide(self) -> Self:
-        if (self.width is None) == (self.field_of_view is None):
-            raise ValueError("give either the strip's width or the camera's field_of_view")
+        ways = (self.width, self.field_of_view, self.camera)
+        if sum(one is not None for one in ways) != 1:
+            raise ValueError("give either the strip's width, a field_of_view, or a camera")
+        if (self.height is None) == (self.ground_resolution is None):
+            raise ValueError("give either a height or a ground_resolution")
+        if self.ground_resolution is not None and self.camera is None:
+            raise ValueError("a ground_resolution is that of a camera: name the camera")
         return self
+
+
+class SurveyPhotosOut(AnswerModel):
+    """Pictures of a survey as they would be taken."""
+
+    places: list[tuple[float, float]]
+    """Metres east and north, in order."""
+    spacing: float
+    """Metres from one to the next on a line."""
+    interval: float
+    """Seconds from one to the next."""
+    line_spacing: float
+    """Metres between two lines at most."""
+    resolution: float | None
+    """Metres of ground in a pixel."""
+    warning: str
+    """Why some cannot be taken, with the remedy; empty where nothing is known against them."""
 
 
 class SurveyOut(AnswerModel):
     """A survey as it would be flown; its waypoints are added by `navigation`."""
 
     waypoints: list[WaypointEntry]
+    height: float
+    """Metres above home."""
     width: float
     """Metres of ground seen across the sweep."""
     angle: float
@@ -91,6 +122,8 @@ class SurveyOut(AnswerModel):
     """Charge that is there to spend, less the reserve; None while it is unknown."""
     start: tuple[float, float, float]
     """Where the drone will come from: its last coming waypoint, or where it is."""
+    photos: SurveyPhotosOut | None
+    """Null without a camera."""
 
 
 class RearrangeIn(RequestModel):

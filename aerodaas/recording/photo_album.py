@@ -88,6 +88,7 @@ class PhotoAlbum:
     def _render(self, robot: str, photo: Photo, path: Path) -> None:
         camera = self._camera(robot)
         camera.follow_gimbal(photo.gimbal)
+        camera.follow_zoom(photo.zoom)
         picture = camera.capture(photo.stamp, photo.truth)
         assert picture is not None  # noqa: S101 - the pose is known
         image = Image.fromarray(cv2.cvtColor(picture.image, cv2.COLOR_BGR2RGB))

@@ -10,14 +10,20 @@ from __future__ import annotations
 import math
 
 from aerodaas.config.model import CameraConfig, GimbalConfig
+from aerodaas.config.robot import SIMULATED_INTERVAL
 from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.payload import GimbalAttitude, GimbalTarget, Photo, PhotoOutcome, PhotoPlace
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.payload import (
+    GimbalAttitude,
+    GimbalTarget,
+    LensTarget,
+    Photo,
+    PhotoOutcome,
+    PhotoPlace,
+)
 from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["SimulatedGimbal", "SimulatedPhotoCamera"]
-
-_STORING = NANOSECONDS // 2
-"""Nanoseconds from exposure until the camera says that it has the picture."""
 
 
 class SimulatedGimbal:
@@ -57,8 +63,17 @@ class SimulatedGimbal:
 class SimulatedPhotoCamera:
     """A camera on board; implements `aerodaas.types.payload.PhotoCamera`."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: CameraConfig) -> None:
         """Have taken nothing yet."""
+        interval = (
+            SIMULATED_INTERVAL if settings.photo_interval is None else settings.photo_interval
+        )
+        self._storing_time = round(interval * NANOSECONDS)
+        """Nanoseconds from exposure until the camera says that it has the picture."""
+        self.zoom: float | None = 0.0 if settings.zoom > 1.0 else None
+        """Percent; None for a lens without."""
+        self.adjusted = True
+        self.lens_fault = ""
         self._taken = 0
         self._asked: list[tuple[int, str]] = []
         self._storing: list[Photo] = []
@@ -70,9 +85,17 @@ class SimulatedPhotoCamera:
         self._asked.append((self._taken, label))
         return self._taken
 
+    def adjust(self, target: LensTarget) -> None:
+        """Zoom at once; everything is in focus to it. Raises VehicleError without a zoom."""
+        if target.zoom is None:
+            return
+        if self.zoom is None:
+            raise VehicleError("the camera has no zoom")
+        self.zoom = target.zoom
+
     def outcomes(self) -> list[PhotoOutcome]:
         """Pictures that are stored by now."""
-        ready = [one for one in self._storing if one.stamp + _STORING <= self._now]
+        ready = [one for one in self._storing if one.stamp + self._storing_time <= self._now]
         self._storing = [one for one in self._storing if one not in ready]
         return list(ready)
 
@@ -98,6 +121,7 @@ class SimulatedPhotoCamera:
                 state.odometry,
                 state.gimbal,
                 state.truth,
+                zoom=state.zoom,
             )
             for number, label in self._asked
         ]

@@ -103,7 +103,9 @@ class Renderer:
         return pixels
 
     def turn(self, camera: CameraModel) -> None:
-        """Turn the camera as `camera` is mounted, whose lens is the same."""
+        """Turn the camera as `camera` is mounted, and zoom to its focal length."""
+        if camera.fx != self._camera.fx:
+            self._eye.node().get_lens().set_focal_length(camera.fx)
         self._camera, self._optical = camera, camera.body_from_optical
 
     def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from aerodaas.types.payload import CameraStatus
 from aerodaas.types.vehicle import Vehicle
 
 __all__ = [
@@ -54,6 +55,8 @@ class HealthReadings:
     """Why it would not come home by itself once this process is gone; empty if it would."""
     remote_id: str | None = None
     """What a Remote ID transmitter objects to; empty if it is ready."""
+    cameras: tuple[CameraStatus, ...] | None = None
+    """What its cameras say that they are and do; empty for none that has answered."""
 
 
 @runtime_checkable

@@ -10,22 +10,26 @@ horizon while the vehicle tilts; only its yaw turns along.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel, angles_of_rotation, rotation_from_rpy
 from aerodaas.types.records import fast_pickle
 
 __all__ = [
+    "CameraStatus",
     "Gimbal",
     "GimbalAttitude",
     "GimbalTarget",
+    "LensCamera",
+    "LensTarget",
     "Photo",
     "PhotoCamera",
     "PhotoFailure",
     "PhotoOutcome",
     "PhotoPlace",
     "levelled",
+    "zoomed",
 ]
 
 
@@ -38,6 +42,17 @@ class GimbalTarget:
     """Negative looks down."""
     yaw: float = 0.0
     """From the vehicle's nose, counter-clockwise."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class LensTarget:
+    """What a camera's lens is to be set to; percent of its range."""
+
+    zoom: float | None = None
+    """0 sees most, 100 least; None leaves it."""
+    focus: float | None = None
+    """0 is the nearest place that it can focus on, 100 the farthest; None leaves it."""
 
 
 @fast_pickle
@@ -88,6 +103,8 @@ class Photo:
     """The simulator's exact state at exposure, by which the picture is rendered."""
     file: str = ""
     """Name or URL by which the camera itself keeps it; empty where it tells none."""
+    zoom: float | None = None
+    """Percent of the lens's range; None where it is not known, and for a lens without."""
 
 
 @fast_pickle
@@ -99,6 +116,47 @@ class PhotoFailure:
     """That of `PhotoCamera.take_photo`."""
     reason: str
     """In a few words."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraStatus:
+    """What a camera says that it is and does; what is not told is None."""
+
+    name: str
+    """By which people know it, such as `camera (component 100)`."""
+    model: str = ""
+    pixels: tuple[int, int] | None = None
+    """Width and height of its pictures."""
+    view: float | None = None
+    """Degrees across its picture."""
+    free: float | None = None
+    """MiB that its card has left."""
+    trouble: str = ""
+    """Why it keeps no pictures, or soon will not; empty if it does."""
+    taken: int | None = None
+    """Pictures by its own count."""
+    interval: float | None = None
+    """Seconds between pictures that it takes by itself, 0 where it does not say; None while it
+    takes none."""
+    recording: float | None = None
+    """Seconds for which it has been recording video; None while it records none."""
+
+    def __str__(self) -> str:
+        """One line for people, without its name."""
+        said = [self.model]
+        if self.pixels is not None:
+            said.append(f"{self.pixels[0]}x{self.pixels[1]}")
+        if self.view is not None:
+            said.append(f"sees {self.view:.0f} degrees across")
+        if self.free is not None:
+            said.append(f"{self.free:.0f} MiB free")
+        if self.taken is not None:
+            said.append(f"{self.taken} pictures taken")
+        if self.interval is not None:
+            said.append(f"takes one every {self.interval:g} s" if self.interval else "takes more")
+        if self.recording is not None:
+            said.append(f"has been recording for {self.recording:.0f} s")
+        return ", ".join(one for one in said if one) or "tells nothing of itself"
 
 
 PhotoOutcome: TypeAlias = Photo | PhotoFailure
@@ -140,6 +198,33 @@ class PhotoCamera(Protocol):
     def outcomes(self) -> list[PhotoOutcome]:
         """Pictures taken, by request or not, and requests that failed, since the last call."""
         ...
+
+
+@runtime_checkable
+class LensCamera(PhotoCamera, Protocol):
+    """A camera whose lens zooms or focuses; every method returns at once."""
+
+    def adjust(self, target: LensTarget) -> None:
+        """Have the lens set to `target`.
+
+        The driver repeats what is not acknowledged. Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether the last target was acknowledged."""
+        ...
+
+    @property
+    def lens_fault(self) -> str:
+        """Why the last target was not taken, in a few words; empty if nothing is known."""
+        ...
+
+
+def zoomed(camera: CameraModel, factor: float) -> CameraModel:
+    """`camera` with a lens of `factor` times its focal length."""
+    return replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
 
 
 def levelled(camera: CameraModel, attitude: GimbalAttitude, vehicle: Odometry) -> CameraModel:

@@ -137,6 +137,8 @@ class VehicleState:
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
     gimbal: GimbalAttitude | None = None
     """Where its gimbal looks; None without one, and where it does not say."""
+    zoom: float | None = None
+    """Percent of its camera's zoom; None without one, and where it does not say."""
     traffic: tuple[Traffic, ...] = ()
     """Other aircraft that it hears of, the nearest first."""
     below: float | None = None

@@ -12,7 +12,7 @@ import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.payload import GimbalTarget
+from aerodaas.types.payload import GimbalTarget, LensTarget
 from aerodaas.types.records import fast_pickle, shared_pickle
 from aerodaas.types.target import FollowedTarget
 
@@ -87,6 +87,8 @@ class SchedulingType(str, enum.Enum):
     UNORDERED = "unordered"
 
 
+_WHOLE = 100.0
+"""Percent."""
 _HALF_TURN = 3.1416
 """Radians: pi, and the rounding of who writes it by hand."""
 LEAST_TRIGGER = 0.1
@@ -180,6 +182,12 @@ class Waypoint:
     cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
     x, y and z are."""
 
+    zoom: float | None = None
+    """Percent of the camera's zoom, 0 (sees most) to 100, that is set on the way there; None leaves
+    it as it is."""
+    focus: float | None = None
+    """The same for the focus, 0 (near) to 100 (far)."""
+
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
         owner = f"waypoint {self.id!r}"
@@ -217,6 +225,11 @@ class Waypoint:
         if self.trigger_distance is not None and self.trigger_interval is not None:
             message = f"{owner}: give it trigger_distance or trigger_interval, not both"
             raise InvalidWaypointError(message)
+        for name in ("zoom", "focus"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value <= _WHOLE:
+                message = f"{owner}: {name} is in percent, from 0 to 100, not {value}"
+                raise InvalidWaypointError(message)
         self._check_look_at(owner)
 
     def _check_look_at(self, owner: str) -> None:
@@ -327,6 +340,13 @@ class Waypoint:
         return GimbalTarget(self.gimbal_pitch or 0.0, self.gimbal_yaw or 0.0)
 
     @property
+    def lens(self) -> LensTarget | None:
+        """What the camera's lens is set to; None to leave it as it is."""
+        if self.zoom is None and self.focus is None:
+            return None
+        return LensTarget(self.zoom, self.focus)
+
+    @property
     def moves(self) -> dict[str, str]:
         """Positions by actuator that are taken there, in order; empty for none."""
         return dict(self.actuate)
@@ -344,6 +364,7 @@ _NUMBERS = tuple(
     in {
         *("x", "y", "z", "hover_duration", "yaw", "speed", "deadline"),
         *("gimbal_pitch", "gimbal_yaw", "trigger_distance", "trigger_interval"),
+        *("zoom", "focus"),
     }
 )
 

@@ -13,6 +13,9 @@ export interface Place {
   robots: Map<string, Abilities>;
 }
 
+/** Degrees downwards from which a camera looks straight down. */
+const DOWN = 85;
+
 /** What a robot is able to do, as far as its operator has to know. */
 export interface Abilities {
   /** m/s. */
@@ -21,6 +24,10 @@ export interface Abilities {
   maxClimb: number;
   /** Of its camera, horizontally, degrees. */
   fieldOfView: number;
+  /** Ids of its cameras. */
+  cameras: string[];
+  /** The one that looks straight down or hangs from a gimbal; null without one. */
+  surveys: string | null;
 }
 
 /** Where a lease's drones stay. */
@@ -47,7 +54,11 @@ export function areasOf(robots: RobotOut[]): LeasedArea[] {
 interface Robot {
   id: string;
   start?: number[];
-  sensors?: { type?: string; settings?: { horizontal_fov?: number } }[];
+  sensors?: {
+    id: string;
+    type?: string;
+    settings?: { horizontal_fov?: number; pitch?: number; gimbal?: object | null };
+  }[];
   limits?: {
     takeoff_height?: number;
     cruise_speed?: number;
@@ -73,11 +84,14 @@ export function placeOf(fleet: FleetOut): Place {
 }
 
 function abilitiesOf(robot: Robot): Abilities {
-  const camera = robot.sensors?.find((one) => one.type === "camera");
+  const cameras = robot.sensors?.filter((one) => one.type === "camera") ?? [];
+  const surveys = cameras.find(({ settings }) => settings?.gimbal || (settings?.pitch ?? 0) >= DOWN);
   return {
     cruiseSpeed: robot.limits?.cruise_speed ?? 1,
     maxSpeed: robot.limits?.max_speed ?? 5,
     maxClimb: robot.limits?.max_climb ?? 1.5,
-    fieldOfView: camera?.settings?.horizontal_fov ?? 82.6,
+    fieldOfView: cameras[0]?.settings?.horizontal_fov ?? 82.6,
+    cameras: cameras.map((one) => one.id),
+    surveys: surveys?.id ?? null,
   };
 }

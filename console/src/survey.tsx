@@ -5,14 +5,24 @@ import { type Flight, aheadOf } from "./flight";
 import { Field } from "./panels";
 import type { Abilities, Point } from "./place";
 import type { Drawn } from "./survey_map";
-import type { SurveyIn, SurveyOut, WaypointEntry } from "./wire";
+import type { SurveyIn, SurveyOut, SurveyPhotosOut, WaypointEntry } from "./wire";
 
 /** Milliseconds without a change before a plan is asked for. */
 const PAUSE = 250;
 const CORNERS = 30;
+const NOWHERE: Point[] = [];
+/** Centimetres of ground in a pixel that are suggested. */
+const RESOLUTION = 2;
 
 interface Settings {
+  /** Id of the camera that takes pictures; null for none. */
+  camera: string | null;
   height: number;
+  /** Centimetres of ground in a pixel, by which the height is chosen; null to give the height. */
+  resolution: number | null;
+  /** Percent of a picture that the next one on its line, and the one beside it, show, too. */
+  frontOverlap: number;
+  sideOverlap: number;
   fieldOfView: number;
   overlap: number;
   /** Metres; null for what the camera sees. */
@@ -27,6 +37,8 @@ interface Settings {
 export interface Survey extends Drawn {
   flight: Flight;
   robot: string;
+  /** Of the robot. */
+  cameras: string[];
   settings: Settings;
   plan: SurveyOut | null;
   problem: string;
@@ -71,13 +83,18 @@ export function useSurvey(
   const plan = answer !== null && answer.asked === asked ? answer.plan : null;
   const problem = refusal !== null && refusal.asked === asked ? refusal.text : "";
   const path = useMemo<Point[]>(() => plan?.waypoints.map((one) => [one.x, one.y]) ?? [], [plan]);
+  const photos = plan?.photos?.places ?? NOWHERE;
   const begin = () => {
     // Map and form stand at the top.
     scrollTo({ top: 0 });
     name.current = `s${Date.now().toString(36).slice(-4)}`;
     setArea([]);
     setSettings({
+      camera: abilities?.surveys ?? null,
       height: Number(height.toFixed(1)),
+      resolution: null,
+      frontOverlap: 75,
+      sideOverlap: 65,
       fieldOfView: abilities?.fieldOfView ?? 82.6,
       overlap: 20,
       width: null,
@@ -90,8 +107,10 @@ export function useSurvey(
   const survey: Survey = {
     flight,
     robot,
+    cameras: abilities?.cameras ?? [],
     area,
     path,
+    photos,
     settings,
     plan,
     problem,
@@ -120,19 +139,36 @@ export function useSurvey(
 function request(robot: string, area: Point[], how: Settings, name: string): SurveyIn | null {
   const corners = area.map(([east, north]): [number, number] => [east, north]);
   const [a, b, c, ...more] = corners;
-  if (!a || !b || !c || !(how.height > 0)) return null;
+  const planned = how.camera !== null && how.resolution !== null ? how.resolution : how.height;
+  if (!a || !b || !c || !(planned > 0)) return null;
   const radians = Math.PI / 180;
   return {
     robot,
     area: [a, b, c, ...more],
-    height: how.height,
-    ...(how.width === null ? { field_of_view: how.fieldOfView * radians } : { width: how.width }),
-    overlap: how.overlap / 100,
+    ...(how.camera !== null && how.resolution !== null
+      ? { ground_resolution: how.resolution / 100 }
+      : { height: how.height }),
+    ...strips(how),
     angle: how.direction === null ? null : (90 - how.direction) * radians,
     speed: how.speed,
     around: how.around,
     name,
   };
+}
+
+/** What decides how far the lines lie apart. */
+function strips(how: Settings): Partial<SurveyIn> {
+  if (how.camera !== null) {
+    return {
+      camera: how.camera,
+      overlap: how.sideOverlap / 100,
+      front_overlap: how.frontOverlap / 100,
+    };
+  }
+  const overlap = how.overlap / 100;
+  return how.width === null
+    ? { field_of_view: (how.fieldOfView * Math.PI) / 180, overlap }
+    : { width: how.width, overlap };
 }
 
 function round([east, north]: Point): Point {
@@ -159,39 +195,63 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
           ? "Click the corners on the map, or press Enter at its cross. Backspace takes one back."
           : "Drag corners to change them, click for more."}
       </p>
-      <Field
-        name="height"
-        label="Height, m"
-        value={String(settings.height)}
-        min={0.5}
-        max={ceiling}
-        onValue={(value) => survey.set({ height: Number(value) })}
-      />
-      <Field
-        name="fov"
-        label="Camera's view, °"
-        value={String(settings.fieldOfView)}
-        min={2}
-        max={170}
-        onValue={(value) => survey.set({ fieldOfView: Number(value) })}
-      />
-      <Field
-        name="overlap"
-        label="Overlap, %"
-        value={String(settings.overlap)}
-        min={0}
-        max={90}
-        step="1"
-        onValue={(value) => survey.set({ overlap: Number(value) })}
-      />
-      <Field
-        name="width"
-        label="Strips, m"
-        value=""
-        min={0.1}
-        optional="as the camera sees"
-        onValue={(value) => survey.set({ width: given(value) })}
-      />
+      {survey.cameras.length > 0 && (
+        <label>
+          <span>Pictures</span>
+          <select
+            name="camera"
+            value={settings.camera ?? ""}
+            onChange={(event) => survey.set({ camera: event.currentTarget.value || null })}
+          >
+            <option value="">none</option>
+            {survey.cameras.map((name) => (
+              <option key={name} value={name}>
+                by {name}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
+      {settings.camera !== null && (
+        <label>
+          <span>Planned by</span>
+          <select
+            name="by"
+            value={settings.resolution === null ? "height" : "resolution"}
+            onChange={(event) =>
+              survey.set({
+                resolution: event.currentTarget.value === "height" ? null : RESOLUTION,
+              })
+            }
+          >
+            <option value="height">height</option>
+            <option value="resolution">resolution</option>
+          </select>
+        </label>
+      )}
+      {settings.camera !== null && settings.resolution !== null ? (
+        <Field
+          key="resolution"
+          name="resolution"
+          label="Resolution, cm/pixel"
+          value={String(settings.resolution)}
+          min={0.05}
+          max={1000}
+          step="any"
+          onValue={(value) => survey.set({ resolution: Number(value) })}
+        />
+      ) : (
+        <Field
+          key="height"
+          name="height"
+          label="Height, m"
+          value={String(settings.height)}
+          min={0.5}
+          max={ceiling}
+          onValue={(value) => survey.set({ height: Number(value) })}
+        />
+      )}
+      {settings.camera === null ? <Strips survey={survey} /> : <Overlaps survey={survey} />}
       <Field
         name="direction"
         label="Direction, ° of north"
@@ -235,6 +295,72 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
         </button>
       </div>
     </form>
+  );
+}
+
+/** Strips without pictures: of a given width, or as a camera sees. */
+function Strips({ survey }: { survey: Survey }) {
+  const { settings } = survey;
+  return (
+    <>
+      <Field
+        key="fov"
+        name="fov"
+        label="Camera's view, °"
+        value={String(settings.fieldOfView)}
+        min={2}
+        max={170}
+        onValue={(value) => survey.set({ fieldOfView: Number(value) })}
+      />
+      <Field
+        key="overlap"
+        name="overlap"
+        label="Overlap, %"
+        value={String(settings.overlap)}
+        min={0}
+        max={90}
+        step="1"
+        onValue={(value) => survey.set({ overlap: Number(value) })}
+      />
+      <Field
+        key="width"
+        name="width"
+        label="Strips, m"
+        value={settings.width === null ? "" : String(settings.width)}
+        min={0.1}
+        optional="as the camera sees"
+        onValue={(value) => survey.set({ width: value === "" ? null : Number(value) })}
+      />
+    </>
+  );
+}
+
+/** How much neighbouring pictures have in common. */
+function Overlaps({ survey }: { survey: Survey }) {
+  const { settings } = survey;
+  return (
+    <>
+      <Field
+        key="front"
+        name="front"
+        label="Overlap ahead, %"
+        value={String(settings.frontOverlap)}
+        min={0}
+        max={95}
+        step="1"
+        onValue={(value) => survey.set({ frontOverlap: Number(value) })}
+      />
+      <Field
+        key="side"
+        name="side"
+        label="Overlap aside, %"
+        value={String(settings.sideOverlap)}
+        min={0}
+        max={90}
+        step="1"
+        onValue={(value) => survey.set({ sideOverlap: Number(value) })}
+      />
+    </>
   );
 }
 
@@ -309,13 +435,49 @@ function Figures({ survey }: { survey: Survey }) {
           <dt>Battery, and home</dt>
           <dd class={short ? "bad" : ""}>{percent(plan.battery)}</dd>
         </div>
+        {plan.photos && <Photos photos={plan.photos} height={plan.height} />}
       </dl>
+      {plan.photos?.warning && (
+        <p class="problem" role="alert" data-testid="survey-warning">
+          {plan.photos.warning}.
+        </p>
+      )}
       {short && (
         <p class="problem" role="alert">
           Only {percent(plan.available ?? 0)} is there to spend: the drone will turn back before the
           end.
         </p>
       )}
+    </>
+  );
+}
+
+function Photos({ photos, height }: { photos: SurveyPhotosOut; height: number }) {
+  return (
+    <>
+      <div class="figure">
+        <dt>Pictures</dt>
+        <dd>{photos.places.length}</dd>
+      </div>
+      <div class="figure">
+        <dt>One every</dt>
+        <dd>
+          {photos.interval.toFixed(1)} <small>s, {photos.spacing.toFixed(1)} m</small>
+        </dd>
+      </div>
+      <div class="figure">
+        <dt>Resolution</dt>
+        <dd>
+          {photos.resolution === null ? "–" : (100 * photos.resolution).toPrecision(2)}{" "}
+          <small>cm/pixel</small>
+        </dd>
+      </div>
+      <div class="figure">
+        <dt>Height</dt>
+        <dd>
+          {height.toFixed(1)} <small>m</small>
+        </dd>
+      </div>
     </>
   );
 }

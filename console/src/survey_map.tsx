@@ -3,12 +3,14 @@
 import type { RefObject } from "preact";
 import { useRef } from "preact/hooks";
 import type { Point } from "./place";
-import type { Sight } from "./sight";
+import { type Sight, px } from "./sight";
 
 /** What the map needs of a survey that is being drawn. */
 export interface Drawn {
   area: Point[];
   path: Point[];
+  /** Where pictures are taken. */
+  photos: Point[];
   refused: boolean;
   add(point: Point): void;
   move(corner: number, to: Point): void;
@@ -35,6 +37,7 @@ export function SurveyLayer({ drawn, sight, box }: LayerProps) {
     <g class={`survey ${drawn.refused ? "refused" : ""}`}>
       {drawn.area.length > 1 && <polygon class="area" points={sight.line(drawn.area)} />}
       {drawn.path.length > 1 && <polyline class="sweeps" points={sight.line(drawn.path)} />}
+      {drawn.photos.length > 0 && <path class="photos" d={dots(drawn.photos, sight)} />}
       {first && <circle class="entry" cx={sight.x(first[0])} cy={sight.y(first[1])} r="5" />}
       {drawn.area.map(([east, north], corner) => (
         <g
@@ -62,4 +65,9 @@ export function SurveyLayer({ drawn, sight, box }: LayerProps) {
       ))}
     </g>
   );
+}
+
+/** One path of points without length: a survey has thousands of pictures. */
+function dots(places: Point[], sight: Sight): string {
+  return places.map(([east, north]) => `M${px(sight.x(east))} ${px(sight.y(north))}h0`).join("");
 }

@@ -261,6 +261,7 @@ export interface WaypointEntry {
     [k: string]: string;
   };
   deadline?: number | null;
+  focus?: number | null;
   gimbal_pitch?: number | null;
   gimbal_yaw?: number | null;
   hover_duration?: number;
@@ -276,6 +277,7 @@ export interface WaypointEntry {
   y: number;
   yaw?: number | null;
   z: number;
+  zoom?: number | null;
 }
 /**
  * How far a recording has been read, and the flight once it was.
@@ -452,8 +454,11 @@ export interface SurveyIn {
    */
   area: [[number, number], [number, number], [number, number], ...[number, number][]];
   around?: boolean;
+  camera?: string | null;
   field_of_view?: number | null;
-  height: number;
+  front_overlap?: number;
+  ground_resolution?: number | null;
+  height?: number | null;
   name?: string;
   overlap?: number;
   robot: string;
@@ -467,7 +472,9 @@ export interface SurveyOut {
   angle: number;
   available: number | null;
   battery: number;
+  height: number;
   length: number;
+  photos: SurveyPhotosOut | null;
   seconds: number;
   /**
    * @minItems 3
@@ -477,4 +484,15 @@ export interface SurveyOut {
   sweeps: number;
   waypoints: WaypointEntry[];
   width: number;
+}
+/**
+ * Pictures of a survey as they would be taken.
+ */
+export interface SurveyPhotosOut {
+  interval: number;
+  line_spacing: number;
+  places: [number, number][];
+  resolution: number | null;
+  spacing: number;
+  warning: string;
 }

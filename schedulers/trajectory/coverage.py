@@ -121,6 +121,7 @@ def cover(
             speed=speed,
             gimbal_pitch=down,
             trigger_distance=distance,
+            zoom=0.0 if camera is not None and camera.zooms else None,
         )
         for number, ((x, y), distance) in enumerate(zip(way.places, spacings, strict=True), start=1)
     )
@@ -170,17 +171,24 @@ class _Way:
     """None for a leg between two strips."""
 
     def spacings(self, most: float | None) -> list[float | None]:
-        """Metres between pictures on each leg, at most `most`, which divide its strip evenly."""
+        """Metres between pictures on each leg, at most `most`, which divide its strip evenly.
+
+        From the beginning of one shorter than half of that a single picture sees all of it.
+        """
         lengths: dict[int, float] = {}
         for (a, b), strip in zip(pairwise(self.places), self.strips[1:], strict=True):
             if strip is not None:
                 lengths[strip] = lengths.get(strip, 0.0) + math.dist(a, b)
         return [
-            None
-            if most is None or strip is None
-            else max(lengths[strip] / max(1, math.ceil(lengths[strip] / most - 1e-9)), _SHORTEST)
+            None if most is None or strip is None else _spacing(lengths[strip], most)
             for strip in self.strips
         ]
+
+
+def _spacing(length: float, most: float) -> float:
+    if length < most / 2.0:
+        return max(most, _SHORTEST)
+    return max(length / max(1, math.ceil(length / most - 1e-9)), _SHORTEST)
 
 
 def _polygon(outline: Sequence[Place], what: str) -> shapely.Polygon:

@@ -35,6 +35,13 @@ class SurveyCamera:
     """The same with the picture beside it on the next line."""
     gimbal: bool = True
     """Whether a gimbal is to be turned straight down; False for a camera that is mounted so."""
+    pixels: int | None = None
+    """Pixels across its picture; None where that is of no interest: it has no resolution then."""
+    interval: float | None = None
+    """Seconds that it needs from one picture to the next; None where that is not known."""
+
+    zooms: bool = False
+    """Whether its lens has to be set to its widest, which `horizontal_fov` is."""
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -46,6 +53,9 @@ class SurveyCamera:
         for overlap in (self.front_overlap, self.side_overlap):
             if not 0.0 <= overlap < 1.0:
                 raise SchedulerError(f"an overlap is 0 to less than 1, not {overlap}")
+        for what, value in (("pixels", self.pixels), ("interval", self.interval)):
+            if value is not None and not value > 0.0:
+                raise SchedulerError(f"a camera's {what} must be positive, not {value}")
 
     @classmethod
     def of_sensor(
@@ -56,10 +66,13 @@ class SurveyCamera:
         front_overlap: float = 0.75,
         side_overlap: float = 0.65,
         gimbal: bool = True,
+        pixels: int | None = None,
+        interval: float | None = None,
     ) -> SurveyCamera:
         """Describe a camera by its data sheet: focal length, width and height of its sensor in mm.
 
-        Raises SchedulerError for lengths that are not positive.
+        `pixels` across its picture and `interval` in seconds are those of the class. Raises
+        SchedulerError for lengths that are not positive.
         """
         width, height = sensor
         if not (focal_length > 0.0 and width > 0.0 and height > 0.0):
@@ -67,7 +80,7 @@ class SurveyCamera:
                 f"focal length and sensor are in mm and positive, not {focal_length} and {sensor}"
             )
         fov = 2.0 * math.atan2(width, 2.0 * focal_length)
-        return cls(fov, width / height, front_overlap, side_overlap, gimbal)
+        return cls(fov, width / height, front_overlap, side_overlap, gimbal, pixels, interval)
 
     def footprint(self, height: float) -> tuple[float, float]:
         """Width and depth in metres of the ground that it sees from `height` metres above it."""
@@ -82,6 +95,22 @@ class SurveyCamera:
         """Metres between two pictures on a line."""
         return self.footprint(height)[1] * (1.0 - self.front_overlap)
 
-    def ground_resolution(self, height: float, pixels: int) -> float:
-        """Metres of ground in one of the `pixels` across its picture."""
-        return self.footprint(height)[0] / pixels
+    def ground_resolution(self, height: float) -> float | None:
+        """Metres of ground in one pixel of its picture; None without `pixels`."""
+        return None if self.pixels is None else self.footprint(height)[0] / self.pixels
+
+    def height(self, ground_resolution: float) -> float:
+        """Metres above the ground from which one pixel shows `ground_resolution` metres of it.
+
+        Raises SchedulerError for a resolution that is none, and without `pixels`.
+        """
+        if self.pixels is None:
+            raise SchedulerError(
+                "a height from a ground resolution needs the picture's width in pixels: give the "
+                "camera its pixels, or the survey a height"
+            )
+        if not (ground_resolution > 0.0 and math.isfinite(ground_resolution)):
+            raise SchedulerError(
+                f"a ground resolution is in metres a pixel and positive, not {ground_resolution}"
+            )
+        return ground_resolution * self.pixels / (2.0 * math.tan(self.horizontal_fov / 2.0))

@@ -6,10 +6,12 @@ import math
 import subprocess
 import sys
 
+import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from aerodaas.cameras.base import Camera
+from aerodaas.cameras.base import Camera, ZoomingCamera
 from aerodaas.cameras.simulated import SimulatedCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
 from aerodaas.types.data import Odometry
@@ -91,3 +93,42 @@ def test_a_camera_that_is_not_opened_does_not_load_the_renderer() -> None:
         "sys.exit('panda3d' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_lens_that_zooms_sees_less_and_says_so() -> None:
+    """The middle of the wide picture, as large; its model has the focal length; depth follows."""
+    camera = make("field", width=128, height=96, zoom=3.0, depth_range=20.0)
+    assert isinstance(camera, ZoomingCamera)
+    camera.open()
+    wide = camera.capture(0, POSE)
+    focal = camera.model.fx
+    camera.follow_zoom(50.0)
+    near = camera.capture(0, POSE)
+    assert (camera.model.fx, camera.model.fy) == pytest.approx((2 * focal, 2 * focal))
+    camera.follow_zoom(None)
+    again = camera.capture(0, POSE)
+    camera.close()
+    assert wide is not None
+    assert near is not None
+    assert again is not None
+    assert np.array_equal(wide.image, again.image)
+
+    def apart(picture: NDArray[np.uint8]) -> float:
+        middle = cv2.resize(picture[24:72, 32:96], (128, 96)).astype(np.float64)
+        return float(np.abs(middle - near.image).mean())
+
+    assert apart(wide.image) < 0.5 * float(np.abs(wide.image.astype(float) - near.image).mean())
+    assert wide.depth is not None
+    assert near.depth is not None
+    assert float(near.depth[90, 64]) == pytest.approx(float(wide.depth[69, 64]), rel=0.05)
+
+
+def test_a_lens_without_a_zoom_stays() -> None:
+    """Whatever the vehicle says."""
+    camera = make(width=64, height=48)
+    camera.open()
+    focal = camera.model.fx
+    camera.follow_zoom(100.0)
+    camera.capture(0, POSE)
+    camera.close()
+    assert camera.model.fx == focal

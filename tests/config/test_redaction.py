@@ -41,6 +41,7 @@ FLEET = {
                         "path": f"rtsp://user:{PRIVATE}@camera/1",
                         "pitch": 20,
                         "horizontal_fov": 90,
+                        "gimbal": {"lowest": -80},
                     },
                 },
                 {"id": "blind", "settings": {"pitch": 90}},
@@ -95,7 +96,8 @@ def test_it_has_what_an_application_asks_for() -> None:
     sensors = {sensor.full_id: sensor for sensor in shown.all_sensors()}
     # The camera without a source could not be flown.
     assert set(sensors) == {"px4/front", "px4/odom", "tello/phone"}
-    assert sensors["px4/front"].settings == {"pitch": 20, "horizontal_fov": 90}
+    lens = {"pitch": 20, "horizontal_fov": 90, "gimbal": {"lowest": -80}}
+    assert sensors["px4/front"].settings == lens
     assert sensors["tello/phone"].settings == {"path": "http://tello-phone.path.invalid"}
     assert shown.compute != "auto"
     assert [(one.id, one.kind) for one in shown.compute] == [("edge", "edge"), ("lambda", "http")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -99,6 +100,71 @@ def test_a_survey_is_planned_and_not_flown(flying: tuple[ConsoleServer, Run]) ->
     visit = {"robot": "drone", "waypoints": answer["waypoints"]}
     assert ask(server.address(), "/v1/missions/own/navigation", visit)[0] == 200
     assert len(run.commands) == 1
+
+
+@pytest.fixture(scope="module")
+def mapper() -> Iterator[ConsoleServer]:
+    """The console of a drone with a camera on a gimbal, and one that looks ahead."""
+    hung = {"gimbal": {}, "width": 4000, "height": 3000, "horizontal_fov": 60, "photo_interval": 2}
+    sensors = [
+        {"id": "map", "type": "camera", "settings": hung},
+        {"id": "front", "type": "camera", "driver": "tello"},
+    ]
+    with console(robots=[{"id": "drone", "sensors": sensors}]) as (server, _):
+        while not ask(server.address(), "/v1/missions/own")[2]["status"]:
+            time.sleep(0.05)
+        yield server
+
+
+def test_a_survey_is_planned_by_its_camera(mapper: ConsoleServer) -> None:
+    """Height by resolution, lines and pictures by overlap, and a warning where it is too slow."""
+    wanted = {
+        **SURVEY,
+        "height": None,
+        "width": None,
+        "camera": "map",
+        "overlap": 0.6,
+        "front_overlap": 0.8,
+        "ground_resolution": 0.002,
+    }
+    status, _, answer = ask(mapper.address(), "/v1/missions/own/survey", wanted)
+    assert status == 200
+    assert answer["height"] == pytest.approx(8 / (2 * math.tan(math.radians(30))))
+    assert answer["width"] == pytest.approx(8.0)
+    photos = answer["photos"]
+    assert photos["resolution"] == pytest.approx(0.002)
+    assert photos["line_spacing"] == pytest.approx(0.4 * 8.0)
+    assert 0.9 * 1.2 < photos["spacing"] <= 1.2
+    assert photos["interval"] == pytest.approx(photos["spacing"])
+    assert "needs 2 s for one" in photos["warning"]
+    triggers = [one["trigger_distance"] for one in answer["waypoints"]]
+    assert sum(one is not None for one in triggers) == answer["sweeps"]
+    assert {one["gimbal_pitch"] for one in answer["waypoints"]} == {-math.pi / 2}
+    assert len(photos["places"]) > 15 * answer["sweeps"]
+    assert ask(mapper.address(), "/v1/missions/own/survey", SURVEY)[2]["photos"] is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "status", "text"),
+    [
+        ({"camera": "front"}, 409, "looks 0 degrees down and not straight down: mount it so"),
+        ({"camera": "ghost"}, 409, "no camera 'ghost'; it has map, front"),
+        ({"width": 4}, 422, "give either"),
+        ({"height": None}, 422, "give either a height or"),
+        ({"ground_resolution": 0.01}, 422, "give either a height or"),
+        ({"height": None, "ground_resolution": 0}, 422, "ground_resolution"),
+        ({"front_overlap": 1}, 422, "front_overlap"),
+        ({"camera": None, "width": 4, "height": None, "ground_resolution": 1}, 422, "the camera"),
+        ({"height": None, "ground_resolution": 0.05}, 409, "above the ceiling"),
+    ],
+)
+def test_a_camera_that_cannot_survey_is_refused(
+    mapper: ConsoleServer, changes: dict[str, object], status: int, text: str
+) -> None:
+    """With the reason, and the remedy."""
+    wanted = {"robot": "drone", "area": FIELD, "height": 4, "camera": "map", **changes}
+    found = ask(mapper.address(), "/v1/missions/own/survey", wanted)
+    assert (found[0], text in found[2]["text"]) == (status, True), found[2]
 
 
 @pytest.mark.parametrize(

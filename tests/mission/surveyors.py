@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flights import PERIOD, Flight, KinematicVehicle
 
-from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.mission.commands import AddNavigation, Start
@@ -19,6 +20,7 @@ from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.payload import (
     GimbalAttitude,
     GimbalTarget,
+    LensTarget,
     Photo,
     PhotoFailure,
     PhotoOutcome,
@@ -26,7 +28,7 @@ from aerodaas.types.payload import (
 from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import Waypoint
 
-__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated"]
+__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated", "surveying"]
 
 
 class Clock:
@@ -75,6 +77,9 @@ class Camera:
     gimbal: Gimbal | None
     refuses: str = ""
     silent: bool = False
+    lens_refuses: str = ""
+    lens_hangs: bool = False
+    lens: list[LensTarget] = field(default_factory=list)
     lies: bool = False
     """Answers with other numbers."""
     asked: list[str] = field(default_factory=list)
@@ -91,6 +96,20 @@ class Camera:
             told = number + 100 if self.lies else number
             self._ready.append(Photo(told, self.clock.now, label, gimbal=attitude))
         return number
+
+    def adjust(self, target: LensTarget) -> None:
+        """Set the lens."""
+        self.lens.append(target)
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether it is set."""
+        return not self.lens_hangs
+
+    @property
+    def lens_fault(self) -> str:
+        """Why it is not."""
+        return self.lens_refuses
 
     def outcomes(self) -> list[PhotoOutcome]:
         """What came of it."""
@@ -119,11 +138,22 @@ def lost(made: Flight) -> list[str]:
     return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
 
 
+def surveying(
+    driver: str = "simulated", *cameras: Mapping[str, object], **limits: object
+) -> RobotConfig:
+    """A robot with cameras of these settings; by default one that hangs from a gimbal."""
+    sensors = [
+        {"id": f"cam{n}", "type": "camera", "rate": 2, "settings": settings}
+        for n, settings in enumerate(cameras or ({"gimbal": {}},))
+    ]
+    fast = {"max_speed": 8, "cruise_speed": 5, **limits}
+    content = {"id": "drone", "driver": driver, "sensors": sensors, "limits": fast}
+    return RobotConfig.model_validate(content)
+
+
 def simulated(*waypoints: Waypoint, noise: float, wind: float) -> Mission:
     """A flight of the simulated drone, in its own time."""
-    sensor = {"id": "cam", "type": "camera", "rate": 2, "settings": {"gimbal": {}}}
-    limits = LimitsConfig(max_speed=8, cruise_speed=5)
-    robot = RobotConfig.model_validate({"id": "drone", "sensors": [sensor], "limits": limits})
+    robot = surveying()
     world = {"sensor_noise": noise, "wind": (wind, wind, 0.0), "gust": wind / 3}
     environment = EnvironmentConfig.model_validate({"robots": [robot], "simulation": world})
     vehicle = SimulatedVehicle(robot, environment)

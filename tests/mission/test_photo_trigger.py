@@ -32,9 +32,10 @@ def flown_straight(trigger: PhotoTrigger, start: Vector, end: Vector, speed: flo
     long = float(np.linalg.norm(way))
     found: list[float] = []
     now, progress = 0, 0.0
+    bearing = math.atan2(way[1], way[0])
     while True:
         velocity = way * (speed / max(long, 1e-9) if progress < long else 0.0)
-        seen = Odometry(start + way * (progress / max(long, 1e-9)), velocity, 0.0)
+        seen = Odometry(start + way * (progress / max(long, 1e-9)), velocity, bearing)
         trigger.place_ahead(seen, now)
         arrived = now if progress >= long else None
         found += [progress] * trigger.passed(seen, now, arrived)
@@ -108,7 +109,28 @@ def test_no_position_is_too_odd(numbers: list[float], spacing: float, now: int) 
     seen = Odometry(np.array(numbers[:3]), np.array(numbers[3:]), 0.0)
     ahead = trigger.place_ahead(seen, now)
     assert ahead is None or np.isfinite(ahead).all()
-    assert 0 <= trigger.passed(seen, now, None) <= 50 / spacing + 2
+    assert 0 <= trigger.passed(seen, now, None) <= math.hypot(50, 9) / spacing + 2
+
+
+def test_the_nose_turns_along_the_line_before_the_first_picture() -> None:
+    """The drone waits for it at the line's beginning, but not for ever, nor where it looks away."""
+    waypoint = Waypoint("b", 0, 50, 9, trigger_distance=5.0)
+    start, still = np.array([0, 0, 9.0]), np.zeros(3)
+    aside, along = Odometry(start, still, 0.0), Odometry(start, still, math.pi / 2 + 0.09)
+    trigger = PhotoTrigger(waypoint, start, 0)
+    ahead = trigger.place_ahead(aside, 0)
+    assert ahead == pytest.approx(start)
+    assert trigger.passed(aside, 0, None) == 0
+    ahead = trigger.place_ahead(along, TURN)
+    assert ahead is not None
+    assert ahead[1] >= 8.0
+    assert trigger.passed(along, TURN, None) == 1
+    looks_away = PhotoTrigger(waypoint, start, 0)
+    looks_away.place_ahead(aside, 0, turns=False)
+    assert looks_away.passed(aside, 0, None) == 1
+    stuck = PhotoTrigger(waypoint, start, 0)
+    stuck.place_ahead(aside, 5 * NANOSECONDS)
+    assert stuck.passed(aside, 5 * NANOSECONDS, None) == 1
 
 
 def test_no_picture_is_taken_beside_the_line() -> None:

@@ -10,7 +10,7 @@ from surveyors import Surveyor, lost
 
 from aerodaas.config.model import MissionConfig
 from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import GimbalTarget
+from aerodaas.types.payload import GimbalTarget, LensTarget
 from aerodaas.types.status import MissionState
 from aerodaas.types.waypoints import Waypoint
 
@@ -210,3 +210,42 @@ def test_the_time_out_begins_anew_after_an_interruption() -> None:
     made.run()
     made.expect(MissionState.LANDED)
     assert made.status.photos == (1, 0)
+
+
+ZOOMED = (
+    Waypoint("north", 0, 5, 2, zoom=40, photo=True),
+    Waypoint("east", 5, 5, 2, zoom=40, focus=100, photo=True),
+)
+
+
+def test_the_lens_is_set_before_the_picture() -> None:
+    """On the way there, once for each waypoint that asks for something else."""
+    vehicle = Surveyor()
+    assert vehicle.photo_camera is not None
+    made = flown(vehicle, *ZOOMED)
+    unharmed(made)
+    assert vehicle.photo_camera.lens == [LensTarget(40, None), LensTarget(40, 100)]
+    assert made.status.photos == (2, 0)
+    assert not lost(made)
+
+
+def test_a_lens_that_is_not_set_costs_its_picture() -> None:
+    """Refused, or never acknowledged; without a picture it is told all the same."""
+    vehicle = Surveyor()
+    assert vehicle.photo_camera is not None
+    vehicle.photo_camera.lens_refuses = "denied"
+    made = flown(vehicle, *ZOOMED)
+    unharmed(made)
+    assert made.status.photos == (0, 2)
+    assert "north: no picture: the camera's lens: denied" in lost(made)[0]
+    hanging = Surveyor()
+    assert hanging.photo_camera is not None
+    hanging.photo_camera.lens_hangs = True
+    made = flown(hanging, ZOOMED[0])
+    made.expect(MissionState.LANDED)
+    assert lost(made) == ["north: no picture: the lens was not set within 4 s"]
+    blind = Surveyor()
+    blind.photo_camera = None
+    made = flown(blind, Waypoint("north", 0, 5, 2, zoom=40))
+    made.expect(MissionState.LANDED)
+    assert lost(made)[0].startswith("north: lens not set: the vehicle has no camera")

@@ -14,7 +14,7 @@ from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.recording.reader import Recording
 
 DOWN = -math.pi / 2
-CAMERA = {"id": "cam", "rate": 2, "settings": {"width": 64, "height": 48, "gimbal": {}}}
+CAMERA = {"id": "cam", "rate": 2, "settings": {"width": 64, "height": 48, "gimbal": {}, "zoom": 3}}
 
 
 def content(**camera: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -28,7 +28,7 @@ def survey(env: Environment) -> None:
     drone = env.get_robot_by_id("drone")
     stops = [
         Waypoint("nadir", 4, 0, 4, gimbal_pitch=DOWN, photo=True),
-        Waypoint("aside", 4, 4, 4, gimbal_pitch=-0.5, gimbal_yaw=0.6, photo=True),
+        Waypoint("aside", 4, 4, 4, gimbal_pitch=-0.5, gimbal_yaw=0.6, zoom=50, photo=True),
     ]
     drone.navigate(AeroNavigation(data=stops))
 
@@ -50,8 +50,15 @@ def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None
         assert image.getexif().get_ifd(0x8825)
     with Recording.open(run.recording) as recording:
         photos = [one.value for one in recording.records(schemas=("aerodaas.Photo",))]
+        calibrations = recording.records(schemas=("foxglove.CameraCalibration",))
+        lenses = [one.value for one in calibrations]
         states = [one.value for one in recording.records(schemas=("aerodaas.VehicleState",))]
     assert [photo["label"] for photo in photos] == ["nadir", "aside"]
+    assert [photo["zoom"] for photo in photos] == [0.0, 50.0]
+    assert [state["zoom"] for state in (states[0], states[-1])] == [0.0, 50.0]
+    # Calibration of each frame: twice the focal length at half of a zoom of three.
+    focal = 32 / math.tan(math.radians(82.6) / 2)
+    assert {round(one.K[0] / focal, 3) for one in lenses} == {1.0, 2.0}
     assert min(state["gimbal"]["pitch"] for state in states) == pytest.approx(DOWN, abs=0.05)
 
 

@@ -35,7 +35,12 @@ FLEET: dict[str, Any] = {
                     "id": "cam",
                     "driver": "video",
                     "rate": 5,
-                    "settings": {"path": "rtsp://camera/1", "pitch": 30, "width": 320},
+                    "settings": {
+                        "path": "rtsp://camera/1",
+                        "pitch": 30,
+                        "width": 320,
+                        "gimbal": {},
+                    },
                 },
                 {"id": "odom", "type": "odometry"},
             ],
@@ -54,7 +59,7 @@ def test_the_fleet_becomes_a_simulated_one() -> None:
     config = rehearsal_config(whole, {"px4": 0.5, "own": 0.4}, seed=8)
     assert [robot.driver for robot in config.robots] == ["simulated"] * 3
     assert all(config.camera_driver(one) == "simulated" for one in config.all_sensors())
-    assert config.robots[0].sensors[0].settings == {"pitch": 30, "width": 320}
+    assert config.robots[0].sensors[0].settings == {"pitch": 30, "width": 320, "gimbal": {}}
     assert config.sensors == whole.sensors
     assert config.robots[2].settings == {"mass": 1.5, "battery": 0.4}
     assert config.simulation == whole.simulation.model_copy(update={"seed": 8})

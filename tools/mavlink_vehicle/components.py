@@ -28,8 +28,9 @@ class EmulatedComponent:
         self.heard: list[Any] = []
         """Every message for it."""
         camera = number in CAMERAS
-        self._say: Callable[[Any], None] = lambda message: say_as(message, number)
-        self.payload = EmulatedPayload(firmware, self._say, gimbal=not camera, camera=camera)
+        self.say: Callable[[Any], None] = lambda message: say_as(message, number)
+        """Sends a message of its own."""
+        self.payload = EmulatedPayload(firmware, self.say, gimbal=not camera, camera=camera)
         self.payload.device = number
         self.payload.by_itself = True
         self.payload.flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
@@ -52,7 +53,7 @@ class EmulatedComponent:
             values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
             result = self._obey(message.command, values)
             peer = (message.get_srcSystem(), message.get_srcComponent())
-            self._say(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))
+            self.say(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))
 
     def _obey(self, number: int, values: tuple[float, ...]) -> Any:  # noqa: ANN401
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL and values[0] == _ATTITUDE:
@@ -62,7 +63,7 @@ class EmulatedComponent:
             said = self.payload.message(int(values[0]))
             if said is None:
                 return mavlink.MAV_RESULT_UNSUPPORTED
-            self._say(said)
+            self.say(said)
             return mavlink.MAV_RESULT_ACCEPTED
         result = self.payload.obey(number, values)
         return mavlink.MAV_RESULT_UNSUPPORTED if result is None else result
@@ -73,7 +74,7 @@ class EmulatedComponent:
             return
         if now >= self._beat_due:
             self._beat_due = now + _HEARTBEAT
-            self._say(
+            self.say(
                 mavlink.MAVLink_heartbeat_message(
                     self._kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
                 )
@@ -83,4 +84,4 @@ class EmulatedComponent:
             self._attitude_due = now + self._attitude
             said = self.payload.message(_ATTITUDE)
             if said is not None:
-                self._say(said)
+                self.say(said)

@@ -22,6 +22,7 @@ _AXES = (
     mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
 )
 _YAW_AXIS = mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
+_LENS = {mavlink.MAV_CMD_SET_CAMERA_ZOOM: "zoom", mavlink.MAV_CMD_SET_CAMERA_FOCUS: "focus"}
 _SHUTTER = 0.3
 """Seconds from a request to the word of its picture."""
 
@@ -53,6 +54,17 @@ class EmulatedPayload:
         """Targets that came without a command."""
         self.nonsense = False
         """Its attitude is not a number."""
+        self.lens: dict[str, float] = {}
+        """Percent of zoom and focus, as set."""
+        self.lens_refuses = False
+        self.mute = False
+        """Pictures are taken, and not told."""
+        self.interval: float | None = None
+        """Seconds between pictures that it says that it takes by itself."""
+        self.recording: float | None = None
+        """Seconds for which it says that it has been recording video."""
+        self.counts = True
+        """It tells how many pictures it has taken."""
         self.blind = False
         """Pictures are acknowledged, and not taken."""
         self.pitch = self.right = 0.0
@@ -76,7 +88,15 @@ class EmulatedPayload:
                 return mavlink.MAV_RESULT_DENIED
             self._turn_to(*(math.radians(value) for value in values[:2]))
             return _OK
-        if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE and self.has_camera:
+        return self._obey_camera(number, values) if self.has_camera else None
+
+    def _obey_camera(self, number: int, values: tuple[float, ...]) -> Any | None:  # noqa: ANN401
+        if number in _LENS:
+            if self.lens_refuses or values[0] != mavlink.ZOOM_TYPE_RANGE:
+                return mavlink.MAV_RESULT_DENIED
+            self.lens[_LENS[number]] = values[1]
+            return _OK
+        if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE:
             if self.camera_refuses:
                 return mavlink.MAV_RESULT_FAILED
             if not self.blind:
@@ -112,12 +132,14 @@ class EmulatedPayload:
         lat, lon, _ = flight.origin.to_geodetic(flight.believed.position)
         stamp, place = round(self._firmware.now * 1e3), (round(lat * 1e7), round(lon * 1e7))
         index = len(self.taken)
+        if self.mute:
+            return
         if self.by_itself or self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
             name = f"DCIM/{index:04d}.JPG".encode()
             height = (round(flight.altitude * 1e3), 0)
             self._say(
                 mavlink.MAVLink_camera_image_captured_message(
-                    stamp, 0, 1, *place, *height, self._quaternion(), index, 1, name
+                    stamp, 0, 1, *place, *height, self._quaternion(), index - 1, 1, name
                 )
             )
             return
@@ -143,6 +165,9 @@ class EmulatedPayload:
             return mavlink.MAVLink_gimbal_device_attitude_status_message(
                 0, 0, stamp, flags, self._quaternion(), *unknown, 0
             )
+        return self._camera_message(number, stamp)
+
+    def _camera_message(self, number: int, stamp: int) -> Any | None:  # noqa: ANN401
         if number == mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION and self.free is not None:
             ready = mavlink.STORAGE_STATUS_READY
             return mavlink.MAVLink_storage_information_message(
@@ -157,7 +182,16 @@ class EmulatedPayload:
             return mavlink.MAVLink_camera_information_message(
                 stamp, name, name, 0, 8.8, 13.2, 8.8, 5472, 3648, 0, self._told_flags, 0, b""
             )
+        if number == mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS and self.has_camera:
+            return self._capture_status(stamp) if self.counts else None
         return None
+
+    def _capture_status(self, stamp: int) -> Any:  # noqa: ANN401
+        by_interval, recording = self.interval is not None, self.recording is not None
+        return mavlink.MAVLink_camera_capture_status_message(
+            *(stamp, 2 * by_interval, int(recording), self.interval or 0.0),
+            *(round(1e3 * (self.recording or 0.0)), self.free or 0.0, len(self.taken)),
+        )
 
     @property
     def _told_flags(self) -> int:

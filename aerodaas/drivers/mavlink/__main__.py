@@ -71,8 +71,9 @@ def _tell(vehicle: MavlinkVehicle) -> None:
         typer.echo(f"at {place}, {gps.satellites} satellites")
     for camera, stream in vehicle.payload.streams():
         typer.echo(f"video of {camera}: {stream}")
-    for camera, card in vehicle.payload.cards():
-        typer.echo(f"card of {camera}: {card}")
+    for told in vehicle.payload.cameras():
+        trouble = f"; {told.trouble}" if told.trouble else ""
+        typer.echo(f"{told.name}: {told}{trouble}")
     for reason in vehicle.preflight():
         typer.echo(f"would not take off: {reason}")
 

@@ -287,7 +287,8 @@ class MavlinkVehicle:
         with self._lock:
             obstacles = self._connected().fallback.obstacles
             stranded = None if self._settings.fallback == "ignore" else obstacles
-            return self._report.health(time.monotonic(), stranded)
+            told = self._report.health(time.monotonic(), stranded)
+            return self.payload.complete_health(told)
 
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""

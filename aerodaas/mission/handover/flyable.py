@@ -68,6 +68,8 @@ def _asks(waypoint: Waypoint) -> Iterator[str]:
         yield "it takes pictures"
     if waypoint.gimbal is not None or waypoint.look_at is not None:
         yield "it turns the gimbal"
+    if waypoint.lens is not None:
+        yield "it sets the camera's lens"
     if waypoint.actuate:
         yield "it moves actuators"
 

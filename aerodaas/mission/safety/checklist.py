@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from aerodaas.config.model import LimitsConfig
@@ -14,6 +14,7 @@ from aerodaas.mission.safety.supervisor import charge_objection, place_objection
 from aerodaas.mission.safety.traffic import DEMANDS, encounters
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import OWN_CHECKS, HealthItem, HealthReadings, MeasuredVehicle, Verdict
+from aerodaas.types.payload import CameraStatus
 from aerodaas.types.sun import sun_elevation
 from aerodaas.types.vehicle import Vehicle, VehicleState
 
@@ -41,6 +42,7 @@ _REMEDIES = {
     "compass": "move away from metal and wires, or calibrate the compass",
     "gps": "wait, or move away from walls and trees",
     "estimator": "let it stand still for a minute; calibrate what does not fit",
+    "camera": "put a card with room into the camera, or look at its cable",
     "storage": "put a working card into the autopilot, or free space on it",
     "wind": "wait for less wind",
     "daylight": "wait for daylight; preflight.sun_elevation where a flight at night is legal",
@@ -74,7 +76,8 @@ class Checklist:
             self._battery(state),
             self._place(state),
         ]
-        faults = _faults(state.faults)
+        cameras = [one.name for one in told.cameras or ()]
+        faults = _faults(state.faults, {**_SUBJECTS, **dict.fromkeys(cameras, "camera")})
         for item in self._health(state, told):
             level: PreflightLevel = getattr(self._policy, item.name)
             if level != "ignore":
@@ -134,6 +137,7 @@ class Checklist:
         yield self._daylight(state, told.clock)
         yield _most("link", told.silence, policy.silence, "last word {:.1f} s ago")
         yield _texts("fallback", told.stranded, "able to come home without us")
+        yield _camera(told.cameras or ())
         yield _texts("remote_id", None if told.remote_id is None else [told.remote_id], "ready")
 
     def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
@@ -224,6 +228,15 @@ def _texts(name: str, objections: Sequence[str] | None, good: str) -> HealthItem
     return HealthItem(name, said or good, good, _verdict(good=not said))
 
 
+def _camera(cameras: Sequence[CameraStatus]) -> HealthItem:
+    bound = "able to keep pictures"
+    if not cameras:
+        return _unknown("camera", bound)
+    bad = any(one.trouble for one in cameras)
+    said = (f"{one.name}: {one}" + (f"; {one.trouble}" if one.trouble else "") for one in cameras)
+    return HealthItem("camera", "; ".join(said), bound, _verdict(good=not bad))
+
+
 def _by(objections: Sequence[str], item: HealthItem) -> HealthItem:
     """An item that is no matter of policy."""
     return replace(item, verdict=Verdict.REFUSED) if objections else item
@@ -246,11 +259,11 @@ def _remedied(item: HealthItem) -> HealthItem:
     return replace(item, remedy=_REMEDIES.get(item.name, ""))
 
 
-def _faults(texts: Sequence[str]) -> dict[str, list[str]]:
+def _faults(texts: Sequence[str], subjects: Mapping[str, str]) -> dict[str, list[str]]:
     """The vehicle's faults by item; those of none under an empty name."""
     found: dict[str, list[str]] = {}
     for text in texts:
         subject, colon, rest = text.partition(": ")
-        name = _SUBJECTS.get(subject, "") if colon else ""
+        name = subjects.get(subject, "") if colon else ""
         found.setdefault(name, []).append(rest if name else text)
     return found

@@ -57,6 +57,7 @@ PHOTO = json_schema(
     place={},
     odometry={},
     gimbal={},
+    zoom={},
     file="string",
 )
 SETPOINT = json_schema(
@@ -112,6 +113,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         state["gps"] = item.gps
     if item.gimbal is not None:
         state["gimbal"] = item.gimbal
+    if item.zoom is not None:
+        state["zoom"] = item.zoom
     if item.traffic:
         state["traffic"] = [_traffic_json(one) for one in item.traffic]
     if item.actuators:
@@ -166,6 +169,7 @@ def photo(item: Photo, message: Message[Any], session: Session) -> Iterator[Entr
         "place": item.place,
         "odometry": item.odometry and odometry_json(item.odometry),
         "gimbal": item.gimbal,
+        "zoom": item.zoom,
         "file": item.file,
     }
     yield Entry(topic(message.stream, "photos"), PHOTO, json_bytes(value), item.stamp)

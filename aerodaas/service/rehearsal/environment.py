@@ -13,7 +13,10 @@ from aerodaas.simulation.battery import flight_power
 
 __all__ = ["rehearsal_config"]
 
-_LENS = ("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range")
+_LENS = (
+    *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
+    *("gimbal", "photo_interval", "zoom"),
+)
 """Settings of a camera that its simulated twin has as well."""
 _CELL_VOLTS = 3.9
 """Mean open-circuit voltage of the simulated battery's cells between full and their knee."""

@@ -10,7 +10,7 @@ import pytest
 from payload_flights import fly, found, outcome, take, told
 from stepped import Stepped
 
-from aerodaas.drivers.mavlink.microservices.storage import card_state
+from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.mission import Mission
 from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
@@ -269,8 +269,8 @@ def test_a_card_that_fills_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         payload = ends.autopilot.components[CAMERA].payload
         payload.free = 12_000.0
         ends.watch(6.0)
-        ((name, card),) = ends.vehicle.payload.cards()
-        assert (name, str(card)) == ("camera (component 100)", "12000 MiB free")
+        (camera,) = ends.vehicle.payload.cameras()
+        assert (camera.name, camera.free) == ("camera (component 100)", 12_000.0)
         assert ends.vehicle.read().faults == ()
         payload.free = 20.0
         ends.watch(25.0)
@@ -280,22 +280,24 @@ def test_a_card_that_fills_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "free", "said"),
+    ("status", "free", "room", "trouble"),
     [
-        (2, 5000.0, "5000 MiB free"),
-        (2, math.nan, "room not told"),
-        (2, -1.0, "room not told"),
-        (2, 0.0, "0 MiB free; its card is full: 0 MiB are left"),
-        (0, 0.0, "room not told; it has no card"),
-        (1, 0.0, "room not told; its card is not formatted"),
-        (3, 0.0, "room not told"),
-        (99, 0.0, "room not told"),
+        (2, 5000.0, 5000.0, ""),
+        (2, math.nan, None, ""),
+        (2, -1.0, None, ""),
+        (2, 0.0, 0.0, "its card is full: 0 MiB are left"),
+        (0, 0.0, None, "it has no card"),
+        (1, 0.0, None, "its card is not formatted"),
+        (3, 0.0, None, ""),
+        (99, 0.0, None, ""),
     ],
 )
-def test_what_a_camera_says_of_its_card(status: int, free: float, said: str) -> None:
+def test_what_a_camera_says_of_its_card(
+    status: int, free: float, room: float | None, trouble: str
+) -> None:
     """A status that is not known says nothing."""
     told = mavlink.MAVLink_storage_information_message(0, 1, 1, status, 1e4, 0.0, free, 0, 0)
-    assert str(card_state(told)) == said
+    assert card_state(told) == CardState(room, trouble)
 
 
 def test_an_address_that_leads_elsewhere_is_shown_and_not_read(

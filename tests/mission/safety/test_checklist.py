@@ -22,6 +22,7 @@ from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, GpsFix
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import HealthItem, HealthReadings, Verdict, gravest
+from aerodaas.types.payload import CameraStatus
 from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import VehicleState
 
@@ -38,6 +39,7 @@ WELL = HealthReadings(
     clock=1_800_000_000.0,
     stranded=(),
     remote_id="",
+    cameras=(CameraStatus("camera", free=900.0),),
 )
 FIX = GpsFix(47.4, 8.5, 500.0, 0.8, 1.2, 12)
 POLICIES = {
@@ -97,6 +99,11 @@ ILL: list[tuple[str, dict[str, Any], str]] = [
     ("daylight", {"clock": 1_800_000_000.0 + 43_200.0}, "sun at -"),
     ("link", {"silence": 1.6}, "1.6 s ago"),
     ("fallback", {"stranded": ("it hovers",)}, "it hovers, should be able to come home without us"),
+    (
+        "camera",
+        {"cameras": (CameraStatus("camera", trouble="it has no card"), CameraStatus("other"))},
+        "camera: tells nothing of itself; it has no card; other: tells nothing",
+    ),
     ("remote_id", {"remote_id": "no position"}, "no position, should be ready"),
 ]
 

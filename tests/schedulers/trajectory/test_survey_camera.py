@@ -20,11 +20,13 @@ ZONE = [(30.0, 12.0), (45.0, 12.0), (45.0, 22.0), (30.0, 22.0)]
 
 def test_a_data_sheet_gives_the_footprint() -> None:
     """A sensor of 13.2 by 8.8 mm behind 8.8 mm sees 150 by 100 m from 100 m."""
-    camera = SurveyCamera.of_sensor(8.8, (13.2, 8.8), front_overlap=0.8, side_overlap=0.6)
+    camera = SurveyCamera.of_sensor(
+        8.8, (13.2, 8.8), front_overlap=0.8, side_overlap=0.6, pixels=5472
+    )
     assert camera.footprint(100.0) == pytest.approx((150.0, 100.0))
     assert camera.trigger_distance(100.0) == pytest.approx(20.0)
     assert camera.line_spacing(100.0) == pytest.approx(60.0)
-    assert camera.ground_resolution(100.0, 5472) == pytest.approx(0.0274, abs=1e-4)
+    assert camera.ground_resolution(100.0) == pytest.approx(0.0274, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -44,6 +46,28 @@ def test_a_camera_that_is_none_is_refused(settings: tuple[float, float, float, f
         SurveyCamera(*settings)
     with pytest.raises(SchedulerError, match="in mm and positive"):
         SurveyCamera.of_sensor(0.0, (13.2, 8.8))
+
+
+@given(fov=st.floats(0.1, 3.0), resolution=st.floats(1e-4, 1.0), pixels=st.integers(16, 10_000))
+def test_a_resolution_has_its_height(fov: float, resolution: float, pixels: int) -> None:
+    """Which gives back the resolution."""
+    camera = SurveyCamera(fov, pixels=pixels)
+    height = camera.height(resolution)
+    assert camera.ground_resolution(height) == pytest.approx(resolution)
+
+
+def test_without_pixels_there_is_no_resolution() -> None:
+    """Nor a height that gives one; and a camera's numbers are positive."""
+    assert SurveyCamera(1.0).ground_resolution(10.0) is None
+    with pytest.raises(SchedulerError, match="give the camera its pixels"):
+        SurveyCamera(1.0).height(0.02)
+    for resolution in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(SchedulerError, match="in metres a pixel"):
+            SurveyCamera(1.0, pixels=640).height(resolution)
+    with pytest.raises(SchedulerError, match="pixels must be positive"):
+        SurveyCamera(1.0, pixels=0)
+    with pytest.raises(SchedulerError, match="interval must be positive"):
+        SurveyCamera(1.0, interval=math.nan)
 
 
 def test_an_area_has_a_width_or_a_camera() -> None:

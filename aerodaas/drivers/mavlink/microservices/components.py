@@ -10,26 +10,39 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from aerodaas.drivers.mavlink.microservices.camera_status import (
+    CameraModelTold,
+    CaptureStatus,
+    camera_model_told,
+    capture_status,
+)
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
 from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.mavlink.wire.senders import CAMERAS
+from aerodaas.types.payload import CameraStatus
 
 __all__ = ["PayloadComponent"]
 
 _CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
 _STORAGE = mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION
+_CAPTURE = mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS
 _CARD_AGAIN = 20.0
 """Seconds after which a camera that tells of its card is asked again."""
+_CAPTURE_AGAIN = 10.0
+"""The same, of what it does."""
+_CAPTURE_SOON = 1.0
+"""The same, while it does not tell of a picture that is overdue."""
 _MOST_STREAMS = 8
 """Streams of one camera that are remembered."""
 _PAUSE = 2.0
@@ -80,7 +93,9 @@ class PayloadComponent:
         """Of its video, by number; the first word of each counts."""
         self.card: CardState | None = None
         """What its camera said of its card; None before."""
-        self._card_at = -math.inf
+        self._model: CameraModelTold | None = None
+        self._capture: CaptureStatus | None = None
+        self._card_at = self._capture_at = -math.inf
         self.commander = commander
         self._moment = moment
         self._count = count
@@ -149,23 +164,56 @@ class PayloadComponent:
             self.streams.setdefault(int(message.stream_id), video_stream(message))
         elif kind == "STORAGE_INFORMATION":
             self.card, self._card_at = card_state(message), now
-            for search in self._searches:
-                search.left = _REQUESTS if search.message == _STORAGE else search.left
+            self._answered(_STORAGE)
+        elif kind == "CAMERA_CAPTURE_STATUS":
+            self._capture, self._capture_at = capture_status(message), now
+            self._answered(_CAPTURE)
+            if self.camera is not None:
+                self.camera.compare(self._capture, now)
+
+    def _answered(self, message: int) -> None:
+        """Ask for it again later: it changes."""
+        for search in self._searches:
+            search.left = _REQUESTS if search.message == message else search.left
 
     def _inform(self, information: Message) -> None:
         self._informed = True
+        self._model = camera_model_told(information)
         if self.camera is None and _takes_pictures(information):
-            self.camera = MavlinkCamera(self.commander, self._moment, self._count)
-        if self.camera is not None and all(one.message != _STORAGE for one in self._searches):
-            self._searches.append(_Search(_STORAGE))
+            lens = MavlinkLens(self.commander, int(information.flags))
+            self.camera = MavlinkCamera(self.commander, lens, self._moment, self._count)
         films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
-        if films and all(search.message != _VIDEO for search in self._searches):
-            self._searches.append(_Search(_VIDEO))
+        wanted = [_STORAGE, _CAPTURE] if self.camera is not None else []
+        for message in [*wanted, _VIDEO] if films else wanted:
+            if all(search.message != message for search in self._searches):
+                self._searches.append(_Search(message))
+
+    @property
+    def status(self) -> CameraStatus | None:
+        """What its camera says that it is and does; None before, and without one."""
+        model, card, capture = self._model, self.card, self._capture
+        if model is None:
+            return None
+        told = None if card is None else card.free
+        return CameraStatus(
+            self.name,
+            model.name,
+            model.pixels,
+            model.view,
+            free=told if told is not None or capture is None else capture.free,
+            trouble="" if card is None else card.trouble,
+            taken=None if capture is None else capture.taken,
+            interval=None if capture is None else capture.interval,
+            recording=None if capture is None else capture.recording,
+        )
 
     def _knows(self, message: int, now: float) -> bool:
         """Whether what a search is for has been found."""
         if message == _STORAGE:
             return now - self._card_at < _CARD_AGAIN
+        if message == _CAPTURE:
+            overdue = self.camera is not None and self.camera.is_overdue(now)
+            return now - self._capture_at < (_CAPTURE_SOON if overdue else _CAPTURE_AGAIN)
         if message == _VIDEO:
             return bool(self.streams)
         return self._informed if message == _CAMERA else self.gimbal is not None

@@ -18,17 +18,19 @@ from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
-from aerodaas.drivers.mavlink.microservices.storage import CardState
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.clock import Clock
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import yaw_enu_to_ned
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.payload import (
+    CameraStatus,
     Gimbal,
     GimbalAttitude,
     GimbalTarget,
+    LensTarget,
     PhotoCamera,
     PhotoOutcome,
 )
@@ -49,6 +51,7 @@ class Payload:
             *("GIMBAL_MANAGER_INFORMATION", "GIMBAL_DEVICE_ATTITUDE_STATUS"),
             *("CAMERA_INFORMATION", "CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"),
             *("VIDEO_STREAM_INFORMATION", "STORAGE_INFORMATION"),
+            "CAMERA_CAPTURE_STATUS",
         }
     )
     """What `take` processes."""
@@ -110,6 +113,10 @@ class Payload:
         cameras = [one.camera for one in self._ranked() if one.camera is not None]
         return [outcome for camera in cameras for outcome in camera.outcomes()]
 
+    def complete_health(self, health: HealthReadings) -> HealthReadings:
+        """`health` with the cameras."""
+        return replace(health, cameras=tuple(self.cameras()))
+
     def complete(self, state: VehicleState) -> VehicleState:
         """`state` with the gimbal's attitude and what is wrong; it is the newest from now on."""
         self._odometry = state.odometry
@@ -136,10 +143,11 @@ class Payload:
                 for number in sorted(one.streams)
             ]
 
-    def cards(self) -> list[tuple[str, CardState]]:
-        """What its cameras say of their cards, with the camera's name, the preferred one first."""
+    def cameras(self) -> list[CameraStatus]:
+        """What its cameras say that they are and do, the preferred one first."""
         with self._lock:
-            return [(one.name, one.card) for one in self._ranked() if one.card is not None]
+            told = (one.status for one in self._ranked())
+            return [status for status in told if status is not None]
 
     def _video(self) -> str:
         return next((stream.uri for _, stream in self.streams() if not stream.objection), "")
@@ -231,6 +239,28 @@ class _Cameras:
             if camera is None:
                 raise VehicleError("no camera answers any more")
             return camera.take_photo(label, time.monotonic())
+
+    def adjust(self, target: LensTarget) -> None:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            if camera is None:
+                raise VehicleError("no camera answers any more")
+            camera.lens.adjust(target, time.monotonic())
+
+    @property
+    def adjusted(self) -> bool:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            return camera is not None and camera.lens.adjusted
+
+    @property
+    def lens_fault(self) -> str:
+        """See `LensCamera`."""
+        with self._lock:
+            camera = self._payload.used_camera()
+            return "" if camera is None else camera.lens.fault
 
     def outcomes(self) -> list[PhotoOutcome]:
         """See `PhotoCamera`."""

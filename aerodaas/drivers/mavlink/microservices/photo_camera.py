@@ -1,7 +1,8 @@
 """A camera by the camera protocol v2: one picture after the other, each until it is told.
 
 That a picture was taken is told by CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with
-the place that the autopilot had at its exposure.
+the place that the autopilot had at its exposure. Where that message is lost on the way, the
+camera's own count (CAMERA_CAPTURE_STATUS) tells that it was taken, and no more.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from aerodaas.drivers.mavlink.microservices.camera_status import CaptureStatus
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
+from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.data import Odometry
@@ -29,6 +32,8 @@ Moment: TypeAlias = Callable[[], tuple[int, Odometry | None, GimbalAttitude | No
 
 _PATIENCE = 8.0
 """Seconds from a request to the word of its picture."""
+_OVERDUE = 2.0
+"""Seconds from the camera's word that it takes a picture, after which its count is asked for."""
 _MOST = 64
 """Outcomes kept for who does not ask for them."""
 
@@ -38,6 +43,12 @@ class _Request:
     number: int
     label: str
     deadline: float
+    before: int | None
+    """Pictures that the camera had taken by its own count; None where that is not known."""
+    begun_at: float = math.inf
+    """Second of its word that it takes the picture."""
+    moment: tuple[int, Odometry | None, GimbalAttitude | None] | None = None
+    """Mission clock, vehicle and gimbal at that word."""
 
 
 class MavlinkCamera:
@@ -46,26 +57,39 @@ class MavlinkCamera:
     def __init__(
         self,
         commander: Commander,
+        lens: MavlinkLens,
         moment: Moment,
         count: Iterator[int],
     ) -> None:
         """Command it by `commander`; `count` numbers the pictures of all cameras."""
+        self.lens = lens
         self._commander = commander
         self._moment = moment
         self._count = count
         self._request: _Request | None = None
         self._newest: int | None = None
+        self._now = -math.inf
+        """Second of its newest turn."""
+        self._taken: int | None = None
+        """Pictures that the camera has taken by its own count; None before its word of it."""
+        self._settled = 0
+        """The same, when a picture was last taken for granted by that count."""
         self._outcomes: deque[PhotoOutcome] = deque(maxlen=_MOST)
 
     def take_photo(self, label: str, now: float) -> int:
         """Ask for one picture; one that is still awaited is given up."""
         self.give_up("another picture was asked for before it came")
+        self._now = now
         number = next(self._count)
-        self._request = _Request(number, label, now + _PATIENCE)
+        self._request = _Request(number, label, now + _PATIENCE, self._taken)
 
         def done(outcome: CommandResult) -> None:
             request = self._request
-            if not outcome.accepted and request is not None and request.number == number:
+            if request is None or request.number != number:
+                return
+            if outcome.accepted:
+                request.begun_at, request.moment = self._now, self._moment()
+            else:
                 self._fail(request, f"the camera: {outcome.text}")
 
         self._commander.give(
@@ -92,6 +116,7 @@ class MavlinkCamera:
 
     def turn(self, now: float) -> None:
         """Give up a picture that is not told."""
+        self._now = now
         if self._request is not None and now >= self._request.deadline:
             self._fail(self._request, "the camera does not tell of the picture")
 
@@ -99,6 +124,27 @@ class MavlinkCamera:
         """Give up a picture that is awaited."""
         if self._request is not None:
             self._fail(self._request, reason)
+
+    def is_overdue(self, now: float) -> bool:
+        """Whether the camera took on a picture a while ago, and does not tell of it."""
+        return self._request is not None and now - self._request.begun_at >= _OVERDUE
+
+    def compare(self, status: CaptureStatus, now: float) -> None:
+        """Take an overdue picture for taken where the camera's own count has gone up for it."""
+        request = self._request
+        self._taken = status.taken
+        # Its count begins anew with a formatted card.
+        self._settled = min(self._settled, status.taken)
+        if request is None or request.moment is None or not self.is_overdue(now):
+            return
+        # Pictures that it takes by itself count, too, and nobody could tell whose one is.
+        if request.before is None or status.interval is not None or status.taken <= request.before:
+            return
+        self._request, self._settled = None, status.taken
+        stamp, odometry, gimbal = request.moment
+        self._outcomes.append(
+            Photo(request.number, stamp, request.label, odometry=odometry, gimbal=gimbal)
+        )
 
     def _fail(self, request: _Request, reason: str) -> None:
         self._request = None
@@ -111,12 +157,17 @@ class MavlinkCamera:
         if index == self._newest:
             return
         self._newest = index
+        # ArduPilot counts its feedback from 1, cameras their pictures from 0.
+        if (index if told else index - 1) < self._settled:
+            return
         request = self._request
         if told and message.capture_result != 1:
             if request is not None:
                 self._fail(request, "the camera failed to take it")
             return
         self._request = None
+        if self._taken is not None:
+            self._taken += 1
         if told:
             place = _place(message.lat, message.lon, message.alt / 1e3)
             file = str(message.file_url)

@@ -27,11 +27,6 @@ class CardState:
     trouble: str = ""
     """Why it keeps no pictures, or soon will not; empty if it does."""
 
-    def __str__(self) -> str:
-        """One line for people."""
-        room = "room not told" if self.free is None else f"{self.free:.0f} MiB free"
-        return f"{room}; {self.trouble}" if self.trouble else room
-
 
 def card_state(message: Message) -> CardState:
     """Read a STORAGE_INFORMATION, whatever it holds."""

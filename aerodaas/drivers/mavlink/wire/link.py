@@ -63,6 +63,7 @@ _WANTED = frozenset(
         *(
             mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION,
             mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+            mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
         ),
         mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
         *(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mavlink.MAVLINK_MSG_ID_RELAY_STATUS),
