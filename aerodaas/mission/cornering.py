@@ -66,18 +66,24 @@ class Cornering:
     _stops: tuple[QueuedWaypoint, QueuedWaypoint] | None = field(default=None, init=False)
     _leaving: Vector | None = field(default=None, init=False)
 
-    def passing_speed(self, leg: Leg, place: Vector, odometry: Odometry) -> float:
-        """m/s at which the end of `leg` is passed; 0 where the drone stops there.
+    def passing_speed(self, leg: Leg, routed: Vector, place: Vector, odometry: Odometry) -> float:
+        """m/s at which `place` is passed, to which the drone flies now; 0 where it stops there.
 
-        `place` is what it flies to now, ENU metres.
+        The way leads to `routed`, the end of `leg` or a corner before it; `place` is that, or one
+        ahead on a line of pictures. Both are ENU metres.
         """
         stop, following = leg.stop, self.navigator.following
         way = stop.waypoint.position - odometry.position
         distance = length(way)
+        rest = length(stop.waypoint.position - place)
+        if place is not routed and rest > _ROUNDING and self.photographer.flies_along_line(stop):
+            limits = self.limits
+            stops = braking_speed(rest, limits.max_acceleration, limits.reaction_time)
+            return min(stop.waypoint.speed or limits.cruise_speed, stops)
         if (
             following is None
             or distance <= _ROUNDING
-            or length(place - stop.waypoint.position) > _ROUNDING
+            or rest > _ROUNDING
             or not leg.is_facing(odometry.yaw)
             or _stays(stop.waypoint)
             or following.waypoint.trigger_distance is not None

@@ -497,16 +497,16 @@ class Mission:
             return self._after_failure(failure, state)
         if busy and phase is LegPhase.DONE:
             phase = LegPhase.HOVERING
-        place = self._route.towards(stop.waypoint.position, position, stop.above_ground)
-        if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
+        routed = self._route.towards(stop.waypoint.position, position, stop.above_ground)
+        if routed is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
             self._finish(stop, phase)
             return self._fly(state)
         stays = phase is LegPhase.HOVERING
         doing = MissionState.LOITERING if stays else MissionState.ENROUTE
         self._to(diverted or doing, f"{'at' if stays else 'flying to'} {stop.id}")
         self._anchor = None
-        place, heading = self.photographer.steer(place, state.odometry, self._now)
-        passing = self._cornering.passing_speed(self._leg, place, state.odometry)
+        place, heading = self.photographer.steer(routed, state.odometry, self._now)
+        passing = self._cornering.passing_speed(self._leg, routed, place, state.odometry)
         flown = self._leg.setpoint(place, position, limits.cruise_speed, heading, passing)
         return Fly(flown, stop.cause)
 

@@ -116,6 +116,11 @@ class PhotoTrigger:
         return abs(wrap_angle(yaw - bearing)) > _ALONG
 
     @property
+    def aligned(self) -> bool:
+        """Whether the drone flies along the line by now, with a place ahead as its target."""
+        return self.distance is not None and self._aligned
+
+    @property
     def awaits(self) -> bool:
         """Whether a place on this leg has not been passed yet."""
         return self.distance is not None and self._next <= self._length + _ROUNDING

@@ -97,6 +97,11 @@ class Photographer:
             return place, heading
         return ahead, task.trigger.bearing if heading is None else heading
 
+    def flies_along_line(self, stop: QueuedWaypoint) -> bool:
+        """Whether the drone flies along the line of pictures by distance on the leg to `stop`."""
+        task = self._tasks.get(stop.id)
+        return task is not None and task.stop is stop and task.trigger.aligned
+
     def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
         """Whether a picture by distance is due within `radius` metres of the end of its leg."""
         task = self._tasks.get(stop.id)

@@ -37,13 +37,13 @@ EAST = np.array([1.0, 0.0, 0.0])
 
 
 def passed_at(one: Flight, waypoint_id: str) -> float:
-    """The passing speed on the way to a waypoint, where it was highest."""
+    """The speed at which a waypoint itself is passed, where it was highest on the way there."""
     speeds = [0.0]
     while (current := one.status.target) is None or current.id != waypoint_id:
         one.turn()
     while (current := one.status.target) is not None and current.id == waypoint_id:
         sent = one.turn().sent
-        if isinstance(sent, PositionSetpoint):
+        if isinstance(sent, PositionSetpoint) and np.array_equal(sent.position, current.position):
             speeds.append(sent.passing_speed)
     return max(speeds)
 
@@ -177,6 +177,39 @@ def test_a_waypoint_that_is_missed_in_passing_is_stopped_at() -> None:
     one = flight(add(*ROW), limits=LIMITS, vehicle=Aside())
     one.run(120.0, until=lambda: one.mission.status.visits == 3)
     assert tuple(one.status.visited) == ("w1", "w2", "w3")
+
+
+def test_the_place_ahead_on_a_line_of_pictures_does_not_slow_the_drone_down() -> None:
+    """Nor is the line's end passed, at which the last picture is due."""
+    far = Waypoint("far", 120.0, 0.0, 2.0, trigger_distance=5.0)
+    one = flight(add(Waypoint("near", 5.0, 0.0, 2.0), far, ROW[0]), limits=LIMITS)
+    one.run(until=lambda: one.mission.status.visits == 1)
+    one.run(20.0)
+    sent = one.turn().sent
+    assert isinstance(sent, PositionSetpoint)
+    assert 10.0 < sent.position[0] < 119.0
+    assert sent.passing_speed == 2.0
+    for record in (one.turn() for _ in range(900)):
+        if isinstance(record.sent, PositionSetpoint) and one.status.visits == 1:
+            there = far.position - record.sent.position
+            room = braking_distance(record.sent.passing_speed, 3.0, 0.3)
+            assert room <= float(np.linalg.norm(there)) + 1e-6
+    assert one.status.visits >= 2
+
+
+def test_a_corner_on_the_way_to_a_picture_is_no_place_ahead() -> None:
+    """A drone that flies around a zone passes none of its corners."""
+    zone = [(43.0, -2.0), (46.0, -2.0), (46.0, 3.0), (43.0, 3.0)]
+    limits = LIMITS.model_copy(update={"geofence": GeofenceConfig(no_fly=[zone], margin=0.5)})
+    far = Waypoint("far", 120.0, 0.0, 2.0, trigger_distance=5.0)
+    one = flight(add(Waypoint("near", 5.0, 0.0, 2.0), far), limits=limits)
+    around = 0
+    while one.status.visits < 2:
+        sent = one.turn().sent
+        if isinstance(sent, PositionSetpoint) and abs(sent.position[1]) > 1.0:
+            around += 1
+            assert sent.passing_speed == 0.0
+    assert around > 20
 
 
 def test_what_lies_in_the_same_place_is_not_passed() -> None:
