@@ -47,13 +47,16 @@ GOOD: dict[str, Any] = {
     ],
 }
 
+_TAKING = ("photo_interval", "zoom")
+"""How new pictures are taken."""
 LOCAL_ALONE = {
     "$schema",
     "robots.sensors.settings.path",
     "robots.sensors.settings.topic",
     "sensors.settings.path",
     "sensors.settings.topic",
-    # No replay turns a gimbal: its camera shows the recorded pictures.
+    # No replay turns a gimbal or zooms: its camera shows the recorded pictures, each with its lens.
+    *(f"{place}sensors.settings.{one}" for place in ("robots.", "") for one in _TAKING),
     *(
         f"{place}sensors.settings.gimbal.{name}"
         for place in ("robots.", "")

@@ -187,7 +187,8 @@ class VelocityLoop:
             reaction_time=_REACTION,
             yaw_rate=self._limits.turn,
         )
-        near = length(target.position - odometry.position) < _AT_REST
+        stops = target.passing_speed == 0.0
+        near = stops and length(target.position - odometry.position) < _AT_REST
         faces = target.yaw is None or abs(wrap_angle(target.yaw - odometry.yaw)) < _FACING
         return VelocitySetpoint(
             np.zeros(3) if near else self._clip(asked.velocity), 0.0 if faces else asked.yaw_rate
