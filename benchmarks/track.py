@@ -1,9 +1,11 @@
 """Track error and time of a 2 km survey: our setpoints beside the autopilot's own mission mode.
 
 python benchmarks/track.py --from ~/ardupilot --speed 10 --wind 8
+python benchmarks/track.py --autopilot px4 --from ~/PX4-Autopilot --speed 10 --wind 0
 
-An ArduCopter in simulation flies the same plan twice, once by our setpoints and once handed over to
-its own mission mode: five lines of 360 m, 45 m apart, and the ways between them, without a stop.
+An ArduCopter or a PX4 (with SIH) in simulation flies the same plan twice, once by our setpoints and
+once handed over to its own mission mode: five lines of 360 m, 45 m apart, and the ways between them,
+without a stop.
 Errors are metres from the plan's lines over ground and in height, by the autopilot's own position,
 from the first waypoint to the last; in the middle of lines, 30 m and more from a corner, and near
 corners. Times are the autopilot's. It runs by the wall clock, some three to eight minutes a flight.
@@ -47,7 +49,10 @@ _PERIOD = 0.05
 _HEIGHT, _LINE, _GAP, _LINES = 30.0, 360.0, 45.0, 5
 _CORNER = 30.0
 """Metres from a corner within which a place counts as near it."""
-_BATTERY = {"BATT_CAPACITY": 60000.0, "SIM_BATT_CAP_AH": 60.0}
+_BATTERY = {
+    "ardupilot": {"BATT_CAPACITY": 60000.0, "SIM_BATT_CAP_AH": 60.0},
+    "px4": {"SIM_BAT_DRAIN": 7200.0},
+}
 """One that lasts for the longest flight."""
 _LONGEST = 1200.0
 """Seconds of a flight."""
@@ -67,7 +72,9 @@ def survey(speed: float) -> list[Waypoint]:
     return stops
 
 
-def fly(url: str, speed: float, wind: float, radius: float, *, own: bool) -> dict[str, float]:
+def fly(
+    autopilot: str, url: str, speed: float, wind: float, radius: float, *, own: bool
+) -> dict[str, float]:
     """Figures of one flight; `own`: by the autopilot's own mission mode."""
     limits = {
         "cruise_speed": speed,
@@ -89,7 +96,8 @@ def fly(url: str, speed: float, wind: float, radius: float, *, own: bool) -> dic
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(60.0)
     try:
-        for name, value in {**_BATTERY, "SIM_WIND_SPD": wind, "SIM_WIND_DIR": 60.0}.items():
+        air = {"SIM_WIND_SPD": wind, "SIM_WIND_DIR": 60.0} if autopilot == "ardupilot" else {}
+        for name, value in {**_BATTERY[autopilot], **air}.items():
             vehicle.parameters.set(name, value)
         return _figures(*_flown(vehicle, robot, survey(speed), own=own), survey(speed))
     finally:
@@ -154,12 +162,15 @@ def main(
     source: Annotated[Path | None, typer.Option("--from", help="Where ArduPilot is.")] = None,
     speed: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [5.0, 10.0, 15.0],  # noqa: B006
     wind: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [0.0, 8.0],  # noqa: B006
+    autopilot: Annotated[str, typer.Option(help="ardupilot, px4")] = "ardupilot",
     who: Annotated[list[str], typer.Option(help="setpoints, mission")] = ["setpoints", "mission"],  # noqa: B006
     radius: Annotated[float, typer.Option(help="arrival_radius; an ArduCopter's is 2 m.")] = 2.0,
     instance: Annotated[int, typer.Option(help="Number of the simulator among several.")] = 0,
     out: Annotated[Path | None, typer.Option(help="File for the figures as JSON.")] = None,
 ) -> None:
     """Fly each speed in each wind, by our setpoints and by the autopilot's own mission mode."""
+    if autopilot == "px4" and any(wind):
+        raise typer.BadParameter("PX4's SIH is flown without wind here: give --wind 0")
     report = Report("track", UNITS, packages=["pymavlink"])
     report.note(
         "across: metres from the plan's lines over ground, by the autopilot's own position; at "
@@ -170,10 +181,10 @@ def main(
             for flown in who:
                 with tempfile.TemporaryDirectory() as state:
                     options = SitlOptions(Path(state), source=source, instance=instance)
-                    with SitlProcess("ardupilot", options):
+                    with SitlProcess(autopilot, options):
                         host, port = options.heard_at
                         url = f"udpin:{host}:{port}"
-                        figures = fly(url, one, air, radius, own=flown == "mission")
+                        figures = fly(autopilot, url, one, air, radius, own=flown == "mission")
                 report.row(f"{one:g} m/s, wind {air:g} m/s, {flown}", figures)
                 report.show()
     if out is not None:
