@@ -4,8 +4,8 @@ python benchmarks/track.py --from ~/ardupilot --speed 10 --wind 8
 python benchmarks/track.py --autopilot px4 --from ~/PX4-Autopilot --speed 10 --wind 0
 
 An ArduCopter or a PX4 (with SIH) in simulation flies the same plan twice, once by our setpoints and
-once handed over to its own mission mode: five lines of 360 m, 45 m apart, and the ways between them,
-without a stop.
+once handed over to its own mission mode: five lines of 360 m, 45 m apart, and the ways between
+them, without a stop.
 Errors are metres from the plan's lines over ground and in height, by the autopilot's own position,
 from the first waypoint to the last; in the middle of lines, 30 m and more from a corner, and near
 corners. Times are the autopilot's. It runs by the wall clock, some three to eight minutes a flight.
