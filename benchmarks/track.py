@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.sitl.process import SitlProcess
-from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
+from aerodaas.drivers.mavlink.sitl.programs import Family, SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.mission.commands import AddNavigation, HandOver, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -73,7 +73,7 @@ def survey(speed: float) -> list[Waypoint]:
 
 
 def fly(
-    autopilot: str, url: str, speed: float, wind: float, radius: float, *, own: bool
+    autopilot: Family, url: str, speed: float, wind: float, radius: float, *, own: bool
 ) -> dict[str, float]:
     """Figures of one flight; `own`: by the autopilot's own mission mode."""
     limits = {
@@ -159,10 +159,12 @@ def _figures(
 
 
 def main(
-    source: Annotated[Path | None, typer.Option("--from", help="Where ArduPilot is.")] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Its source tree or program.")
+    ] = None,
     speed: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [5.0, 10.0, 15.0],  # noqa: B006
     wind: Annotated[list[float], typer.Option(help="m/s; may be repeated.")] = [0.0, 8.0],  # noqa: B006
-    autopilot: Annotated[str, typer.Option(help="ardupilot, px4")] = "ardupilot",
+    autopilot: Annotated[Family, typer.Option(help="Whose simulation flies.")] = "ardupilot",
     who: Annotated[list[str], typer.Option(help="setpoints, mission")] = ["setpoints", "mission"],  # noqa: B006
     radius: Annotated[float, typer.Option(help="arrival_radius; an ArduCopter's is 2 m.")] = 2.0,
     instance: Annotated[int, typer.Option(help="Number of the simulator among several.")] = 0,

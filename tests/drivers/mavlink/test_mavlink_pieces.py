@@ -158,14 +158,17 @@ def flown_along(
         setpoint = PositionSetpoint(
             places[leg], None, speed, 0.0 if last else passing, places[leg - 1]
         )
-        state = {"vehicle": here, "velocity": moving, "facing": 0.0, "now": 100.0 + turn / 20}
-        seen = target.towards(setpoint, speed, **state)
+        seen = target.towards(
+            setpoint, speed, vehicle=here, velocity=moving, facing=0.0, now=100.0 + turn / 20
+        )
         sent.append(seen)
         late = sent[max(0, turn - 2)]
         for _ in range(5):
             wanted = late.velocity + 0.95 * (late.position - here)
             change = (wanted - moving) / lag
-            moving = moving + 0.01 * change * min(1.0, 3.0 / max(1e-9, np.linalg.norm(change)))
+            moving = moving + 0.01 * change * min(
+                1.0, 3.0 / max(1e-9, float(np.linalg.norm(change)))
+            )
             here = here + 0.01 * moving
             track.append((*here[:2], float(np.linalg.norm(moving))))
     return np.array(track)
@@ -212,7 +215,7 @@ def test_a_vehicle_at_its_limit_is_asked_for_little_more_than_it_does() -> None:
 def test_a_vehicle_that_was_blown_far_away_is_waited_for() -> None:
     """Its target stands and is not flown on from."""
     target, far = MovingTarget(3.0, 1.5), PositionSetpoint(np.array([900.0, 0.0, 0.0]))
-    state = {"velocity": np.zeros(3), "facing": 0.0}
+    state: dict[str, Any] = {"velocity": np.zeros(3), "facing": 0.0}
     first = target.towards(far, 5.0, vehicle=np.zeros(3), now=100.0, **state)
     blown = first.position + np.array([0.0, 6.5, 0.0])
     seen = target.towards(far, 5.0, vehicle=blown, now=100.05, **state)
