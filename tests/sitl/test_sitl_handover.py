@@ -60,7 +60,8 @@ def finish(flight: SitlFlight) -> None:
     flight.run(180.0)
     assert flight.mission.state is S.LANDED, flight.story
     assert flight.status.visited == ("a", "b", "c", "d")
-    assert flight.relay.witness.away < 1.0
+    # PX4's own estimate has wandered by up to a metre meanwhile.
+    assert flight.relay.witness.away < 1.5
 
 
 def test_the_autopilot_flies_them_all(autopilot: Autopilot) -> None:

@@ -203,7 +203,8 @@ def test_a_vehicle_at_its_limit_is_asked_for_little_more_than_it_does() -> None:
     """Against the wind it flies at 6 m/s, whatever it is told."""
     target, here, moving = MovingTarget(3.0, 1.5), np.zeros(3), np.array([6.0, 0.0, 0.0])
     far = PositionSetpoint(np.array([900.0, 0.0, 0.0]))
-    for turn in range(400):
+    seen = target.towards(far, 10.0, vehicle=here, velocity=moving, facing=0.0, now=100.0)
+    for turn in range(1, 400):
         here = here + moving * 0.05
         seen = target.towards(
             far, 10.0, vehicle=here, velocity=moving, facing=0.0, now=100.0 + turn / 20
