@@ -25,6 +25,8 @@ _LONG = 1.5
 _GROUND = frozenset({"idle", "preflight", "taking_off", "landing", "landed", "aborted"})
 _SHAPES = "sDv^P*X"
 """Marks of the first, second, … label seen."""
+_NAMES_ABOVE, _NAMES_ASIDE = 8, 5
+"""Waypoints that are named in each plot at most: more names would hide each other."""
 _APART = 1.0
 """Metres between the marks of one label: an object seen 15 times a second is marked once."""
 
@@ -84,9 +86,12 @@ def profile_figure(flight: RecordedFlight) -> Figure:
                 linewidth=2.5,
             )
             states[state] = None
-        for name_, distance, height in _passed(robot, way):
+        passed = list(_passed(robot, way))
+        labelled = _labelled(len(passed), _NAMES_ASIDE)
+        for index, (name_, distance, height) in enumerate(passed):
             axes.plot(distance, height, "o", color="black", markersize=7, zorder=4)
-            _label(axes, distance, height, name_)
+            if index in labelled:
+                _label(axes, distance, height, name_)
         suffix = f" of {name}" if len(robots) > 1 else ""
         axes.set_ylabel(f"Height{suffix} (m)")
         axes.margins(x=0.02, y=0.22)
@@ -152,10 +157,17 @@ def _draw_plan(axes: Axes, robot: RobotFlight) -> None:
         ring = np.array([*robot.fence, robot.fence[0]])
         axes.plot(ring[:, 0], ring[:, 1], "--", color="black", linewidth=1.2)
     order = {name: str(number) for number, name in enumerate(robot.visited, start=1)}
-    for name, (east, north, _) in robot.plan.items():
+    labelled = _labelled(len(robot.plan), _NAMES_ABOVE)
+    for index, (name, (east, north, _)) in enumerate(robot.plan.items()):
         face = "black" if name in order else "white"
         axes.plot(east, north, "o", color="black", mfc=face, markersize=7, zorder=4)
-        _label(axes, east, north, f"{order[name]}. {name}" if name in order else name)
+        if index in labelled:
+            _label(axes, east, north, f"{order[name]}. {name}" if name in order else name)
+
+
+def _labelled(count: int, most: int) -> frozenset[int]:
+    """Which of `count` waypoints in a row are named, `most` at most; first and last are."""
+    return frozenset(np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist())
 
 
 def _draw_path(axes: Axes, robot: RobotFlight) -> list[str]:
