@@ -10,15 +10,19 @@ from typing import Any
 
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 
-__all__ = ["catalogue", "redacted"]
+__all__ = ["calibration", "catalogue", "redacted"]
 
 _CALIBRATION = (
     *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
     *("gimbal", "photo_interval", "zoom"),
 )
-"""Settings of a sensor that anybody may know."""
 _NOWHERE = "http://{}.invalid"
 """An address that leads nowhere, for whatever has one at its owner's (RFC 2606, section 2)."""
+
+
+def calibration(sensor: SensorConfig) -> dict[str, Any]:
+    """Settings of a sensor that anybody may know, and that a simulated twin of it has as well."""
+    return {key: sensor.settings[key] for key in _CALIBRATION if key in sensor.settings}
 
 
 def catalogue(config: EnvironmentConfig) -> EnvironmentConfig:
@@ -74,7 +78,7 @@ def redacted(
 
 
 def _sensor(sensor: SensorConfig, *, paths: bool) -> dict[str, Any]:
-    settings = {key: sensor.settings[key] for key in _CALIBRATION if key in sensor.settings}
+    settings = calibration(sensor)
     camera = sensor.type == "camera"
     if paths and not camera and sensor.settings.get("path"):
         settings["path"] = _NOWHERE.format(f"{sensor.full_id.replace('/', '-')}.path")

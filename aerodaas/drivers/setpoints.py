@@ -1,16 +1,29 @@
-"""Checks of a setpoint by every driver, before it is sent."""
+"""What every driver does with a setpoint before it is sent: checks, and a speed that it may fly."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from aerodaas.types.errors import InvalidWaypointError
 from aerodaas.types.geometry import is_finite
-from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
-__all__ = ["require_finite"]
+__all__ = ["require_finite", "slowed"]
+
+
+def slowed(
+    setpoint: PositionSetpoint, cruise: float, fastest: float
+) -> tuple[PositionSetpoint, float]:
+    """`setpoint` with a speed of at most `fastest` m/s, and that speed; `cruise` if it names none.
+
+    Its place is passed no faster than the way there is flown.
+    """
+    speed = min(cruise if setpoint.speed is None else float(setpoint.speed), fastest)
+    passing = min(float(setpoint.passing_speed), speed)
+    return replace(setpoint, speed=speed, passing_speed=passing), speed
 
 
 def require_finite(name: str, setpoint: Setpoint) -> None:

@@ -15,7 +15,7 @@ from aerodaas.cameras.settings import camera_settings
 from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.setpoints import require_finite
+from aerodaas.drivers.setpoints import require_finite, slowed
 from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
@@ -258,13 +258,11 @@ class SimulatedVehicle:
     def _send_position(self, setpoint: PositionSetpoint) -> PositionSetpoint:
         x, y, z = (float(axis) for axis in setpoint.position)
         z = max(z, self._rotor.ground)
-        wanted = self._limits.cruise if setpoint.speed is None else float(setpoint.speed)
-        speed = min(wanted, self._limits.speed)
+        sent, speed = slowed(setpoint, self._limits.cruise, self._limits.speed)
         yaw = setpoint.yaw
         facing = self._rotor.yaw + self._noise.yaw_drift if yaw is None else float(yaw)
-        passing = min(float(setpoint.passing_speed), speed)
-        self._autopilot.guide(Goto((x, y, z), facing, speed, passing))
-        return replace(setpoint, position=np.array([x, y, z]), speed=speed, passing_speed=passing)
+        self._autopilot.guide(Goto((x, y, z), facing, speed, sent.passing_speed))
+        return replace(sent, position=np.array([x, y, z]))
 
     def hold(self) -> None:
         """Brake and hover; raise VehicleError on the ground."""

@@ -99,13 +99,17 @@ class Photographer:
 
     def flies_along_line(self, stop: QueuedWaypoint) -> bool:
         """Whether the drone flies along the line of pictures by distance on the leg to `stop`."""
-        task = self._tasks.get(stop.id)
-        return task is not None and task.stop is stop and task.trigger.aligned
+        trigger = self._trigger_of(stop)
+        return trigger is not None and trigger.aligned
 
     def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
         """Whether a picture by distance is due within `radius` metres of the end of its leg."""
+        trigger = self._trigger_of(stop)
+        return trigger is not None and trigger.ends_with_place(radius)
+
+    def _trigger_of(self, stop: QueuedWaypoint) -> PhotoTrigger | None:
         task = self._tasks.get(stop.id)
-        return task is not None and task.stop is stop and task.trigger.ends_with_place(radius)
+        return task.trigger if task is not None and task.stop is stop else None
 
     def look(self, now: int) -> None:
         """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""

@@ -6,11 +6,12 @@ It decides; publishing and threads are the vehicle's.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from aerodaas.drivers.ros2.touchdown import Touchdown
+from aerodaas.drivers.setpoints import slowed
 from aerodaas.types.braking import limit_length, stopping_point, velocity_towards
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector, length, wrap_angle
@@ -117,11 +118,7 @@ class VelocityLoop:
             rate = _cut(float(setpoint.yaw_rate), self._limits.turn)
             clipped = VelocitySetpoint(self._clip(setpoint.velocity), rate)
             return clipped, clipped
-        speed = setpoint.speed
-        wanted = min(self._limits.cruise if speed is None else speed, self._limits.speed)
-        setpoint = replace(
-            setpoint, speed=wanted, passing_speed=min(setpoint.passing_speed, wanted)
-        )
+        setpoint, _ = slowed(setpoint, self._limits.cruise, self._limits.speed)
         return setpoint, self._towards(setpoint, odometry)
 
     def observe(self, odometry: Odometry, now: float) -> None:

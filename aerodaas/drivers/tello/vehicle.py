@@ -6,13 +6,12 @@ import math
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.setpoints import require_finite
+from aerodaas.drivers.setpoints import require_finite, slowed
 from aerodaas.drivers.tello.battery import BatteryGauge
 from aerodaas.drivers.tello.commands import (
     ENTER,
@@ -273,10 +272,7 @@ class TelloVehicle:
             self._predict(now)
             odometry = self._reckoning.odometry
             if isinstance(setpoint, PositionSetpoint):
-                wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
-                speed = min(wanted, self._speed)
-                passing = min(setpoint.passing_speed, speed)
-                setpoint = replace(setpoint, speed=speed, passing_speed=passing)
+                setpoint, _ = slowed(setpoint, self._cruise, self._speed)
                 asked = self._towards(setpoint, odometry.position, odometry.yaw)
                 velocity = self._clip(asked.velocity)
                 yaw_rate = asked.yaw_rate

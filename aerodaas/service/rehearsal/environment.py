@@ -8,16 +8,12 @@ from typing import Any
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, validated
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.redaction import calibration
 from aerodaas.simulation.airframe import GRAVITY, Airframe
 from aerodaas.simulation.battery import flight_power
 
 __all__ = ["rehearsal_config"]
 
-_LENS = (
-    *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
-    *("gimbal", "photo_interval", "zoom"),
-)
-"""Settings of a camera that its simulated twin has as well."""
 _CELL_VOLTS = 3.9
 """Mean open-circuit voltage of the simulated battery's cells between full and their knee."""
 _HOUR = 3600.0
@@ -74,6 +70,5 @@ def _policy(preflight: PreflightConfig) -> dict[str, Any]:
 def _sensor(sensor: SensorConfig) -> dict[str, Any]:
     content = sensor.model_dump()
     if sensor.type == "camera":
-        lens = {key: sensor.settings[key] for key in _LENS if key in sensor.settings}
-        content |= {"driver": "simulated", "settings": lens}
+        content |= {"driver": "simulated", "settings": calibration(sensor)}
     return content

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.drivers.setpoints import slowed
 from aerodaas.types.braking import limit_length
 from aerodaas.types.data import Odometry
 from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
@@ -64,10 +64,7 @@ class Steering:
             return self._velocity(VelocitySetpoint(np.zeros(3)), target, now)
         if isinstance(setpoint, VelocitySetpoint):
             return self._velocity(setpoint, target, now)
-        wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
-        speed = min(wanted, self._speed)
-        passing = min(float(setpoint.passing_speed), speed)
-        sent = replace(setpoint, speed=speed, passing_speed=passing)
+        sent, speed = slowed(setpoint, self._cruise, self._speed)
         moved = self._target.towards(
             sent,
             speed,
