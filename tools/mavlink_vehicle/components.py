@@ -13,7 +13,19 @@ from tools.mavlink_vehicle.payload import EmulatedPayload
 __all__ = ["EmulatedComponent"]
 
 _HEARTBEAT = 1.0
+"""Seconds between its heartbeats, each with the manager's status where it is a gimbal."""
+_STREAM = 0.2
+"""Seconds between two attitudes of a gimbal that was asked for no other rate."""
 _ATTITUDE = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+_FORMER = {
+    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION,
+    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+    mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: (
+        mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
+    ),
+}
+_MANAGER = mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS
 
 
 class EmulatedComponent:
@@ -25,6 +37,8 @@ class EmulatedComponent:
         """It says and hears nothing."""
         self.stalls = False
         """It beats, and answers nothing."""
+        self.former = False
+        """It knows the requests that came before MAV_CMD_REQUEST_MESSAGE, and not that."""
         self.heard: list[Any] = []
         """Every message for it."""
         camera = number in CAMERAS
@@ -35,7 +49,7 @@ class EmulatedComponent:
         self.payload.by_itself = True
         self.payload.flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
         self._kind = mavlink.MAV_TYPE_CAMERA if camera else mavlink.MAV_TYPE_GIMBAL
-        self._attitude = 0.0
+        self._attitude = 0.0 if camera else _STREAM
         """Seconds between two attitudes; 0 for none."""
         self._beat_due = self._attitude_due = 0.0
 
@@ -59,8 +73,11 @@ class EmulatedComponent:
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL and values[0] == _ATTITUDE:
             self._attitude = values[1] / 1e6
             return mavlink.MAV_RESULT_ACCEPTED
-        if number == mavlink.MAV_CMD_REQUEST_MESSAGE:
-            said = self.payload.message(int(values[0]))
+        requested = _FORMER.get(number) if self.former else None
+        if number == mavlink.MAV_CMD_REQUEST_MESSAGE and not self.former:
+            requested = int(values[0])
+        if requested is not None:
+            said = self.payload.message(requested)
             if said is None:
                 return mavlink.MAV_RESULT_UNSUPPORTED
             self.say(said)
@@ -79,9 +96,13 @@ class EmulatedComponent:
                     self._kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
                 )
             )
+            self._tell(_MANAGER)
         self.payload.advance()
         if self._attitude and now >= self._attitude_due:
             self._attitude_due = now + self._attitude
-            said = self.payload.message(_ATTITUDE)
-            if said is not None:
-                self.say(said)
+            self._tell(_ATTITUDE)
+
+    def _tell(self, number: int) -> None:
+        said = self.payload.message(number)
+        if said is not None:
+            self.say(said)

@@ -159,6 +159,13 @@ class EmulatedPayload:
             return mavlink.MAVLink_gimbal_manager_information_message(
                 stamp, able, self.device, *ranges
             )
+        if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION and self.has_gimbal:
+            return self._gimbal_device(stamp)
+        if number == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS and self.has_gimbal:
+            controller = tuple(max(0, round(value)) for value in self.controller or (0.0, 0.0))
+            return mavlink.MAVLink_gimbal_manager_status_message(
+                stamp, 0, self.device, *controller, 0, 0
+            )
         if number == mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS and self.has_gimbal:
             flags = mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK
             unknown = (math.nan, math.nan, math.nan)
@@ -166,6 +173,15 @@ class EmulatedPayload:
                 0, 0, stamp, flags, self._quaternion(), *unknown, 0
             )
         return self._camera_message(number, stamp)
+
+    def _gimbal_device(self, stamp: int) -> Any:  # noqa: ANN401
+        name = b"emulated"
+        able = _AXES | (_YAW_AXIS if self.turns else 0)
+        widest = _WIDEST if self.turns else 0.0
+        ranges = (0.0, 0.0, _LOWEST, _HIGHEST, -widest, widest)
+        return mavlink.MAVLink_gimbal_device_information_message(
+            stamp, name, name, b"", 0, 0, 0, able, 0, *ranges
+        )
 
     def _camera_message(self, number: int, stamp: int) -> Any | None:  # noqa: ANN401
         if number == mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION and self.free is not None:

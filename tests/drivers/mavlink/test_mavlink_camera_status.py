@@ -83,6 +83,24 @@ def test_a_camera_tells_what_it_is_and_does(ends: Stepped) -> None:
         assert item.value.endswith("takes one every 2 s, has been recording for 12 s")
 
 
+def test_a_camera_that_knows_the_former_requests_alone(ends: Stepped) -> None:
+    """What it refuses by MAV_CMD_REQUEST_MESSAGE is asked for by the commands of former days."""
+    with ends:
+        camera = ends.autopilot.components[CAMERA]
+        camera.former = True
+        payload(ends).free, payload(ends).video = 12_000.0, "rtsp://127.0.0.1/main"
+        ready(ends)
+        wait(ends, lambda: ends.vehicle.payload.cameras()[0].free == 12_000.0)
+        wait(ends, ends.vehicle.payload.streams)
+        wanted = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
+        ends.watch(8.0)
+        newer = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
+    refused = wanted.count(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    assert refused == 4
+    assert newer.count(mavlink.MAV_CMD_REQUEST_MESSAGE) == refused
+    assert newer.count(mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION) == 1
+
+
 def test_a_full_card_is_the_cameras_and_told_once(ends: Stepped) -> None:
     """By the level of its policy, and not among other faults again."""
     with ends:

@@ -7,7 +7,7 @@ not do costs what was asked of it, and nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from aerodaas.drivers.mavlink.microservices.camera_status import (
@@ -37,6 +37,14 @@ _CAMERA = mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION
 _VIDEO = mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION
 _STORAGE = mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION
 _CAPTURE = mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS
+_BEFORE: Mapping[int, tuple[int, tuple[float, ...]]] = {
+    _CAMERA: (mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION, (1.0,)),
+    _VIDEO: (mavlink.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION, ()),
+    _STORAGE: (mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION, (0.0, 1.0)),
+    _CAPTURE: (mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS, (1.0,)),
+}
+"""How cameras were asked before MAV_CMD_REQUEST_MESSAGE: by commands that are deprecated and that
+cameras still want (MAVSDK's camera server tells of its card by them only)."""
 _CARD_AGAIN = 20.0
 """Seconds after which a camera that tells of its card is asked again."""
 _CAPTURE_AGAIN = 10.0
@@ -45,6 +53,8 @@ _CAPTURE_SOON = 1.0
 """The same, while it does not tell of a picture that is overdue."""
 _MOST_STREAMS = 8
 """Streams of one camera that are remembered."""
+_VALUES = 7
+"""Of each command."""
 _PAUSE = 2.0
 """Seconds between two requests for the same message."""
 _REQUESTS = 5
@@ -64,6 +74,22 @@ class _Search:
     message: int
     left: int = _REQUESTS
     due: float = -math.inf
+    before: bool = False
+    """Whether it is asked for as in former days, since it was refused otherwise."""
+
+    def command(self) -> PendingCommand:
+        """What asks for it."""
+        now = mavlink.MAV_CMD_REQUEST_MESSAGE, (float(self.message),)
+        number, values = _BEFORE[self.message] if self.before else now
+        padded = (*values, *[0.0] * (_VALUES - len(values)))
+        return PendingCommand(number, padded, "tell what it carries", insists=False)
+
+    def refused(self) -> None:
+        """Ask in the other way, or no more."""
+        if self.before or self.message not in _BEFORE:
+            self.left = 0
+        else:
+            self.before, self.left, self.due = True, _REQUESTS, -math.inf
 
 
 class PayloadComponent:
@@ -228,13 +254,12 @@ class PayloadComponent:
             self.commander.turn(now)
         if self.camera is not None:
             self.camera.turn(now)
-        busy = self.commander.under_way(mavlink.MAV_CMD_REQUEST_MESSAGE) is not None
         for search in self._searches:
             if (
                 not self._knows(search.message, now)
                 and search.left
                 and now >= search.due
-                and not busy
+                and self.commander.under_way(search.command().number) is None
             ):
                 self._request(search, now)
                 return
@@ -245,18 +270,9 @@ class PayloadComponent:
 
         def done(outcome: CommandResult) -> None:
             if not (outcome.accepted or outcome.replaced) and outcome.text != "no answer":
-                search.left = 0
+                search.refused()
 
-        self.commander.give(
-            PendingCommand(
-                mavlink.MAV_CMD_REQUEST_MESSAGE,
-                (float(search.message), *[0.0] * 6),
-                "tell what it carries",
-                insists=False,
-            ),
-            done,
-            now=now,
-        )
+        self.commander.give(search.command(), done, now=now)
 
     def see_to_attitude(self, now: float, device: Callable[[int], Commander | None]) -> None:
         """Ask for the gimbal's attitude, at first and where it does not come.
