@@ -171,10 +171,8 @@ class Multirotor:
         ax = _VELOCITY_GAIN * (demand[0] - vx)
         ay = _VELOCITY_GAIN * (demand[1] - vy)
         az = _VELOCITY_GAIN * (demand[2] - vz)
-        size = math.sqrt(ax * ax + ay * ay + az * az)
-        if size > self._max_acceleration:
-            scale = self._max_acceleration / size
-            ax, ay, az = ax * scale, ay * scale, az * scale
+        if ax * ax + ay * ay + az * az > self._max_acceleration * self._max_acceleration:
+            ax, ay, az = _limited((ax, ay, az), demand, self._max_acceleration)
         lx, ly, lz = self._disturbance
         fx, fy, fz = ax - lx, ay - ly, az - lz + GRAVITY
         fz = min(max(fz, _MIN_THRUST_SHARE * GRAVITY), self._max_thrust)
@@ -242,3 +240,21 @@ class Multirotor:
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         forward, left = c * fx + s * fy, c * fy - s * fx
         return math.asin(-left / size), math.atan2(forward, fz)
+
+
+def _limited(wanted: Triple, demand: Triple, most: float) -> Triple:
+    """An acceleration of at most `most` m/s²: what is flown beside the demanded way stops first.
+
+    What is left speeds up or brakes along it. At a corner, where both are wanted, a drone that did
+    neither in full would be carried past.
+    """
+    ax, ay, az = wanted
+    speed = math.hypot(*demand)
+    ux, uy, uz = (part / speed for part in demand) if speed > 0.0 else (0.0, 0.0, 0.0)
+    along = ax * ux + ay * uy + az * uz
+    bx, by, bz = ax - along * ux, ay - along * uy, az - along * uz
+    aside = math.sqrt(bx * bx + by * by + bz * bz)
+    share = min(1.0, most / aside) if aside > 0.0 else 1.0
+    rest = math.sqrt(max(0.0, most * most - (share * aside) ** 2))
+    along = min(max(along, -rest), rest)
+    return share * bx + along * ux, share * by + along * uy, share * bz + along * uz

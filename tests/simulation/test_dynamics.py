@@ -128,3 +128,19 @@ def test_reading_ahead_changes_nothing() -> None:
     drone.step((1.0, 0.0, 1.0), 0.3)
     there = drone.motion()
     assert here.position[2] < ahead.position[2] < there.position[2]
+
+
+@pytest.mark.parametrize("speed", [2.0, 5.0, 10.0])
+def test_it_stops_beside_a_new_way_before_it_speeds_up_along_it(speed: float) -> None:
+    """From 2.7 m/s east to any speed north: 1.2 m of braking, and what its lag adds."""
+    drone = rotor()
+    for _ in range(300):
+        drone.step((0.0, 0.0, 1.5), 0.0)
+    while drone.velocity[0] < 2.7:
+        drone.step((3.0, 0.0, 0.0), 0.0)
+    start = drone.position[0]
+    for _ in range(round(4.0 / STEP)):
+        drone.step((0.0, speed, 0.0), 0.0)
+        assert math.hypot(*drone.acceleration) < 1.05 * ACCELERATION
+    assert 1.2 < drone.position[0] - start < 2.0
+    assert drone.velocity[1] > 0.9 * min(speed, 8.0)
