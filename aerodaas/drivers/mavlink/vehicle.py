@@ -430,7 +430,7 @@ class MavlinkVehicle:
 
     def logs(self) -> list[LogEntry]:
         """The autopilot's own logs, oldest first; blocks, raises VehicleError, in flight always."""
-        return list_logs(self._grounded_link("list logs"))
+        return list_logs(self._grounded_link("list logs"), self.connection.autopilot)
 
     def fetch_log(
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None

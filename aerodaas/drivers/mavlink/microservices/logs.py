@@ -38,7 +38,7 @@ _FORM = "%Y%m%d-%H%M%S"
 Progress = Callable[[int, int], None]
 
 
-def list_logs(link: MavlinkLink) -> list[LogEntry]:
+def list_logs(link: MavlinkLink, autopilot: Autopilot) -> list[LogEntry]:
     """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread."""
     target = link.target
     found: dict[int, LogEntry] = {}
@@ -49,7 +49,9 @@ def list_logs(link: MavlinkLink) -> list[LogEntry]:
             for entry in _heard(inbox, _TIMEOUT):
                 total = entry.num_logs
                 if total:
-                    found[entry.id] = LogEntry(entry.id, entry.size, entry.time_utc or None)
+                    told = entry.time_utc or None
+                    times = (None, told) if autopilot.log_time_is_end else (told, None)
+                    found[entry.id] = LogEntry(entry.id, entry.size, *times)
                 if len(found) >= entry.num_logs:
                     return [found[number] for number in sorted(found)]
     if total is None:
@@ -80,7 +82,7 @@ def fetch_log(
     link = grounded()
     if not 0 < log.size <= _LARGEST:
         raise VehicleError(f"log {log.number} has {log.size} bytes, which is none to be fetched")
-    file = folder / f"log-{log.number}{_when(log.began)}{autopilot.log_suffix}"
+    file = folder / f"log-{log.number}{_when(log)}{autopilot.log_suffix}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         transfer = FileTransfer(link)
@@ -171,5 +173,6 @@ def _heard(inbox: queue.SimpleQueue[Any], timeout: float) -> Iterator[Any]:
             yield inbox.get(timeout=timeout)
 
 
-def _when(began: float | None) -> str:
-    return "" if began is None else f"-{datetime.fromtimestamp(began, timezone.utc):{_FORM}}"
+def _when(log: LogEntry) -> str:
+    time = log.ended if log.began is None else log.began
+    return "" if time is None else f"-{datetime.fromtimestamp(time, timezone.utc):{_FORM}}"
