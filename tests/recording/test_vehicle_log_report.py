@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from aerodaas.recording.report.page.figures import log_plots
 from aerodaas.recording.report.plots.vehicle_log import log_figures
 from aerodaas.recording.report.report import read_report, write_report
 from aerodaas.recording.vehicle_log.attachment import attach_log, attached_logs, flight_of
+from aerodaas.recording.vehicle_log.log import Series
 from aerodaas.types.errors import AeroDaaSError, RecordingError
 
 FLOWN = Flown()
@@ -99,6 +101,24 @@ def test_lines_are_drawn_at_mission_seconds(recording: Path, tmp_path: Path) -> 
     assert (time[0], time[-1]) == pytest.approx((0.0, 59.9), abs=0.01)
     assert (np.diff(time) >= 0).all()
     assert "PX4's log own.ulg" in made["battery"].axes[0].get_title(loc="left")
+
+
+def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
+    recording: Path, tmp_path: Path
+) -> None:
+    """Whatever the order in the log, and however long it is."""
+    attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    assert attached.log is not None
+    time = np.array([70.0, 62.0, 61.0, 60.0, 10.0, 300.0])
+    heading = np.array([20.0, 5.0, 355.0, 350.0, 1.0, 2.0])
+    angles = {"roll": heading, "pitch": heading, "heading": heading}
+    log = replace(attached.log, topics={"attitude": Series(time, angles)})
+    (made,) = [make() for *_, make in log_figures(replace(attached, log=log))]
+    roll, _, shown = (np.asarray(axes.lines[0].get_ydata()) for axes in made.axes)
+    assert roll.tolist() == [350.0, 355.0, 5.0, 20.0]
+    assert np.array_equal(shown, [350.0, 355.0, np.nan, 5.0, 20.0], equal_nan=True)
 
 
 def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) -> None:
