@@ -18,7 +18,7 @@ from aerodaas.simulation.rangefinder import Floats, SimulatedRangefinder, Surfac
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
 from aerodaas.types.errors import ConfigError
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode
 
 SECOND = 1_000_000_000
 THINGS: list[dict[str, Any]] = [
@@ -127,6 +127,14 @@ def test_its_errors_are_the_seeds() -> None:
     assert measured(0, 0, 5.0, time=0.01, noise=2.0, seed="8") != read[0]
 
 
+def test_an_error_does_not_reach_beyond_the_range() -> None:
+    """Half of the readings at its end are none."""
+    read = [measured(0, 0, 11.99, time=step / 10, noise=1.0) for step in range(200)]
+    known = [one for one in read if one is not None]
+    assert 80 < len(known) < 170
+    assert max(known) <= 12.0
+
+
 def test_ground_that_rises_lifts_what_stands_on_it() -> None:
     """The drone stands at 3 m; unknown ground is nothing."""
 
@@ -172,6 +180,27 @@ def test_the_drone_tells_it_where_its_limits_need_one(tmp_path: Path) -> None:
     state = vehicle.read()
     assert state.truth is not None
     assert state.below == pytest.approx(state.truth.height, abs=0.02)
+
+
+def test_the_drone_measures_its_terrain(tmp_path: Path) -> None:
+    """Which rises to the east by 10 m in 100 m, from where it stands."""
+    longitudes = np.tile(np.arange(1201) / 1200, (1201, 1))
+    east = (longitudes - 0.1) * 111_320.0 * math.cos(math.radians(47.1))
+    (tmp_path / "N47E008.hgt").write_bytes((540 + 0.1 * east).round().astype(">i2").tobytes())
+    config = environment(tmp_path, limits={**LIMITS, "takeoff_height": 8.0})
+    places = {
+        "home": {"latitude": 47.1, "longitude": 8.1, "altitude": 590.0},
+        "terrain": {"files": [str(tmp_path / "N47E008.hgt")]},
+    }
+    vehicle = vehicle_of(validated(config.model_dump(by_alias=True) | places, "file"))
+    vehicle.take_off(8.0)
+    vehicle.advance_to(15 * SECOND)
+    vehicle.send(PositionSetpoint(np.array([40.0, 0.0, 8.0]), speed=5.0))
+    vehicle.advance_to(45 * SECOND)
+    state = vehicle.read()
+    assert state.truth is not None
+    assert state.truth.position[0] == pytest.approx(40.0, abs=0.5)
+    assert state.below == pytest.approx(8.0 - 4.0, abs=0.7)
 
 
 def test_without_one_there_is_no_take_off(tmp_path: Path) -> None:

@@ -46,6 +46,8 @@ class ReportFiles:
     summary_json: Path
     summary_text: Path
     plots: tuple[Path, ...]
+    logs: tuple[AttachedLog, ...]
+    """Vehicles' own logs that the page shows, or says why not."""
 
 
 def read_report(recording: str | Path) -> Report:
@@ -109,6 +111,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         folder / SUMMARY,
         folder / "summary.txt",
         tuple(folder / f"{plot.name}.png" for plot in report.plots),
+        tuple(report.logs),
     )
     contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
     if report.moments:
