@@ -5,9 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pymavlink import DFReader
 from vehicle_logs import Flown, dataflash, ulog
 
@@ -120,6 +123,36 @@ def test_damage_in_the_midst_costs_what_it_covers(tmp_path: Path) -> None:
     assert set(roll.tolist()) == {1.0}
     lost = int(log.damage.split()[0])
     assert 2000 <= lost < 2200
+
+
+def test_figures_that_no_vehicle_has_are_left_out(tmp_path: Path) -> None:
+    """A plot would show nothing beside them."""
+    whole = bytearray(dataflash(FLOWN))
+    at = whole.index(b"\xa3\x95\x13", 5000) + 3 + 9
+    whole[at : at + 4] = np.float32(3e30).tobytes()
+    voltage = read(tmp_path, bytes(whole)).topics["battery"].columns["voltage"]
+    assert np.isnan(voltage).sum() == 1
+    assert np.nanmax(voltage) < 16.0
+
+
+@given(st.sampled_from([dataflash, ulog]), st.randoms(use_true_random=False))
+@settings(max_examples=60, deadline=None)
+def test_whatever_a_file_holds_it_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, write: Write, random: Random
+) -> None:
+    """A recording's attachment may be a stranger's: no other error comes of it."""
+    content = bytearray(write(Flown(duration=2.0)))
+    for _ in range(random.randint(1, 20)):
+        at = random.randrange(8, len(content))
+        change = random.choice([b"", b"\xff", random.randbytes(9)])
+        content[at : at + random.choice([0, 1, 40])] = change
+    try:
+        log = read(tmp_path_factory.mktemp("log"), bytes(content))
+    except RecordingError:
+        return
+    for series in log.topics.values():
+        assert {len(one) for one in series.columns.values()} == {len(series.time)}
+        assert all(np.nanmax(np.abs(one), initial=0.0) <= 1e8 for one in series.columns.values())
 
 
 @pytest.mark.parametrize(

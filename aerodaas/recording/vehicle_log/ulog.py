@@ -51,7 +51,6 @@ def read_ulog(file: Path) -> VehicleLog:
     """
     require_extra("logs", "a log of PX4")
     from pyulog import ULog  # noqa: PLC0415 - needs the extra
-    from pyulog.exceptions import ULogException  # noqa: PLC0415 - as above
 
     wanted = sorted({message for _, message, _ in _TOPICS})
     try:
@@ -59,7 +58,7 @@ def read_ulog(file: Path) -> VehicleLog:
         with contextlib.redirect_stdout(io.StringIO()):
             _check_formats(ULog(str(file), parse_header_only=True))
             ulog = ULog(str(file), message_name_filter_list=wanted)
-    except (ULogException, ValueError, IndexError, KeyError, TypeError, RecursionError) as error:
+    except Exception as error:  # noqa: BLE001 - its reader raises what a broken file brings about
         raise RecordingError(f"is no ULog that can be read ({error}); fetch it again") from None
     found: dict[str, _Data] = {}
     for part in ulog.data_list:
