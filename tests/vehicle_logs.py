@@ -164,7 +164,14 @@ _ULOG = {
 }
 
 
-def ulog(flown: Flown, *, begin: float = 0.0, end: float | None = None, extra: str = "") -> bytes:
+def ulog(
+    flown: Flown,
+    *,
+    begin: float = 0.0,
+    end: float | None = None,
+    extra: str = "",
+    current: float = 11.0,
+) -> bytes:
     """PX4's log of a flight, between two seconds of the mission; `extra` is one more format."""
     log = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", _us(flown, begin)))
     log += _ulog("B", bytes(40))
@@ -178,7 +185,7 @@ def ulog(flown: Flown, *, begin: float = 0.0, end: float | None = None, extra: s
         now = step / 10.0
         east, north, up = flown.velocity(now)
         rows = (
-            (15.2, 11.0),
+            (15.2, current),
             (turned[1], turned[0], 0.0, 0.0),
             (turned[1], 0.0, turned[0], 0.0),
             (1.0, 2.0, -3.0, north, east, -up),

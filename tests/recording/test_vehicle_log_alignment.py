@@ -114,6 +114,18 @@ def test_a_log_of_another_flight_is_refused(tmp_path: Path, other: Flown, said: 
         align(log_of(other), clock_of(tmp_path, FLOWN))
 
 
+def test_a_clock_that_counts_from_1970_lies_over_its_stamps_of_32_bits(tmp_path: Path) -> None:
+    """Simulated PX4s: time_boot_ms has begun anew hundreds of times."""
+    simulated = Flown(zero=1_710_773_350.0)
+    recorded = clock_of(tmp_path, simulated, error=None)
+    anew = 2**32 / 1000
+    recorded.pairs = [(at, clock % anew, error) for at, clock, error in recorded.pairs]
+    told = align(log_of(simulated, 20.0, 50.0), recorded)
+    assert (told.begin, told.end) == pytest.approx((20.0, 50.0), abs=0.01)
+    with pytest.raises(RecordingError, match="another flight"):
+        align(log_of(Flown(zero=simulated.zero + 500.0)), recorded)
+
+
 def test_without_motion_the_clocks_tell(tmp_path: Path) -> None:
     """And that they alone do is said."""
     recorded = clock_of(tmp_path, FLOWN)

