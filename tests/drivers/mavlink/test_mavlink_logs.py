@@ -72,7 +72,10 @@ def test_px4_has_its_own_format(tmp_path: Path) -> None:
     with flight(fallback="ignore") as pair:
         pair.autopilot.firmware.logs.logs = {0: ULOG}
         (log,) = pair.vehicle.logs()
-        assert (log.began, log.ended) == (BEGAN, None)
+        assert (log.began, log.ended) == (None, BEGAN)
+        pair.vehicle.telemetry.software = "1.15.4.255"
+        (older,) = pair.vehicle.logs()
+        assert (older.began, older.ended) == (BEGAN, None)
         file = pair.vehicle.fetch_log(log, tmp_path)
     assert file.suffix == ".ulg"
     assert file.read_bytes() == ULOG
@@ -235,9 +238,8 @@ def test_the_log_of_a_recorded_flight_is_attached(
     with EmulatedAutopilot(options) as autopilot:
         store = autopilot.firmware.logs
         store.logs = {1: other, 2: own, 3: other}
-        # Of a flight of 12 seconds: those of ArduPilot are when a log was last written.
-        shift = 9 if family == "ardupilot" else 4
-        store.times = {1: EPOCH - 600, 2: EPOCH + shift, 3: EPOCH + 600}
+        # Of a flight of 12 seconds: they are when a log was last written.
+        store.times = {1: EPOCH - 600, 2: EPOCH + 9, 3: EPOCH + 600}
         code, told = run("drone", "1", "--attach", "flight.mcap")
         assert code != 0
         assert "is of another flight" in told
