@@ -10,6 +10,7 @@ import typer
 
 from aerodaas.cli import cluster, lab, lease, models, plan, provider, remote, sim
 from aerodaas.cli.application import build_application, run_application, speed_option
+from aerodaas.cli.attach import attach
 from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
@@ -309,6 +310,7 @@ def doctor(
 app.command()(serve)
 app.command()(view)
 app.command()(report)
+app.command()(attach)
 app.command()(compare)
 app.command()(export)
 app.command("import")(import_bag)

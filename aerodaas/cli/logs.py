@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,6 +29,14 @@ def logs(
     latest: Annotated[  # noqa: FBT002
         bool, typer.Option("--latest", help="Fetch the newest one.")
     ] = False,
+    attach: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RECORDING",
+            help="Attach what is fetched to the recording of its flight; without a number, the log "
+            "that was written then.",
+        ),
+    ] = None,
     to: Annotated[Path, typer.Option(help="The folder for what is fetched.")] = Path(),
     env: EnvironmentFile = ENVIRONMENT,
     setting: Overrides = None,
@@ -42,21 +51,59 @@ def logs(
     aerodaas logs drone
     aerodaas logs drone --latest --to runs/logs
     aerodaas logs drone 3 4 --env campus.json
+    aerodaas logs drone --attach runs/survey-20260101-120000/flight.mcap
     """
     from aerodaas.types.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
 
+    # Before anything is fetched: the recording may be none.
+    flown = None if attach is None else _flight(attach, robot)
     with connected_robot(robot, env, setting or ()) as (vehicle, _):
         if not isinstance(vehicle, LoggingVehicle):
             driver = vehicle.capabilities.driver
             raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")
         found = vehicle.logs()
-        if not (numbers or latest):
+        if numbers:
+            chosen = _chosen(found, numbers)
+        elif latest:
+            chosen = _chosen(found, [max((one.number for one in found), default=0)])
+        elif flown is not None:
+            chosen = [_written_then(found, flown)]
+        else:
             _show(robot, found, as_json=as_json)
             return
-        chosen = _chosen(found, numbers or [max((one.number for one in found), default=0)])
         files = [_fetch(vehicle, one, to, quiet=as_json) for one in chosen]
-        if as_json:
-            typer.echo(json.dumps([str(file) for file in files]))
+    if as_json:
+        typer.echo(json.dumps([str(file) for file in files]))
+    if attach is not None:
+        for file in files:
+            _attach(attach, file, robot, quiet=as_json)
+
+
+def _flight(recording: Path, robot: str) -> tuple[float, float]:
+    from aerodaas.recording.vehicle_log.attachment import flight_of  # noqa: PLC0415 - slow to load
+
+    return flight_of(recording, robot)
+
+
+def _written_then(found: Sequence[LogEntry], flown: tuple[float, float]) -> LogEntry:
+    from aerodaas.types.vehicle_log import log_of_flight  # noqa: PLC0415 - slow to load
+
+    chosen = log_of_flight(found, *flown)
+    if chosen is None:
+        raise VehicleError(
+            f"the vehicle tells of no log that it was written at {_when(flown[0])}: list its logs, "
+            "and name one by its number"
+        )
+    return chosen
+
+
+def _attach(recording: Path, file: Path, robot: str, *, quiet: bool) -> None:
+    from aerodaas.config.printable import printable  # noqa: PLC0415 - slow to load
+    from aerodaas.recording.vehicle_log.attachment import attach_log  # noqa: PLC0415 - as above
+
+    attached = attach_log(recording, file, robot)
+    if not quiet:
+        typer.echo(printable(str(attached)))
 
 
 def _chosen(found: Sequence[LogEntry], numbers: Sequence[int]) -> list[LogEntry]:
@@ -84,17 +131,19 @@ def _show(name: str, found: Sequence[LogEntry], *, as_json: bool) -> None:
     from rich.table import Table  # noqa: PLC0415 - as above
 
     if as_json:
-        rows = [{"number": one.number, "size": one.size, "began": one.began} for one in found]
-        typer.echo(json.dumps(rows))
+        typer.echo(json.dumps([asdict(one) for one in found]))
         return
     if not found:
         typer.echo(f"{name} has no logs")
         return
     table = Table(box=None, pad_edge=False)
-    for column in ("log", "began", "MB"):
+    # Each autopilot tells one of the two.
+    ends = any(one.ended is not None for one in found)
+    for column in ("log", "last written" if ends else "began", "MB"):
         table.add_column(column)
     for one in found:
-        table.add_row(str(one.number), _when(one.began), f"{one.size / 1e6:.2f}")
+        when = _when(one.ended if ends else one.began)
+        table.add_row(str(one.number), when, f"{one.size / 1e6:.2f}")
     Console().print(table)
 
 

@@ -29,7 +29,8 @@ def report(
     )
 
     files = write_report(recording, out or recording.parent)
-    typer.echo(f"{printable(str(files.summary))}\n{files.page}")
+    lines = [str(files.summary), *(f"  {log}" for log in files.logs)]
+    typer.echo(printable("\n".join(lines)) + f"\n{files.page}")
 
 
 def compare(

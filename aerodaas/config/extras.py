@@ -10,6 +10,7 @@ __all__ = ["has_extra", "require_extra"]
 
 _PACKAGES = {
     "evaluation": ("pycocotools", "yaml"),
+    "logs": ("pyulog",),
     "notebook": ("pandas",),
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
@@ -31,7 +32,7 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`,
+        extra: `evaluation`, `logs`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service`,
             `supervision` or `terrain`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 

@@ -22,7 +22,10 @@ from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
 from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.payload import SimulatedGimbal, SimulatedPhotoCamera
+from aerodaas.simulation.rangefinder import SimulatedRangefinder, Surface
 from aerodaas.simulation.wind import Wind
+from aerodaas.simulation.world import World
+from aerodaas.terrain.ground import Ground
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
 from aerodaas.types.health import HealthReadings
@@ -79,6 +82,8 @@ class SimulatedVehicle:
         )
         self._noise = SensorNoise(simulation.sensor_noise, f"{simulation.seed}/{robot.id}/noise")
         self._autopilot = Autopilot(airframe, self._rotor, self._noise, self._limits)
+        self._measures_ground = limits.rangefinder_clearance > 0.0
+        self._rangefinder = _rangefinder(robot, environment, airframe)
         self._now = 0
         self._steps = 0
         self._connected = False
@@ -163,7 +168,7 @@ class SimulatedVehicle:
         """Return the state at the time last advanced to."""
         self._require_connection()
         motion = self._rotor.motion((self._now - self._steps * STEP_NS) / NANOSECONDS)
-        exact = _EXACT.odometry(motion)
+        exact, finder = _EXACT.odometry(motion), self._rangefinder
         return VehicleState(
             self._now,
             self._noise.odometry(motion),
@@ -176,6 +181,7 @@ class SimulatedVehicle:
             ended=self._autopilot.ended,
             gimbal=None if self._gimbal is None else self._gimbal.attitude,
             zoom=None if self._camera is None else self._camera.zoom,
+            below=finder.below(motion, self._now) if finder is not None else None,
             actuators=dict(self._actuators.positions),
         )
 
@@ -212,6 +218,11 @@ class SimulatedVehicle:
             reasons.append(f"already {self._autopilot.mode.value.replace('_', ' ')}")
         if self._autopilot.crashed:
             reasons.append("crashed")
+        if self._measures_ground and self._rangefinder is None:
+            reasons.append(
+                "no rangefinder (settings.rangefinder is null), which "
+                "limits.rangefinder_clearance relies on"
+            )
         left, needed = self._autopilot.battery.fraction, self._airframe.battery_minimum
         if left < needed:
             reasons.append(f"the battery holds {left:.0%}, take-off needs {needed:.0%}")
@@ -290,3 +301,25 @@ class SimulatedVehicle:
             raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
         if self._autopilot.mode is VehicleMode.FAILSAFE:
             raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
+
+
+def _rangefinder(
+    robot: RobotConfig, environment: EnvironmentConfig, airframe: Airframe
+) -> SimulatedRangefinder | None:
+    """Its rangefinder; None without one, and where the robot's limits need none.
+
+    Raises ConfigError for a terrain that cannot be read.
+    """
+    if airframe.rangefinder is None or robot.limits.rangefinder_clearance <= 0.0:
+        return None
+    simulation, home, terrain = environment.simulation, environment.home, environment.terrain
+    ground = None
+    if home is not None and terrain is not None:
+        takeoff, reach = np.array(robot.start), robot.limits.max_range
+        ground = Ground.of(terrain, home.origin, takeoff, reach).heights
+    return SimulatedRangefinder(
+        airframe.rangefinder,
+        Surface(World.load(simulation), robot.start[2], ground),
+        simulation.sensor_noise,
+        f"{simulation.seed}/{robot.id}/rangefinder",
+    )

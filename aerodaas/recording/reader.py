@@ -31,6 +31,9 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["Record", "Recording", "Topic"]
 
 _RECORD_HEAD = 9
+_STAMP = 8
+_CHECKSUM = 4
+_BLOCK = 1 << 20
 _LATEST = 1 << 63
 """Nanoseconds since 1970 that a date can show: until the year 2262."""
 _NEVER = 1 << 64
@@ -182,22 +185,53 @@ class Recording:
         Raises:
             RecordingError: If the attachment does not exist or is damaged.
         """
-        if name not in self._index.attachments:
-            known = ", ".join(self._index.attachments) or "none"
-            raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")
-        offset, length = self._index.attachments[name]
-        if length > MAX_ATTACHMENT:
-            raise RecordingError(
-                f"the attachment {name!r} of {self.path} has {length} bytes, more than the "
-                f"{MAX_ATTACHMENT} that are read"
-            )
-        self._file.seek(offset + _RECORD_HEAD)
-        body = BytesIO(self._file.read(length - _RECORD_HEAD))
+        length = self._seek_attachment(name, MAX_ATTACHMENT)
+        body = BytesIO(self._file.read(length))
         try:
             data: bytes = Attachment.read(ReadDataStream(body)).data
         except BROKEN:
             raise RecordingError(f"the attachment {name!r} of {self.path} is damaged") from None
         return data
+
+    def extract(self, name: str, file: Path, most: int) -> None:
+        """Write the contents of an attachment of up to `most` bytes to a file, block by block.
+
+        Raises:
+            RecordingError: If the attachment does not exist, is larger or is damaged; the file is
+                then of no use.
+            OSError: If the file cannot be written.
+        """
+        left = self._seek_attachment(name, most)
+        try:
+            stream = ReadDataStream(self._file, calculate_crc=True)
+            stream.read(2 * _STAMP)
+            for _ in ("name", "media type"):
+                stream.read_prefixed_string()
+            size = stream.read8()
+            if stream.count + size + _CHECKSUM != left:
+                raise ValueError("an attachment and the file's index differ in its size")
+            with file.open("wb") as output:
+                while size:
+                    size -= output.write(stream.read(min(size, _BLOCK)))
+            found = stream.checksum()
+            if stream.read4() not in {0, found}:
+                raise ValueError("the checksum of an attachment does not match")
+        except BROKEN:
+            raise RecordingError(f"the attachment {name!r} of {self.path} is damaged") from None
+
+    def _seek_attachment(self, name: str, most: int) -> int:
+        """Go to the body of an attachment's record; returns its length."""
+        if name not in self._index.attachments:
+            known = ", ".join(self._index.attachments) or "none"
+            raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")
+        offset, length = self._index.attachments[name]
+        if length > most:
+            raise RecordingError(
+                f"the attachment {name!r} of {self.path} has {length} bytes, more than the "
+                f"{most} that are read"
+            )
+        self._file.seek(offset + _RECORD_HEAD)
+        return length - _RECORD_HEAD
 
     def records(
         self,

@@ -58,6 +58,7 @@ def state_of(value: dict[str, Any]) -> VehicleState:
         dict(value["extra"]),
         FlightEnd(ended) if ended else None,
         traffic=tuple(map(_traffic_of, value.get("traffic", ()))),
+        below=value.get("below"),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from typing_extensions import Self
 
-__all__ = ["AIR_DENSITY", "GRAVITY", "Airframe"]
+__all__ = ["AIR_DENSITY", "GRAVITY", "Airframe", "RangefinderSettings"]
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2."""
@@ -23,6 +23,28 @@ AIR_DENSITY = 1.225
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class RangefinderSettings(BaseModel):
+    """What a rangefinder that looks down can measure; by default as small lidars do."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    min_range: NotNegative = 0.2
+    """Metres; what is nearer is told as this."""
+    max_range: Positive = 12.0
+    """Metres; what is farther is not told."""
+    noise: NotNegative = 0.02
+    """Standard deviation of a reading in metres, at `simulation.sensor_noise` 1."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.min_range >= self.max_range:
+            message = (
+                f"min_range ({self.min_range:g} m) must be below max_range ({self.max_range:g} m)"
+            )
+            raise ValueError(message)
+        return self
 
 
 class Airframe(BaseModel):
@@ -63,6 +85,8 @@ class Airframe(BaseModel):
     """Charge below which a takeoff is refused."""
     battery_failsafe: Fraction = 0.05
     """Charge below which it lands by itself, overriding all commands."""
+    rangefinder: RangefinderSettings | None = RangefinderSettings()
+    """Heeded where `limits.rangefinder_clearance` is set; None: it has none."""
 
     @model_validator(mode="after")
     def _agree(self) -> Self:

@@ -101,6 +101,13 @@ def test_an_autopilots_clock_costs_no_state(tmp_path: Path) -> None:
     assert played(tmp_path / "a.mcap", ("a", state))["a"] == [state]
 
 
+def test_what_a_rangefinder_measured_stays(tmp_path: Path) -> None:
+    """And that it measured nothing."""
+    for below in (3.25, None):
+        state = VehicleState(1, TRUTH, Battery(0.5), VehicleMode.GUIDED, armed=True, below=below)
+        assert played(tmp_path / f"{below}.mcap", ("a", state))["a"] == [state]
+
+
 def test_no_odometry_is_none() -> None:
     """Pictures of others have none."""
     assert odometry_of(None) is None

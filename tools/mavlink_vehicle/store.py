@@ -70,13 +70,17 @@ class LogStore:
 
     def __init__(self) -> None:
         self.logs: dict[int, bytes] = {}
+        self.times: dict[int, int] = {}
+        """Seconds since 1970 that are told of them; for want of one, the same of all."""
 
     def handle(self, message: Any) -> list[Any]:  # noqa: ANN401
         """The answers to LOG_REQUEST_LIST or LOG_REQUEST_DATA."""
         if message.get_type() == "LOG_REQUEST_LIST":
             count, last = len(self.logs), max(self.logs, default=0)
             told = [
-                mavlink.MAVLink_log_entry_message(number, count, last, _BEGAN, len(content))
+                mavlink.MAVLink_log_entry_message(
+                    number, count, last, self.times.get(number, _BEGAN), len(content)
+                )
                 for number, content in self.logs.items()
             ]
             return told or [mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0)]

@@ -1,8 +1,8 @@
-"""Pictures, gimbal and region of interest of a plan's items, as waypoints have them.
+"""Pictures, gimbal, lens and region of interest of a plan's items, as waypoints have them.
 
 A plan says what goes on from an item; a waypoint says what is done on the way to it and there. So
 what begins at an item is given to the waypoints behind it; a single picture is the waypoint's
-before it, and so is a gimbal's turn that comes before pictures there.
+before it, and so is a turn of the gimbal, or of the lens, that comes before pictures there.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar
 
 from aerodaas.dataflow.plans.commands import (
@@ -25,6 +26,9 @@ from aerodaas.dataflow.plans.commands import (
     IMAGE_STOP_CAPTURE,
     MOUNT_MAVLINK_TARGETING,
     MOUNT_NEUTRAL,
+    OF_RANGE,
+    SET_CAMERA_FOCUS,
+    SET_CAMERA_ZOOM,
     why_not,
 )
 from aerodaas.dataflow.plans.numbers import LatLon, place
@@ -33,7 +37,7 @@ from aerodaas.types.errors import ConfigError, InvalidWaypointError
 from aerodaas.types.geometry import wrap_angle
 from aerodaas.types.waypoints import LEAST_TRIGGER, HeightReference, Waypoint
 
-__all__ = ["Height", "PictureItems"]
+__all__ = ["Height", "PictureItems", "same_place"]
 
 Height = Callable[[PlanItem, LatLon], tuple[float, HeightReference | None]]
 """Height of an item's place: metres above home, or above what follows; raises ConfigError."""
@@ -44,8 +48,26 @@ _SHOOT = 1
 """DO_DIGICAM_CONTROL: take a picture."""
 _YAW_LOCK = 16
 """GIMBAL_MANAGER_FLAGS_YAW_LOCK: yaw counts from north."""
+_WHOLE = 100.0
+"""Percent."""
 _NOBODY = "no waypoint comes after it"
 _NOT_HERE = "no waypoint comes before it"
+
+
+def same_place(waypoint: Waypoint, item: PlanItem) -> Waypoint:
+    """Another waypoint there, for what `item` says, with nothing of what is done at the first."""
+    return replace(
+        waypoint,
+        id=f"item{item.number}",
+        hover_duration=0.0,
+        gimbal_pitch=None,
+        gimbal_yaw=None,
+        look_at=None,
+        photo=False,
+        zoom=None,
+        focus=None,
+        actuate={},
+    )
 
 
 class _Aim:
@@ -82,6 +104,7 @@ class PictureItems:
             *(IMAGE_START_CAPTURE, IMAGE_STOP_CAPTURE),
             *(DO_MOUNT_CONTROL, DO_GIMBAL_MANAGER_PITCHYAW),
             *(DO_SET_ROI_LOCATION, DO_SET_ROI_NONE, DO_SET_ROI),
+            *(SET_CAMERA_ZOOM, SET_CAMERA_FOCUS),
         }
     )
     """What `take` knows."""
@@ -96,6 +119,8 @@ class PictureItems:
         """Item that began pictures which no waypoint has had yet."""
         self._aim: _Aim | None = None
         """What no waypoint has had yet."""
+        self._lens: dict[str, tuple[PlanItem, float]] = {}
+        """Percent of `zoom` and `focus` that no waypoint has had yet, with their items."""
         self._angles = (0.0, 0.0)
         self._looks = False
         self._does: dict[int, Callable[[PlanItem, list[Waypoint]], str]] = {
@@ -109,6 +134,8 @@ class PictureItems:
             DO_SET_ROI: self._region,
             DO_SET_ROI_LOCATION: self._look_at,
             DO_SET_ROI_NONE: self._look_away,
+            SET_CAMERA_ZOOM: partial(self._set_lens, "zoom"),
+            SET_CAMERA_FOCUS: partial(self._set_lens, "focus"),
         }
 
     def take(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
@@ -122,7 +149,9 @@ class PictureItems:
         """A new waypoint, with what items before it say, and what it cannot have."""
         self._begun = None
         dressed = replace(
-            waypoint, trigger_distance=self._distance, trigger_interval=self._interval
+            self._with_lens(waypoint),
+            trigger_distance=self._distance,
+            trigger_interval=self._interval,
         )
         aim, self._aim = self._aim, None
         if aim is None:
@@ -135,6 +164,7 @@ class PictureItems:
     def left(self) -> Iterator[tuple[PlanItem, str]]:
         """Items whose word no waypoint has had."""
         waiting = [self._begun, None if self._aim is None else self._aim.item]
+        waiting += [item for item, _ in self._lens.values()]
         yield from ((item, _NOBODY) for item in waiting if item is not None)
 
     def _by_distance(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
@@ -184,15 +214,43 @@ class PictureItems:
         return ""
 
     def _aim_here(self, waypoints: list[Waypoint]) -> None:
-        """Give a pending aim to the waypoint before, where pictures are taken now."""
-        aim = self._aim
-        if aim is None or not waypoints:
+        """Give a pending aim and lens to the waypoint before, where pictures are taken now."""
+        if not waypoints or waypoints[-1].photo:
             return
-        last = waypoints[-1]
-        if last.photo or last.gimbal is not None or last.look_at is not None:
+        self._set_lens_here(waypoints)
+        aim, last = self._aim, waypoints[-1]
+        if aim is None or last.gimbal is not None or last.look_at is not None:
             return
         waypoints[-1] = aim.at(last)
         self._aim = None
+
+    def _with_lens(self, waypoint: Waypoint) -> Waypoint:
+        """`waypoint`, with the pending zoom and focus."""
+        lens = {name: percent for name, (_, percent) in self._lens.items()}
+        self._lens.clear()
+        zoom, focus = lens.get("zoom", waypoint.zoom), lens.get("focus", waypoint.focus)
+        return replace(waypoint, zoom=zoom, focus=focus)
+
+    def _set_lens_here(self, waypoints: list[Waypoint]) -> None:
+        """Give a pending zoom and focus to the waypoint before."""
+        last = waypoints[-1]
+        items = [item for name, (item, _) in self._lens.items() if getattr(last, name) is not None]
+        if items:
+            # Both are set, one on the way there, one at a waypoint of its own in the same place.
+            waypoints.append(same_place(last, items[0]))
+        waypoints[-1] = self._with_lens(waypoints[-1])
+
+    def _set_lens(self, name: str, item: PlanItem, _: list[Waypoint]) -> str:
+        """Set `zoom` or `focus` on the way to the next waypoint."""
+        kind, percent, *_rest = item.values
+        if kind != OF_RANGE:
+            told = "none" if kind is None else f"{kind:g}"
+            return f"of {name} types percent of the range (2) is done, not type {told}"
+        if percent is None or not 0.0 <= percent <= _WHOLE:
+            told = "none" if percent is None else f"{percent:g}"
+            return f"a {name} is 0 to 100 % of the range, not {told}"
+        self._lens[name] = (item, percent)
+        return ""
 
     def _mount(self, item: PlanItem, _: list[Waypoint]) -> str:
         mode = item.z or 0.0

@@ -1,4 +1,4 @@
-"""Pictures, gimbal and places to look at of waypoints, as a plan's items."""
+"""Pictures, gimbal, lens and places to look at of waypoints, as a plan's items."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ from aerodaas.dataflow.plans.commands import (
     IMAGE_START_CAPTURE,
     IMAGE_STOP_CAPTURE,
     MOUNT_MAVLINK_TARGETING,
+    OF_RANGE,
+    SET_CAMERA_FOCUS,
+    SET_CAMERA_ZOOM,
 )
 from aerodaas.dataflow.plans.plan import PlanItem
 from aerodaas.types.waypoints import Waypoint
@@ -36,6 +39,10 @@ class PictureWriter:
     ) -> Iterator[PlanItem]:
         """What begins on the way to `waypoint`; `spot` is what it looks at, in its `frame`."""
         yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
+        if waypoint.zoom is not None:
+            yield _item(SET_CAMERA_ZOOM, OF_RANGE, waypoint.zoom)
+        if waypoint.focus is not None:
+            yield _item(SET_CAMERA_FOCUS, OF_RANGE, waypoint.focus)
         gimbal = waypoint.gimbal
         if gimbal is not None:
             values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)

@@ -28,7 +28,7 @@ from aerodaas.dataflow.plans.commands import (
     why_not,
 )
 from aerodaas.dataflow.plans.numbers import LatLon, finite, place
-from aerodaas.dataflow.plans.pictures_in import PictureItems
+from aerodaas.dataflow.plans.pictures_in import PictureItems, same_place
 from aerodaas.dataflow.plans.plan import Notice, Plan, PlanItem
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import yaw_ned_to_enu
@@ -246,18 +246,7 @@ class _Flown:
         name, position = move
         if name in last.moves:
             # Both are done, one at a waypoint of its own in the same place.
-            again = f"item{item.number}"
-            self.waypoints.append(
-                replace(
-                    last,
-                    id=again,
-                    hover_duration=0.0,
-                    gimbal_pitch=None,
-                    gimbal_yaw=None,
-                    photo=False,
-                    actuate={name: position},
-                )
-            )
+            self.waypoints.append(replace(same_place(last, item), actuate={name: position}))
         else:
             self.waypoints[-1] = replace(last, actuate={**last.moves, name: position})
 

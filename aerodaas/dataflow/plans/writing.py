@@ -152,7 +152,6 @@ def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
     for what, named in (
         ("priorities", [w.id for w in waypoints if w.priority != DEFAULT_PRIORITY]),
         ("deadlines", [w.id for w in waypoints if w.deadline is not None]),
-        ("zoom and focus", [w.id for w in waypoints if w.lens is not None]),
     ):
         if named:
             yield Notice(

@@ -430,15 +430,15 @@ class MavlinkVehicle:
 
     def logs(self) -> list[LogEntry]:
         """The autopilot's own logs, oldest first; blocks, raises VehicleError, in flight always."""
-        return list_logs(self._grounded_link("list logs"))
+        link, software = self._grounded_link("list logs"), self._telemetry.software
+        return list_logs(link, self.connection.autopilot, software)
 
     def fetch_log(
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
     ) -> Path:
         """Fetch one of them into `folder`; blocks, raises VehicleError, in flight always."""
         link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
-        files = self._telemetry.serves_files
-        return fetch_log(link, autopilot, log, folder, progress, serves_files=files)
+        return fetch_log(link, autopilot, log, folder, progress, ftp=self._telemetry.serves_files)
 
     def _grounded_link(self, deed: str) -> MavlinkLink:
         connection = self._connected()

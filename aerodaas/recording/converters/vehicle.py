@@ -117,6 +117,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         state["zoom"] = item.zoom
     if item.traffic:
         state["traffic"] = [_traffic_json(one) for one in item.traffic]
+    if item.below is not None:
+        state["below"] = item.below
     if item.actuators:
         state["actuators"] = item.actuators
     if item.truth is not None:

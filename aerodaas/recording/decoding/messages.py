@@ -97,6 +97,7 @@ class _VehicleState(TypedDict):
     extra: dict[Word, Reading]
     gps: NotRequired[_Fix | None]
     truth: NotRequired[_Odometry | None]
+    below: NotRequired[Number | None]
     ended: NotRequired[Literal[tuple(end.value for end in FlightEnd)] | None]  # type: ignore[valid-type]
 
 

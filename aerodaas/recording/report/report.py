@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.recording.vehicle_log.attachment import AttachedLog, attached_logs
 from aerodaas.types.errors import RecordingError
 
 __all__ = ["SUMMARY", "Report", "ReportFiles", "read_report", "write_report", "write_summary"]
@@ -31,6 +33,8 @@ class Report:
     summary: FlightSummary
     plots: list[Plot]
     moments: list[MomentPicture]
+    logs: list[AttachedLog]
+    """Vehicles' own logs that are attached."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +46,8 @@ class ReportFiles:
     summary_json: Path
     summary_text: Path
     plots: tuple[Path, ...]
+    logs: tuple[AttachedLog, ...]
+    """Vehicles' own logs that the page shows, or says why not."""
 
 
 def read_report(recording: str | Path) -> Report:
@@ -59,7 +65,8 @@ def read_report(recording: str | Path) -> Report:
     with Recording.open(recording) as opened:
         flight, summary = _read(opened)
         moments = picture_moments(opened, key_moments(flight))
-    return Report(summary, _plots(flight), moments)
+        logs = attached_logs(opened)
+    return Report(summary, _plots(flight, logs), moments, logs)
 
 
 def _read(recording: Recording) -> tuple[RecordedFlight, FlightSummary]:
@@ -71,13 +78,16 @@ def _read(recording: Recording) -> tuple[RecordedFlight, FlightSummary]:
     return flight, FlightSummary.of(recording, flight)
 
 
-def _plots(flight: RecordedFlight) -> list[Plot]:
-    """The plots of a flight; none without the extra `plots`."""
+def _plots(flight: RecordedFlight, logs: Sequence[AttachedLog]) -> list[Plot]:
+    """The plots of a flight and of vehicles' logs; none without the extra `plots`."""
     if not has_extra("plots"):
         return []
-    from aerodaas.recording.report.page.figures import plots_of  # noqa: PLC0415 - needs the extra
+    from aerodaas.recording.report.page.figures import (  # noqa: PLC0415 - needs the extra
+        log_plots,
+        plots_of,
+    )
 
-    return plots_of(flight)
+    return [*plots_of(flight), *log_plots(logs)]
 
 
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
@@ -101,6 +111,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         folder / SUMMARY,
         folder / "summary.txt",
         tuple(folder / f"{plot.name}.png" for plot in report.plots),
+        tuple(report.logs),
     )
     contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
     if report.moments:
@@ -108,7 +119,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         contents[folder / "moments.png"] = sheet.tobytes()
     summary = report.summary
     contents |= {
-        files.page: flight_page(summary, report.plots, report.moments).encode(),
+        files.page: flight_page(summary, report.plots, report.moments, report.logs).encode(),
         files.summary_json: _as_json(summary),
         files.summary_text: f"{summary}\n".encode(),
     }

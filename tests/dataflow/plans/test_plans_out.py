@@ -195,7 +195,6 @@ def test_pymavlink_reads_what_is_written(tmp_path: Path) -> None:
     [
         ({"priority": 1}, "plan", "priorities: a plan holds none; 1 waypoints had one: a"),
         ({"deadline": 9.0}, "plan", "deadlines: a plan holds none; 1 waypoints had one: a"),
-        ({"zoom": 9.0}, "plan", "zoom and focus: a plan holds none; 1 waypoints had one: a"),
         ({"yaw": 1.0}, "waypoints", "item 2: NAV_WAYPOINT: ArduPilot does not turn"),
     ],
 )

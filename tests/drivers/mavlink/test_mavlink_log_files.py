@@ -148,6 +148,23 @@ class Liar(FileServer):
         return super().checksum(name) ^ 1
 
 
+class Growing(FileServer):
+    """Goes on writing a log while it is fetched."""
+
+    def checksum(self, name: str) -> int:
+        """That of what there is by then."""
+        self.files[name] += b"more"
+        return super().checksum(name)
+
+
+def test_a_log_that_grows_meanwhile_is_fetched_as_it_was_listed(pair: Pair, tmp_path: Path) -> None:
+    """ArduPilot writes some lines whenever it is asked for one."""
+    put(pair, Growing())
+    file = pair.vehicle.fetch_log(LOG, tmp_path)
+    assert file.read_bytes() == DATAFLASH
+    assert [one.name for one in tmp_path.iterdir()] == [NAME]
+
+
 def test_a_checksum_that_does_not_fit(pair: Pair, tmp_path: Path) -> None:
     """No file is better than a wrong one."""
     put(pair, Liar())

@@ -8,14 +8,16 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from mavlink_flights import LOOPBACK, Pair, flight, free_port, wait_for
+from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
 
 from aerodaas.cli.app import main
 from aerodaas.drivers.mavlink.microservices import logs as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.recording.reader import Recording
 from aerodaas.testing.channel import Impairment
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle_log import LogEntry
@@ -47,8 +49,9 @@ def pair(connected: Pair) -> Pair:
 
 
 def test_the_list(pair: Pair) -> None:
-    """Numbers, sizes and times; of none it is empty."""
-    assert pair.vehicle.logs() == [LogEntry(1, 90, BEGAN), LogEntry(2, 100_003, BEGAN)]
+    """Numbers, sizes and times, of ArduPilot those of the last writing; of none it is empty."""
+    ended = BEGAN
+    assert pair.vehicle.logs() == [LogEntry(1, 90, None, ended), LogEntry(2, 100_003, None, ended)]
     pair.autopilot.firmware.logs.logs = {}
     assert pair.vehicle.logs() == []
 
@@ -69,6 +72,10 @@ def test_px4_has_its_own_format(tmp_path: Path) -> None:
     with flight(fallback="ignore") as pair:
         pair.autopilot.firmware.logs.logs = {0: ULOG}
         (log,) = pair.vehicle.logs()
+        assert (log.began, log.ended) == (None, BEGAN)
+        pair.vehicle.telemetry.software = "1.15.4.255"
+        (older,) = pair.vehicle.logs()
+        assert (older.began, older.ended) == (BEGAN, None)
         file = pair.vehicle.fetch_log(log, tmp_path)
     assert file.suffix == ".ulg"
     assert file.read_bytes() == ULOG
@@ -201,6 +208,7 @@ def test_on_the_command_line(tmp_path: Path, run: Callable[..., tuple[int, str]]
         code, told = run("drone")
         assert code == 0, told
         assert "2027-01-15 08:00:00 UTC" in told
+        assert "last written" in told
         code, told = run("drone", "--latest", "--to", "got", "--json")
         (file,) = json.loads(told)
         assert (code, Path(file).read_bytes()) == (0, DATAFLASH)
@@ -210,6 +218,45 @@ def test_on_the_command_line(tmp_path: Path, run: Callable[..., tuple[int, str]]
     code, told = run("other")
     assert code != 0
     assert "no logs can be fetched by the driver simulated" in told
+
+
+@pytest.mark.parametrize(("family", "write"), [("ardupilot", dataflash), ("px4", ulog)])
+def test_the_log_of_a_recorded_flight_is_attached(
+    tmp_path: Path,
+    run: Callable[..., tuple[int, str]],
+    family: Literal["ardupilot", "px4"],
+    write: Callable[[Flown], bytes],
+) -> None:
+    """The one that was written then, by itself; another one that is named is refused."""
+    port = free_port()
+    settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": "ignore", "failsafes": "ignore"}
+    drone = {"id": "drone", "driver": "mavlink", "settings": settings}
+    (tmp_path / "environment.json").write_text(json.dumps({"robots": [drone]}))
+    recording = record_flown(tmp_path / "flight.mcap", Flown(duration=12.0))
+    own, other = write(Flown(duration=12.0)), write(Flown(zero=500.0, duration=12.0))
+    options = AutopilotOptions(family=family, peer=(LOOPBACK, port))
+    with EmulatedAutopilot(options) as autopilot:
+        store = autopilot.firmware.logs
+        store.logs = {1: other, 2: own, 3: other}
+        # Of a flight of 12 seconds: they are when a log was last written.
+        store.times = {1: EPOCH - 600, 2: EPOCH + 9, 3: EPOCH + 600}
+        code, told = run("drone", "1", "--attach", "flight.mcap")
+        assert code != 0
+        assert "is of another flight" in told
+        code, told = run("drone", "--attach", "flight.mcap", "--to", "got")
+        assert code == 0, told
+        assert "of drone" in told
+        assert "covers 0.0 to 1" in told
+        store.times = dict.fromkeys(store.logs, 0)
+        code, told = run("drone", "--attach", "flight.mcap")
+        assert code != 0
+        assert "no log that it was written at 2027-01-15 08:00:05 UTC" in told
+        code, told = run("drone", "--attach", "none.mcap")
+        assert "cannot open the recording none.mcap" in told
+    with Recording.open(recording) as opened:
+        (name,) = opened.attachments
+        assert name.startswith("vehicle_logs/drone/log-2-")
+        assert opened.attachment(name) == own
 
 
 def test_the_command_changes_nothing_at_the_vehicle(

@@ -103,6 +103,9 @@ class Autopilot(ABC):
     log_suffix: ClassVar[str]
     log_head: ClassVar[bytes]
     """Of the files of its own logs, and their first bytes."""
+    log_begin_until: ClassVar[tuple[int, int]]
+    """Version from which the time that it tells of a log is when it was last written; before, when
+    it began."""
     log_folders: ClassVar[tuple[str, ...]]
     """Where they may lie: on its card, and in its simulator's folder."""
     ways_home: ClassVar[frozenset[str]]

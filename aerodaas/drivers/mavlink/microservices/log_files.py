@@ -52,6 +52,11 @@ class FileTransfer:
         finally:
             self._send(self._client.farewell())
 
+    def size(self, path: str) -> int | None:
+        """Bytes that a file has now, None if it is not there; raises VehicleError."""
+        folder, _, name = path.rpartition("/")
+        return next((one.size for one in self.entries(folder) if one.name == name), None)
+
     def checksum(self, path: str, size: int) -> int | None:
         """Its CRC-32 by the vehicle's own reckoning, None if it tells none; VehicleError."""
         return self._run(self._client.checksum(path, size))
@@ -104,7 +109,8 @@ def fetch_file(
     """Fetch `path` of `size` bytes from the vehicle into `file`, whole or not at all.
 
     What has come is kept in `part` while it is not whole, and is where the next one goes on.
-    Raises VehicleError, also if the vehicle's own checksum is another one, and OSError.
+    Raises VehicleError, also if the vehicle's own checksum is another one, and OSError. A file that
+    has grown meanwhile, as a log that is not ended does, has no checksum of these bytes.
     """
     held = part.stat().st_size if part.is_file() else 0
     for begin in dict.fromkeys((held if held <= size else 0, 0)):
@@ -117,7 +123,9 @@ def fetch_file(
                 raise VehicleError(f"{error}; the next fetch goes on from {part}") from None
         told = transfer.checksum(path, size)
         # What was held may be of another vehicle, and without a checksum nobody would know.
-        if told == _checksum(part) or (told is None and begin == 0):
+        if told == _checksum(part) or (
+            begin == 0 and (told is None or (transfer.size(path) or 0) > size)
+        ):
             part.replace(file)
             return
     part.unlink()

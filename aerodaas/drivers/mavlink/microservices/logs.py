@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, older_than
 from aerodaas.drivers.mavlink.microservices.log_files import FileTransfer, fetch_file, find_log
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
@@ -38,8 +38,12 @@ _FORM = "%Y%m%d-%H%M%S"
 Progress = Callable[[int, int], None]
 
 
-def list_logs(link: MavlinkLink) -> list[LogEntry]:
-    """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread."""
+def list_logs(link: MavlinkLink, autopilot: Autopilot, software: str) -> list[LogEntry]:
+    """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread.
+
+    `software` is its version, such as `1.16.1.255`; empty where it is not known.
+    """
+    ends = not older_than(software, *autopilot.log_begin_until)
     target = link.target
     found: dict[int, LogEntry] = {}
     total: int | None = None
@@ -49,7 +53,9 @@ def list_logs(link: MavlinkLink) -> list[LogEntry]:
             for entry in _heard(inbox, _TIMEOUT):
                 total = entry.num_logs
                 if total:
-                    found[entry.id] = LogEntry(entry.id, entry.size, entry.time_utc or None)
+                    told = entry.time_utc or None
+                    times = (None, told) if ends else (told, None)
+                    found[entry.id] = LogEntry(entry.id, entry.size, *times)
                 if len(found) >= entry.num_logs:
                     return [found[number] for number in sorted(found)]
     if total is None:
@@ -64,11 +70,11 @@ def fetch_log(
     folder: Path,
     progress: Progress = lambda _, __: None,
     *,
-    serves_files: bool = False,
+    ftp: bool = False,
 ) -> Path:
     """Fetch a log into a file of `folder`, whole or not at all; raises VehicleError.
 
-    By MAVLink FTP where the vehicle `serves_files`, and this log among them. Packets that are lost
+    By MAVLink FTP where the vehicle has `ftp`, and this log among its files. Packets that are lost
     are asked for again. `grounded` is the link of a vehicle that stands, and raises VehicleError
     for one that does not: it is asked again and again. Not for use in the link's thread.
     """
@@ -80,11 +86,11 @@ def fetch_log(
     link = grounded()
     if not 0 < log.size <= _LARGEST:
         raise VehicleError(f"log {log.number} has {log.size} bytes, which is none to be fetched")
-    file = folder / f"log-{log.number}{_when(log.began)}{autopilot.log_suffix}"
+    file = folder / f"log-{log.number}{_when(log)}{autopilot.log_suffix}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         transfer = FileTransfer(link)
-        path = _path(transfer, autopilot, log) if serves_files else None
+        path = _path(transfer, autopilot, log) if ftp else None
         if path is not None:
             # Not by its time: of the log that is written last, ArduPilot tells the present one.
             part = folder / f"log-{log.number}-{log.size}.part"
@@ -171,5 +177,6 @@ def _heard(inbox: queue.SimpleQueue[Any], timeout: float) -> Iterator[Any]:
             yield inbox.get(timeout=timeout)
 
 
-def _when(began: float | None) -> str:
-    return "" if began is None else f"-{datetime.fromtimestamp(began, timezone.utc):{_FORM}}"
+def _when(log: LogEntry) -> str:
+    time = log.ended if log.began is None else log.began
+    return "" if time is None else f"-{datetime.fromtimestamp(time, timezone.utc):{_FORM}}"

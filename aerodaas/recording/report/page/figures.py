@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
 from itertools import islice
@@ -18,12 +18,17 @@ from aerodaas.recording.report.plots.loads import loads_figure
 from aerodaas.recording.report.plots.outcomes import outcomes_figure
 from aerodaas.recording.report.plots.timeline import timeline_figure
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
+from aerodaas.recording.report.plots.vehicle_log import log_figures
+from aerodaas.recording.vehicle_log.attachment import AttachedLog
 
-__all__ = ["plots_of", "png_of"]
+__all__ = ["log_plots", "plots_of", "png_of"]
 
 _DPI = 200
 _MOST = 24
 """Robots, streams and analyses in one plot; more are too small to be told apart."""
+
+_MOST_LOGS = 6
+"""Logs whose plots are drawn, six of each."""
 
 V = TypeVar("V")
 
@@ -82,12 +87,25 @@ def plots_of(flight: RecordedFlight) -> list[Plot]:
     ]
 
 
+def log_plots(logs: Sequence[AttachedLog]) -> list[Plot]:
+    """Plots of the main topics of each vehicle's log, of the first few logs."""
+    return [
+        Plot(f"vehicle_log_{number}_{name}", title, description, _png(make))
+        for number, attached in enumerate(logs[:_MOST_LOGS], 1)
+        for name, title, description, make in log_figures(attached)
+    ]
+
+
 def png_of(flight: RecordedFlight, make: Callable[[RecordedFlight], Figure]) -> bytes:
     """PNG of the plot that `make` draws of a flight."""
+    return _png(lambda: make(_shown(flight)))
+
+
+def _png(make: Callable[[], Figure]) -> bytes:
     # Names in a recording may hold a `$`, which would begin a formula.
     with mpl.rc_context({"text.parse_math": False}):
         buffer = BytesIO()
-        make(_shown(flight)).savefig(buffer, dpi=_DPI)
+        make().savefig(buffer, dpi=_DPI)
     return buffer.getvalue()
 
 

@@ -8,9 +8,10 @@ import cv2
 
 from aerodaas.recording.report.moments import MomentPicture
 from aerodaas.recording.report.page.document import document, paragraph, picture, section
-from aerodaas.recording.report.page.tables import sections
+from aerodaas.recording.report.page.tables import log_section, sections
 from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.recording.vehicle_log.attachment import AttachedLog
 
 __all__ = ["flight_page", "origin_line"]
 
@@ -20,11 +21,15 @@ _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 
 def flight_page(
-    summary: FlightSummary, plots: Sequence[Plot], moments: Sequence[MomentPicture]
+    summary: FlightSummary,
+    plots: Sequence[Plot],
+    moments: Sequence[MomentPicture],
+    logs: Sequence[AttachedLog] = (),
 ) -> str:
     """Return the report of a flight as one HTML page."""
     parts = [section(plot.title, picture(plot.png, plot.description)) for plot in plots]
     parts += sections(summary)
+    parts += map(log_section, logs)
     if moments:
         shown = "".join(_moment(moment) for moment in moments)
         parts.append(section("Key moments", f'<div class="moments">{shown}</div>', wide=True))

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from aerodaas.config.printable import printable
 from aerodaas.recording.report.page.document import paragraph, section, table
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.recording.vehicle_log.attachment import AttachedLog
 
-__all__ = ["figures", "sections"]
+__all__ = ["figures", "log_section", "sections"]
+
+_MOST_TEXTS = 200
+"""Messages of an autopilot that are listed."""
 
 
 def figures(summary: FlightSummary) -> dict[str, object]:
@@ -66,6 +73,26 @@ def sections(summary: FlightSummary) -> Iterator[str]:
         yield section("Dropped", what, table(["stream", "messages"], summary.drops.items()))
     else:
         yield section("Dropped", paragraph("Nothing: every message of every stream was recorded."))
+
+
+def log_section(attached: AttachedLog) -> str:
+    """A section on one vehicle's own log: how it lies over the flight, and its messages."""
+    told = paragraph(str(attached))
+    if attached.log is None or attached.alignment is None:
+        return section("The autopilot's own log", told, wide=True)
+    texts = attached.log.texts
+    rows = [
+        (
+            f"{attached.alignment.clock.mission_time(np.array(one.time)):.1f}",
+            one.severity,
+            printable(one.text),
+        )
+        for one in texts[:_MOST_TEXTS]
+    ]
+    shown = table(["at (s)", "severity", "message of the autopilot"], rows) if rows else ""
+    left_out = len(texts) - len(rows)
+    more = paragraph(f"{left_out} more messages are in the log.") if left_out else ""
+    return section("The autopilot's own log", told, shown, more, wide=True)
 
 
 def _alerts(summary: FlightSummary) -> list[tuple[str, str, str]]:

@@ -1,0 +1,201 @@
+"""Laying a vehicle's log over the mission clock, and telling whether it is of the same flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from typing_extensions import Self
+
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.vehicle_log.clock_line import ClockLine, fit_clock_line, starts_of
+from aerodaas.recording.vehicle_log.log import Floats, VehicleLog
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import RecordingError, UnknownIdError
+
+__all__ = ["Alignment", "RecordedClock", "align", "recorded_clocks", "robot_of"]
+
+_OVERLAP = 1.0
+"""Seconds that a log and a recording have in common at least."""
+_MOVING = 0.5
+"""Metres a second from which a state tells by its motion whose it is."""
+_ROUND = 2**32 / 1e3
+"""Seconds after which time_boot_ms begins anew, which has 32 bits."""
+_ENOUGH = 20
+"""Such states, of a second or so, from which a judgement is made."""
+_STRANGE = 0.5
+"""Share of the recorded motion's square that the log's is beside it, from which it is another's:
+of the same flight it is a few hundredths, of two unrelated ones it is 1 or more."""
+
+
+@dataclass
+class RecordedClock:
+    """What a recording tells of one robot's autopilot: its clock, its motion, when it was armed."""
+
+    pairs: list[tuple[float, float, float]] = field(default_factory=list)
+    """Mission seconds, the autopilot's seconds, error in seconds (NaN: not by TIMESYNC)."""
+    motion: list[tuple[float, float, float, float]] = field(default_factory=list)
+    """Mission seconds, velocity east, north, up in m/s."""
+    armed: list[float] = field(default_factory=list)
+    """Mission seconds of the states with motors armed."""
+
+    def take(self, value: dict[str, Any]) -> None:
+        """Take a state from its JSON."""
+        now, extra = seconds(value["stamp"]), value["extra"]
+        clock, error = extra.get("autopilot_time"), extra.get("autopilot_time_error")
+        if isinstance(clock, int | float):
+            known = isinstance(error, int | float)
+            self.pairs.append((now, float(clock), float(error) if known else np.nan))
+        velocity = (value["odometry"]["velocity"][axis] for axis in "xyz")
+        self.motion.append((now, *(np.nan if one is None else one for one in velocity)))  # type: ignore[arg-type]
+        if value["armed"]:
+            self.armed.append(now)
+
+    @property
+    def flown(self) -> tuple[float, float]:
+        """First and last mission second with motors armed; of the recording if there is none."""
+        moments = self.armed or [moment for moment, *_ in self.motion] or [0.0]
+        return moments[0], moments[-1]
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """How a log lies over a recording."""
+
+    clock: ClockLine
+    begin: float
+    """Mission seconds of the log's first and last moments."""
+    end: float
+    flown: tuple[float, float]
+    """Mission seconds of the flight in the recording."""
+    compared: bool
+    """Whether the motion was compared; if not, the clocks alone tell that it is the same flight."""
+
+    @classmethod
+    def of(
+        cls, log: VehicleLog, clock: ClockLine, flown: tuple[float, float], *, compared: bool
+    ) -> Self:
+        """Lay the ends of a log over the mission clock."""
+        begin, end = clock.mission_time(np.array(log.span))
+        return cls(clock, float(begin), float(end), flown, compared)
+
+    def __str__(self) -> str:
+        begin, end = self.flown
+        short = (
+            ""
+            if self.begin <= begin and self.end >= end
+            else (f", of the flight from {begin:.1f} to {end:.1f} s")
+        )
+        alone = (
+            "" if self.compared else "; compared by clocks alone, for hardly any motion is in both"
+        )
+        span = f"{self.begin:.1f} to {self.end:.1f} s of the mission{short}"
+        return f"covers {span}; {self.clock}{alone}"
+
+
+def recorded_clocks(recording: Recording) -> dict[str, RecordedClock]:
+    """Read what a recording tells of each robot's autopilot, by robot."""
+    clocks: dict[str, RecordedClock] = {}
+    for record in recording.records(schemas=("aerodaas.VehicleState",)):
+        clocks.setdefault(record.value["robot"], RecordedClock()).take(record.value)
+    return clocks
+
+
+def robot_of(clocks: dict[str, RecordedClock], robot: str | None) -> str:
+    """The robot whose log is meant: the only one with a clock, where none is named.
+
+    Raises:
+        UnknownIdError: If there is no such robot in the recording.
+        RecordingError: If it has no clock of an autopilot, or several have and none is named.
+    """
+    if robot is not None and robot not in clocks:
+        raise UnknownIdError("robot in the recording", robot, list(clocks))
+    timed = [name for name, one in clocks.items() if one.pairs and robot in {None, name}]
+    if len(timed) == 1:
+        return timed[0]
+    if timed:
+        raise RecordingError(
+            f"the recording has several autopilots ({', '.join(timed)}): say whose log it is by "
+            "--robot"
+        )
+    raise RecordingError(
+        "the recording holds no clock of an autopilot (autopilot_time), by which a log is laid "
+        "over it; only flights by the driver mavlink do"
+    )
+
+
+def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
+    """Lay a log over the mission clock.
+
+    Args:
+        log: The log.
+        recorded: The robot's clock and motion, with a pair at least.
+
+    Raises:
+        RecordingError: If they have no time in common, or the motion is another's.
+    """
+    pairs, motion = np.array(recorded.pairs), np.array(recorded.motion)
+    found: list[tuple[float, Alignment]] = []
+    for start in starts_of(pairs):
+        clock = _within_days(fit_clock_line(start), log)
+        begin, end = clock.mission_time(np.array(log.span))
+        if min(end, start[-1, 0]) - max(begin, start[0, 0]) < _OVERLAP:
+            continue
+        within = motion[(motion[:, 0] >= start[0, 0]) & (motion[:, 0] <= start[-1, 0])]
+        strange = _strangeness(log, clock, within)
+        told = Alignment.of(log, clock, recorded.flown, compared=strange is not None)
+        found.append((0.0 if strange is None else strange, told))
+    if not found:
+        raise RecordingError(
+            f"is of another flight: it runs from second {log.span[0]:.0f} to {log.span[1]:.0f} of "
+            f"the autopilot's clock, the recording {_spans(starts_of(pairs))}; {_REMEDY}"
+        )
+    strange, best = min(found, key=lambda one: one[0])
+    if strange > _STRANGE:
+        raise RecordingError(
+            "is of another flight: at the same seconds of the autopilot's clock its speeds are not "
+            f"those of the recording; {_REMEDY}"
+        )
+    return best
+
+
+def _within_days(clock: ClockLine, log: VehicleLog) -> ClockLine:
+    """`clock`, whole rounds of time_boot_ms later where that is all that the autopilot told.
+
+    Simulated PX4s count from 1970, of which TIMESYNC's answers are no readings since a start.
+    """
+    if clock.synchronised:
+        return clock
+    rounds = round((log.span[0] - clock.offset) / _ROUND)
+    return replace(clock, offset=clock.offset + rounds * _ROUND)
+
+
+_REMEDY = "give the one of this flight (aerodaas logs ROBOT lists them with their times)"
+
+
+def _spans(starts: Iterable[Floats]) -> str:
+    return " and ".join(f"from {one[:, 1].min():.0f} to {one[:, 1].max():.0f}" for one in starts)
+
+
+def _strangeness(log: VehicleLog, clock: ClockLine, motion: Floats) -> float | None:
+    """How much of the recorded motion's square the log's is beside it; None for hardly any."""
+    velocity = log.topics.get("velocity")
+    if velocity is None or len(velocity.time) == 0:
+        return None
+    order = np.argsort(velocity.time)
+    times = clock.mission_time(velocity.time[order])
+    inside = (motion[:, 0] >= times[0]) & (motion[:, 0] <= times[-1])
+    told = np.column_stack(
+        [np.interp(motion[:, 0], times, velocity.columns[axis][order]) for axis in _AXES]
+    )
+    speeds = np.fmax(np.linalg.norm(told, axis=1), np.linalg.norm(motion[:, 1:], axis=1))
+    used = inside & (speeds >= _MOVING) & np.isfinite(told).all(1) & np.isfinite(motion).all(1)
+    if used.sum() < _ENOUGH:
+        return None
+    beside = np.square(told[used] - motion[used, 1:]).sum()
+    return float(beside / max(np.square(motion[used, 1:]).sum(), np.square(told[used]).sum()))
+
+
+_AXES = ("east", "north", "up")

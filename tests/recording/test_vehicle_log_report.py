@@ -1,0 +1,161 @@
+"""A vehicle's log attached to its flight's recording, and its topics in the report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
+
+from aerodaas.recording.attaching import attach_file
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.page.figures import log_plots
+from aerodaas.recording.report.plots.vehicle_log import log_figures
+from aerodaas.recording.report.report import read_report, write_report
+from aerodaas.recording.vehicle_log.attachment import attach_log, attached_logs, flight_of
+from aerodaas.recording.vehicle_log.log import Series
+from aerodaas.types.errors import AeroDaaSError, RecordingError
+
+FLOWN = Flown()
+PLOTS = ("battery", "attitude", "position", "gps", "vibration", "motors")
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """A flight."""
+    return record_flown(tmp_path / "flight.mcap", FLOWN)
+
+
+def written(folder: Path, name: str, content: bytes) -> Path:
+    """A log's file."""
+    file = folder / name
+    file.write_bytes(content)
+    return file
+
+
+def test_an_attached_log_lies_over_its_flight(recording: Path, tmp_path: Path) -> None:
+    """As it was found when it was attached; with the moment at which it begins."""
+    file = written(tmp_path, "00000012.BIN", dataflash(FLOWN, begin=2.0))
+    told = attach_log(recording, file)
+    assert str(told).startswith("00000012.BIN of drone (ArduPilot) covers 2.0 to 60.0 s")
+    with Recording.open(recording) as opened:
+        assert opened.attachments == ["vehicle_logs/drone/00000012.BIN"]
+        (found,) = attached_logs(opened)
+    assert (found.robot, found.file, str(found.alignment)) == (
+        "drone",
+        "00000012.BIN",
+        str(told.alignment),
+    )
+    data = recording.read_bytes()
+    at = data.rindex(b"vehicle_logs/drone/00000012.BIN", 0, data.rindex(b"vehicle_logs/drone"))
+    stamp = int.from_bytes(data[at - 20 : at - 12], "little")
+    assert stamp / 1e9 == pytest.approx(EPOCH + 2.0, abs=0.01)
+
+
+def test_what_is_refused_leaves_the_recording(recording: Path, tmp_path: Path) -> None:
+    """Another flight's, no log, none at all, and one that is attached already."""
+    before = recording.read_bytes()
+    for name, content, said in (
+        ("other.bin", dataflash(Flown(zero=900.0)), "other.bin is of another flight"),
+        ("music.mp3", b"ID3" * 100, "music.mp3 is no log of an autopilot"),
+        ("empty.ulg", b"", "empty.ulg is empty"),
+    ):
+        with pytest.raises(RecordingError, match=said):
+            attach_log(recording, written(tmp_path, name, content))
+    with pytest.raises(RecordingError, match=r"cannot read the log .*none.bin"):
+        attach_log(recording, tmp_path / "none.bin")
+    with pytest.raises(AeroDaaSError, match="eagle"):
+        attach_log(recording, written(tmp_path, "own.bin", dataflash(FLOWN)), "eagle")
+    assert recording.read_bytes() == before
+    attach_log(recording, tmp_path / "own.bin", "drone")
+    with pytest.raises(RecordingError, match=r"has vehicle_logs/drone/own.bin already"):
+        attach_log(recording, tmp_path / "own.bin")
+
+
+def test_the_report_shows_its_topics(recording: Path, tmp_path: Path) -> None:
+    """One plot each, said to be from the autopilot's log; its messages at mission seconds."""
+    attach_log(recording, written(tmp_path, "own.bin", dataflash(FLOWN)))
+    files = write_report(recording, tmp_path / "report")
+    names = [f"vehicle_log_1_{name}.png" for name in PLOTS]
+    assert [path.name for path in files.plots][-6:] == names
+    page = files.page.read_text()
+    assert page.count("From the autopilot&#x27;s log: ") >= len(PLOTS)
+    assert "ERR of subsystem 16, code 2" in page
+    assert "<th>60.0</th>" in page
+    assert "own.bin of drone (ArduPilot) covers 0.0 to 60.0 s of the mission" in page
+
+
+def test_lines_are_drawn_at_mission_seconds(recording: Path, tmp_path: Path) -> None:
+    """Around the flight, in order, and setpoints beside what was flown."""
+    attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    made = {name: make() for name, _, _, make in log_figures(attached)}
+    assert set(made) == set(PLOTS)
+    north = made["position"].axes[1].lines
+    assert [str(line.get_label()) for line in north] == ["estimated", "setpoint"]
+    assert [float(np.asarray(line.get_ydata())[0]) for line in north] == [1.0, 1.5]
+    time = np.asarray(north[0].get_xdata(), dtype=np.float64)
+    assert (time[0], time[-1]) == pytest.approx((0.0, 59.9), abs=0.01)
+    assert (np.diff(time) >= 0).all()
+    assert "PX4's log own.ulg" in made["battery"].axes[0].get_title(loc="left")
+
+
+def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
+    recording: Path, tmp_path: Path
+) -> None:
+    """Whatever the order in the log, and however long it is."""
+    attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    assert attached.log is not None
+    time = np.array([70.0, 62.0, 61.0, 60.0, 10.0, 300.0])
+    heading = np.array([20.0, 5.0, 355.0, 350.0, 1.0, 2.0])
+    angles = {"roll": heading, "pitch": heading, "heading": heading}
+    log = replace(attached.log, topics={"attitude": Series(time, angles)})
+    (made,) = [make() for *_, make in log_figures(replace(attached, log=log))]
+    roll, _, shown = (np.asarray(axes.lines[0].get_ydata()) for axes in made.axes)
+    assert roll.tolist() == [350.0, 355.0, 5.0, 20.0]
+    assert np.array_equal(shown, [350.0, 355.0, np.nan, 5.0, 20.0], equal_nan=True)
+
+
+def test_what_was_not_measured_has_no_row(recording: Path, tmp_path: Path) -> None:
+    """A current of PX4's that is not known, and an axis without a setpoint."""
+    attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN, current=-1.0)))
+    with Recording.open(recording) as opened:
+        (attached,) = attached_logs(opened)
+    assert attached.log is not None
+    setpoint = attached.log.topics["position setpoint"]
+    north = Series(setpoint.time, {"north": setpoint.columns["north"]})
+    log = replace(attached.log, topics={**attached.log.topics, "position setpoint": north})
+    made = {name: make() for name, _, _, make in log_figures(replace(attached, log=log))}
+    assert [axes.get_ylabel() for axes in made["battery"].axes] == ["Voltage (V)"]
+    assert [len(axes.lines) for axes in made["position"].axes] == [1, 2, 1]
+
+
+def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) -> None:
+    """In a report that is otherwise whole; names in it are a stranger's."""
+    noise = written(tmp_path, "noise", b"noise" * 100)
+    labels = ("application/octet-stream", 0)
+    attach_file(recording, noise, "vehicle_logs/drone/<b>x</b>", *labels)
+    attach_file(recording, noise, "vehicle_logs/eagle/../../x", *labels)
+    report = read_report(recording)
+    assert [one.log for one in report.logs] == [None, None]
+    assert log_plots(report.logs) == []
+    page = write_report(recording, tmp_path / "report").page.read_text()
+    assert "&lt;b&gt;x&lt;/b&gt; of drone is not shown: &lt;b&gt;x&lt;/b&gt; is no log" in page
+    assert "../../x of eagle is not shown: no robot in the recording is called" in page
+
+
+def test_when_it_flew(recording: Path) -> None:
+    """From arming to disarming, by the wall's clock."""
+    assert flight_of(recording, "drone") == pytest.approx((EPOCH + 5.0, EPOCH + 55.0))
+
+
+def test_a_recording_without_an_autopilots_clock_is_told(tmp_path: Path) -> None:
+    """A simulated drone's, for one."""
+    path = record_flown(tmp_path / "flight.mcap", FLOWN, robots=())
+    with pytest.raises(AeroDaaSError, match="no clock of an autopilot"):
+        attach_log(path, written(tmp_path, "own.bin", dataflash(FLOWN)))
