@@ -137,7 +137,7 @@ class MovingTarget:
             drawn += _EXCESS * max(0.0, moving - fastest)
         sent = min(ramp, max(0.0, fastest - drawn)) * direction
         if setpoint.line_from is not None:
-            sent = sent - _excess_aside(velocity, place - setpoint.line_from)
+            sent = sent - _excess_aside(vehicle, velocity, setpoint.line_from, place)
         if setpoint.yaw is not None:
             most = self._yaw_rate * duration
             turn = wrap_angle(setpoint.yaw - self._yaw)
@@ -156,11 +156,18 @@ class MovingTarget:
         self._position = self._position + _unit(aside) * min(far, step)
 
 
-def _excess_aside(velocity: Vector, line: Vector) -> Vector:
-    """What a vehicle that flies aside from its line is told to fly back, ENU m/s."""
-    direction = _unit(line)
+def _excess_aside(vehicle: Vector, velocity: Vector, start: Vector, end: Vector) -> Vector:
+    """What a vehicle that flies aside from the line to `end` is told to fly back, ENU m/s.
+
+    What draws it to the line is no excess.
+    """
+    direction = _unit(end - start)
+    beside = vehicle - start
+    offset = beside - float(beside @ direction) * direction
     aside = velocity - float(velocity @ direction) * direction
-    return _EXCESS * max(0.0, float(np.linalg.norm(aside)) - _ASIDE) * _unit(aside)
+    way = _unit(aside)
+    allowed = _ASIDE + _PULL * max(0.0, -float(offset @ way))
+    return _EXCESS * max(0.0, float(np.linalg.norm(aside)) - allowed) * way
 
 
 def _unit(way: Vector) -> Vector:
