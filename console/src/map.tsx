@@ -2,6 +2,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Flight } from "./flight";
+import { MarkLayer, nameOf } from "./ground";
 import { Drone, Grid, Plan, Scale } from "./map_layers";
 import type { LeasedArea, Place, Point } from "./place";
 import { RulerLayer, measured } from "./ruler";
@@ -72,6 +73,7 @@ export function FlightMap(props: MapProps) {
   };
 
   const own = props.flight.status(props.robot)?.position?.[2] ?? null;
+  const marks = props.flight.marks.at(props.flight.now, props.flight.recorded);
   const traffic = trafficOf(props.flight.mission.status, props.robot);
 
   const keys: Record<string, () => void> = {
@@ -169,6 +171,7 @@ export function FlightMap(props: MapProps) {
             <circle r="9" />
             <text dy="4">H</text>
           </g>
+          <MarkLayer marks={marks} now={props.flight.now} stale={props.flight.stale} sight={sight} />
           {props.flight.mission.robots.map((robot, number) => {
             const status = props.flight.status(robot);
             if (!status) return null;
@@ -274,6 +277,11 @@ export function FlightMap(props: MapProps) {
         <li class="coming">coming</li>
         <li class="fenced">fence</li>
         <li class="forbidden">no-fly</li>
+        {marks.length > 0 && (
+          <li class="sighted">
+            seen<span class="unseen">: {[...marks].reverse().map((one) => nameOf(one.what)).join(", ")}</span>
+          </li>
+        )}
         {traffic.length > 0 && (
           <li class="aircraft">
             aircraft
