@@ -94,7 +94,7 @@ export class Flight {
   constructor(
     mission: MissionOut,
     readonly source: Source,
-    private readonly token: string,
+    readonly token: string,
     private readonly changed: () => void,
   ) {
     this.mission = mission;

@@ -9,6 +9,7 @@ import { RulerLayer, measured } from "./ruler";
 import { SceneryLayer } from "./scenery";
 import { Sight, type Size, type View } from "./sight";
 import { type Drawn, SurveyLayer } from "./survey_map";
+import { useArchive } from "./tile_archive";
 import { TileLayer } from "./tiles";
 import { TrafficLayer, heightOf, headingOf, trafficOf } from "./traffic";
 import type { SceneryOut } from "./wire";
@@ -74,6 +75,7 @@ export function FlightMap(props: MapProps) {
 
   const own = props.flight.status(props.robot)?.position?.[2] ?? null;
   const marks = props.flight.marks.at(props.flight.now, props.flight.recorded);
+  const map = useArchive(props.scenery.tiles, props.flight.token);
   const traffic = trafficOf(props.flight.mission.status, props.robot);
 
   const keys: Record<string, () => void> = {
@@ -150,7 +152,7 @@ export function FlightMap(props: MapProps) {
         }}
       >
         <svg width={size.width} height={size.height} aria-hidden="true">
-          {props.scenery.tiles && <TileLayer tiles={props.scenery.tiles} sight={sight} />}
+          {map.tiles && <TileLayer tiles={map.tiles} archive={map.archive} sight={sight} />}
           <Grid sight={sight} />
           <SceneryLayer shapes={props.scenery.shapes} sight={sight} />
           {props.place.fences.map((fence) => (
@@ -201,6 +203,11 @@ export function FlightMap(props: MapProps) {
           <path class="cross" d={`M${size.width / 2 - 6} ${size.height / 2}h12m-6-6v12`} />
         </svg>
         <Scale scale={shown.scale} />
+        {map.problem && (
+          <p class="unmapped" role="status" data-testid="unmapped">
+            {map.problem}
+          </p>
+        )}
         {props.scenery.tiles?.attribution && (
           <div class="attribution">{props.scenery.tiles.attribution}</div>
         )}
