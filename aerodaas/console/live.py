@@ -125,12 +125,11 @@ class LiveSession:
             await asyncio.sleep(_IDLE_SECONDS / 2)
 
     async def _forward(self, watcher: Watcher) -> None:
-        while (found := await watcher.next()) is not None:
-            message, blob = found
+        while (item := await watcher.next()) is not None:
             async with self._sending:
-                await self._socket.send_json(message)
-                if blob:
-                    await self._socket.send_bytes(blob)
+                await self._socket.send_text(item.text)
+                if item.blob:
+                    await self._socket.send_bytes(item.blob)
 
     async def _read(self) -> None:
         """Return when the watcher has gone; it has nothing to say."""
