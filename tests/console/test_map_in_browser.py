@@ -34,6 +34,17 @@ def browser() -> Iterator[Browser]:
 
 
 @contextmanager
+def serving(handler: type[BaseHTTPRequestHandler]) -> Iterator[int]:
+    """A server of this machine; yields its port."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield server.server_address[1]
+        finally:
+            server.shutdown()
+
+
+@contextmanager
 def tile_server(asked: list[str]) -> Iterator[int]:
     """A server of green tiles; yields its port, and notes the paths that it is asked for."""
     picture = cv2.imencode(".png", np.full((256, 256, 3), (90, 160, 90), np.uint8))[1].tobytes()
@@ -49,12 +60,8 @@ def tile_server(asked: list[str]) -> Iterator[int]:
         def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its own word
             """Nothing."""
 
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        try:
-            yield server.server_address[1]
-        finally:
-            server.shutdown()
+    with serving(Handler) as port:
+        yield port
 
 
 def corner_of(column: float, row: float, level: int) -> tuple[float, float]:
@@ -182,12 +189,8 @@ def archive_server(content: bytes, asked: list[dict[str, str]]) -> Iterator[str]
         def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its own word
             """Nothing."""
 
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        try:
-            yield f"http://127.0.0.1:{server.server_address[1]}/city.pmtiles"
-        finally:
-            server.shutdown()
+    with serving(Handler) as port:
+        yield f"http://127.0.0.1:{port}/city.pmtiles"
 
 
 def opened(browser: Browser, url: str, **more: Any) -> Iterator[Page]:  # noqa: ANN401 - JSON
