@@ -70,15 +70,16 @@ def main(
 
     "captured to drawn" is until the page has drawn a picture on its canvas, not until it lights
     up; "click to setpoint" until the drone's controller has sent another setpoint, by the
-    recording. "cores" are those of the drone's side: application, console, actors and Ray. A
-    viewer takes the state ten times a second and every picture that it can.
+    recording. "drone's cores" are those of the actors and Ray, "server's cores" those of the
+    application's own process, which serves the console and encodes its pictures. A viewer takes
+    the state ten times a second and every picture that it can.
     """
     report = Report("console", UNITS, packages=["ray", "starlette", "uvicorn", "websockets"])
     report.note(f"Camera of {SIZE[0]} x {SIZE[1]} at {RATE:g} Hz, recorded as JPEG.")
     report.note(f"Pictures go to the browser as {pictures}.")
     report.note(f"{psutil.getloadavg()[0]:.1f} processes wanted to run when it began.")
     with tempfile.TemporaryDirectory() as temporary:
-        _fly(Path(temporary), report, seconds, commands, viewers or [0, 1, 50], pictures)
+        _fly(Path(temporary), report, seconds, commands, viewers or [0, 1, 50, 200], pictures)
     sizes = [len(gzip.compress(path.read_bytes(), 9)) for path in _PAGE.glob("[ci]*.*")]
     report.row("page, gzip, kB", _row([sum(sizes) / 1e3]))
     report.show()
@@ -154,8 +155,9 @@ def _look_on(
             page.until("window.firstView")
             first.append(page.run("window.firstView"))
     report.row("first view of the page, ms", _row(first))
-    for count, (cores, pictures, size) in loads.items():
-        report.row(f"cores with {count} viewers", _row([cores]))
+    for count, (drone, server, pictures, size) in loads.items():
+        report.row(f"drone's cores with {count} viewers", _row([drone]))
+        report.row(f"server's cores with {count} viewers", _row([server]))
         if count:
             report.note(
                 f"{count} viewers got {pictures:.1f} pictures a second each, {size / 1e6:.2f} MB."
@@ -186,8 +188,10 @@ def _changes(path: Path) -> list[float]:
     return found
 
 
-def _load(address: str, viewers: int, seconds: float, form: str) -> tuple[float, float, float]:
-    """Cores of this process and its children; pictures and bytes a second and viewer."""
+def _load(
+    address: str, viewers: int, seconds: float, form: str
+) -> tuple[float, float, float, float]:
+    """Cores of the drone's side and the server's; pictures and bytes a second and viewer."""
     watching = None
     if viewers:
         script = str(Path(__file__).with_name("_console_viewers.py"))
@@ -197,21 +201,23 @@ def _load(address: str, viewers: int, seconds: float, form: str) -> tuple[float,
     others = {watching.pid} if watching is not None else set()
     before, began = _busy(others), time.monotonic()
     time.sleep(seconds)
-    cores = (_busy(others) - before) / (time.monotonic() - began)
+    took = time.monotonic() - began
+    drone, server = ((now - then) / took for now, then in zip(_busy(others), before, strict=True))
     said = watching.communicate()[0] if watching is not None else "0 0"
     pictures, size = map(float, said.split())
-    return cores, pictures, size
+    return drone, server, pictures, size
 
 
-def _busy(others: set[int]) -> float:
-    """Seconds of processor time that the drone's side has taken so far."""
-    busy = 0.0
+def _busy(others: set[int]) -> tuple[float, float]:
+    """Seconds of processor time of this process' children but `others`, and of itself, so far."""
     own = psutil.Process()
-    for process in [own, *own.children(recursive=True)]:
-        if process.pid not in others:
-            with_times = process.cpu_times()
-            busy += with_times.user + with_times.system
-    return busy
+    children = [one for one in own.children(recursive=True) if one.pid not in others]
+    return sum(map(_taken, children)), _taken(own)
+
+
+def _taken(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
 
 
 def _row(values: list[float]) -> dict[str, float]:

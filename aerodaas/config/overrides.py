@@ -66,6 +66,8 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
     if content["terrain"] is not None:
         files = content["terrain"]["files"]
         content["terrain"]["files"] = [_absolute(file, folder) for file in files]
+    if config.map_tiles is not None and config.map_tiles.file is not None:
+        content["map_tiles"]["url"] = _absolute(content["map_tiles"]["url"], folder)
     if content["simulation"]["world"].endswith(".json"):
         content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
     content["simulation"]["network"] = "+".join(

@@ -19,6 +19,7 @@ from aerodaas.console.access import role_of
 from aerodaas.console.controls import ControlCommand, ControlSession, told_of_controls
 from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
+from aerodaas.console.map_archive import archive_routes
 from aerodaas.console.own_flight import OWN, OwnFlight
 from aerodaas.console.page import page_routes
 from aerodaas.console.surveys import SurveyPlanner
@@ -69,6 +70,7 @@ def build_page(
     for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
         app.add_exception_handler(kind, _refused)
     app.include_router(page_routes(framed=framed, tiles=tiles))
+    app.include_router(archive_routes(tiles))
     app.include_router(routes)
     return app
 

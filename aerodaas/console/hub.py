@@ -1,4 +1,4 @@
-"""Hub of live streams: each is read and packed once, whatever the number of its watchers.
+"""Hub of live streams: each is read, packed and written once, whatever the number of watchers.
 
 A video's pictures, whose messages have `key`, need all those before them back to a key frame. Who
 begins to watch gets these at once; who lags is left out until the next key frame.
@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["StreamHub", "Watcher"]
+__all__ = ["Item", "StreamHub", "Watcher"]
 
 Packed: TypeAlias = tuple[dict[str, Any], bytes]
+"""A message and its blob, as a stream's reader has them."""
 _WAITING = 8
 """Most items that wait for one watcher; older ones are left out, for they are stale."""
 _LONGEST_GROUP = 120
@@ -26,13 +28,21 @@ _KEY = "key"
 """Of a message of a video: whether decoding can begin with it."""
 
 
+class Item(NamedTuple):
+    """What each watcher is sent."""
+
+    text: str
+    """The message as JSON."""
+    blob: bytes
+    key: bool | None
+    """Of a video's picture: whether decoding can begin with it; None for anything else."""
+
+
 class Watcher:
-    """One watcher's queue, filled by a thread and read by the event loop."""
+    """One watcher's queue, of the event loop."""
 
     def __init__(self) -> None:
-        """Belong to the running event loop."""
-        self._loop = asyncio.get_running_loop()
-        self._queue: asyncio.Queue[Packed | None] = asyncio.Queue()
+        self._queue: asyncio.Queue[Item | None] = asyncio.Queue()
         self._begun = 0
         """Items of the beginning that wait, beside the others."""
         self._broken = False
@@ -40,33 +50,25 @@ class Watcher:
         self.left_out = 0
         """Items that newer ones took the place of."""
 
-    def put(self, packed: Packed | None) -> None:
-        """Add an item, in any thread; None for the stream's end."""
-        with contextlib.suppress(RuntimeError):  # the loop has been closed
-            self._loop.call_soon_threadsafe(self._put, packed)
+    def begin(self, group: Sequence[Item]) -> None:
+        """Add what comes before the next item."""
+        for item in group:
+            self._begun += 1
+            self._queue.put_nowait(item)
 
-    def begin(self, group: Sequence[Packed]) -> None:
-        """Add what comes before the next item, in any thread."""
-        for packed in group:
-            with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._put_first, packed)
-
-    def _put_first(self, packed: Packed) -> None:
-        self._begun += 1
-        self._queue.put_nowait(packed)
-
-    def _put(self, packed: Packed | None) -> None:
+    def put(self, item: Item | None) -> None:
+        """Add an item; None for the stream's end."""
         full = self._queue.qsize() >= _WAITING + self._begun
-        key = None if packed is None else packed[0].get(_KEY)
+        key = None if item is None else item.key
         if key is False and (full or self._broken):
             self._broken = True
             self.left_out += 1
             return
         if key:
             self._broken = False
-        if full and packed is not None:
+        if full and item is not None:
             self._leave_out(self._queue.qsize() if key else 1)
-        self._queue.put_nowait(packed)
+        self._queue.put_nowait(item)
 
     def _leave_out(self, count: int) -> None:
         for _ in range(count):
@@ -74,11 +76,11 @@ class Watcher:
         self._begun = max(0, self._begun - count)
         self.left_out += count
 
-    async def next(self) -> Packed | None:
+    async def next(self) -> Item | None:
         """The next item; None once the stream has ended."""
-        packed = await self._queue.get()
+        item = await self._queue.get()
         self._begun = max(0, self._begun - 1)
-        return packed
+        return item
 
 
 class _Source:
@@ -86,16 +88,26 @@ class _Source:
 
     def __init__(self) -> None:
         self.watchers: set[Watcher] = set()
-        self.group: list[Packed] = []
+        self.loop = asyncio.get_running_loop()
+        self.group: list[Item] = []
         """Pictures of a video since its last key frame; empty where these are too many."""
 
-    def keep(self, packed: Packed) -> None:
+    def keep(self, item: Item) -> None:
         """Keep a picture for who begins to watch."""
-        key = packed[0].get(_KEY)
-        if key:
-            self.group = [packed]
-        elif key is False and self.group:
-            self.group = [*self.group, packed] if len(self.group) < _LONGEST_GROUP else []
+        if item.key:
+            self.group = [item]
+        elif item.key is False and self.group:
+            self.group = [*self.group, item] if len(self.group) < _LONGEST_GROUP else []
+
+    def tell(self, watchers: Sequence[Watcher], item: Item | None) -> None:
+        """Give watchers an item, in any thread: the loop is woken once for all of them."""
+        with contextlib.suppress(RuntimeError):  # the loop has been closed
+            self.loop.call_soon_threadsafe(_put_all, watchers, item)
+
+
+def _put_all(watchers: Sequence[Watcher], item: Item | None) -> None:
+    for one in watchers:
+        one.put(item)
 
 
 class StreamHub:
@@ -108,7 +120,10 @@ class StreamHub:
         self._sources: dict[tuple[str, str, PictureForm], _Source] = {}
 
     def watch(self, mission: str, stream: str, form: PictureForm) -> Watcher:
-        """Begin to watch a stream, its pictures in a form; `leave` ends it."""
+        """Begin to watch a stream, its pictures in a form; `leave` ends it.
+
+        All watchers are of one event loop, in which this is called.
+        """
         watcher, key = Watcher(), (mission, stream, form)
         with self._lock:
             source = self._sources.get(key)
@@ -131,18 +146,16 @@ class StreamHub:
         try:
             with contextlib.suppress(AeroDaaSError):
                 for message, blob in self._items(*key):
+                    item = Item(json.dumps(message), blob, message.get(_KEY)) if message else None
                     with self._lock:
                         watchers = list(source.watchers)
                         if not watchers:
                             return
-                        source.keep((message, blob))
-                    if message:
-                        for one in watchers:
-                            one.put((message, blob))
+                        if item is not None:
+                            source.keep(item)
+                            source.tell(watchers, item)
         finally:
             with self._lock:
                 if self._sources.get(key) is source:
                     del self._sources[key]
-                left = list(source.watchers)
-            for one in left:
-                one.put(None)
+                source.tell(list(source.watchers), None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Protocol, TypeAlias
 
 from fastapi import Query, WebSocket, WebSocketDisconnect
@@ -27,6 +27,8 @@ Form: TypeAlias = Annotated[PictureForm, Query()]
 """How pictures are sent; of a view's address."""
 
 _MOST_STREAMS = 16
+_RENEWAL_SECONDS = 5.0
+"""Wall seconds between two looks at whether a watcher still may watch."""
 _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
 
@@ -72,21 +74,30 @@ class LiveSession:
         # An item's two messages stay together.
         self._sending = asyncio.Lock()
 
-    async def run(self, rate: float, streams: Sequence[Wanted], *, own: bool) -> None:
-        """Accept the watcher, and send until the mission is over or the watcher has gone.
+    async def run(
+        self,
+        rate: float,
+        streams: Sequence[Wanted],
+        *,
+        own: bool,
+        allowed: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Accept the watcher; send until the mission is over, or the watcher has gone or must go.
 
         Args:
             rate: Most messages of the mission's state a second.
             streams: Whose items are sent, too.
             own: Whether the watcher counts as the mission's user, who is heard of so.
+            allowed: Whether the watcher still may watch; called in another thread.
         """
         offered = self._socket.scope.get("subprotocols", ())
         await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
         state = asyncio.create_task(self._state(rate, own=own))
         gone = asyncio.create_task(self._read())
-        jobs = [state, gone, *(asyncio.create_task(self._items(*one)) for one in streams)]
+        ends = [state, gone, asyncio.create_task(self._until_refused(allowed))]
+        jobs = [*ends, *(asyncio.create_task(self._items(*one)) for one in streams)]
         try:
-            await asyncio.wait((state, gone), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for job in jobs:
                 job.cancel()
@@ -125,12 +136,16 @@ class LiveSession:
             await asyncio.sleep(_IDLE_SECONDS / 2)
 
     async def _forward(self, watcher: Watcher) -> None:
-        while (found := await watcher.next()) is not None:
-            message, blob = found
+        while (item := await watcher.next()) is not None:
             async with self._sending:
-                await self._socket.send_json(message)
-                if blob:
-                    await self._socket.send_bytes(blob)
+                await self._socket.send_text(item.text)
+                if item.blob:
+                    await self._socket.send_bytes(item.blob)
+
+    async def _until_refused(self, allowed: Callable[[], bool]) -> None:
+        """Return when the watcher may not watch any more."""
+        while await asyncio.to_thread(allowed):  # noqa: ASYNC110 - a token's end has no event
+            await asyncio.sleep(_RENEWAL_SECONDS)
 
     async def _read(self) -> None:
         """Return when the watcher has gone; it has nothing to say."""

@@ -6,10 +6,11 @@ import contextlib
 import threading
 import time
 from collections.abc import Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 from aerodaas.console.meter import FlightMeter
-from aerodaas.console.packed_reader import PackedReader, drawn_streams
+from aerodaas.console.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import MissionOut, MissionPhase, PictureForm
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from aerodaas.actors.run.flight_state import FlightState
     from aerodaas.config.model import EnvironmentConfig
     from aerodaas.dataflow.graph import Graph
+    from aerodaas.terrain.ground import Ground
 
 __all__ = ["OWN", "Flown", "OwnFlight"]
 
@@ -89,6 +91,11 @@ class OwnFlight:
         """What is flown in."""
         return self._run.config
 
+    @cached_property
+    def _ground(self) -> Ground | None:
+        """What is flown over; it is read when something is watched."""
+        return ground_of(self._run.config)
+
     def mission(self) -> MissionOut:
         """The flight as a service would show it."""
         self._asked = time.monotonic()
@@ -141,7 +148,7 @@ class OwnFlight:
         graph = self._run.graph
         if stream not in drawn_streams(graph) or graph.reader is None:
             raise ConfigError(f"no stream that can be drawn is called {stream!r}")
-        reader = PackedReader(graph.reader(stream), stream, form)
+        reader = PackedReader(graph.reader(stream), stream, form, self._ground)
         while not self.over:
             yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
 

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from aerodaas.analytics.wire_items import pack
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.graph import Graph
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.protocol.schemas import PictureForm, StreamKind
 from aerodaas.recording.h264 import H264Encoder, is_key_frame
-from aerodaas.recording.playback.page_items import packed_depth, packed_picture, packed_target
+from aerodaas.recording.playback.page_items import (
+    packed_depth,
+    packed_picture,
+    packed_places,
+    packed_target,
+)
+from aerodaas.terrain.ground import Ground
 from aerodaas.types.data import Detections, Frame, Header
+from aerodaas.types.errors import ConfigError
 from aerodaas.types.status import Message
 
-__all__ = ["PackedReader", "drawn_streams"]
+__all__ = ["PackedReader", "drawn_streams", "ground_of"]
 
 _VIDEO_QUALITY = 26
 """x264's constant rate factor of a live picture; a recording has its own."""
+
+_DRAWN = frozenset({PictureForm.JPEG, PictureForm.H264})
+"""Forms that a page asks for."""
 
 
 class PackedReader:
@@ -28,11 +42,13 @@ class PackedReader:
         reader: Any,  # noqa: ANN401 - LiveReader, of Ray's side
         stream: str,
         form: PictureForm = PictureForm.WHOLE,
+        ground: Ground | None = None,
     ) -> None:
-        """Read `stream` by `reader`; pictures in this form."""
+        """Read `stream` by `reader`; pictures in this form, and what is in them on this ground."""
         self._reader = reader
         self._stream = stream
         self._form = form
+        self._ground = ground
         self._encoder: H264Encoder | None = None
 
     def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
@@ -63,6 +79,8 @@ class PackedReader:
         if isinstance(item, AeroNavigation) and self._form is not PictureForm.WHOLE:
             target = next((one.target for one in item.commands if one.target), None)
             return None if target is None else (packed_target(header, target), b"", {})
+        if isinstance(item, Detections) and self._form in _DRAWN:
+            return *pack(item), packed_places(item, self._ground)
         if not isinstance(item, Frame) or self._form is PictureForm.WHOLE:
             return None if self._form is PictureForm.DEPTH else (*pack(item), {})
         if self._form is PictureForm.DEPTH:
@@ -84,6 +102,21 @@ class PackedReader:
             return self._encoder.encode(frame.image, frame.header.stamp)
         except ValueError:
             return b""
+
+
+def ground_of(config: EnvironmentConfig) -> Ground | None:
+    """The terrain around home, where there is one; it lies on the local frame's zero there.
+
+    None as well where it is not known at home, or of too many samples: then no drone starts, and
+    its own mission says why.
+    """
+    home, terrain = config.home, config.terrain
+    if home is None or terrain is None:
+        return None
+    reach = max((robot.limits.max_range for robot in config.robots), default=0.0)
+    with contextlib.suppress(ConfigError):
+        return Ground.of(terrain, home.origin, np.zeros(3), reach)
+    return None
 
 
 def drawn_streams(graph: Graph) -> dict[str, StreamKind]:

@@ -24,7 +24,8 @@ _HEADERS = {
     # Nothing from elsewhere, no inline script or style, and in nobody's frame unless asked for.
     "content-security-policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:{tiles}; "
-        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
+        "connect-src 'self'{archive}; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors {ancestors}"
     ),
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -47,12 +48,15 @@ def page_routes(*, framed: bool = False, tiles: MapTilesConfig | None = None) ->
 
     Args:
         framed: Pages of this machine may hold them in a frame.
-        tiles: Pictures may come from their server, too.
+        tiles: Pictures may come from their server, too, or parts of an archive.
     """
     router = APIRouter()
+    origin = "" if tiles is None or not tiles.origin else f" {tiles.origin}"
+    archive = tiles is not None and tiles.is_archive
     given = {
         "ancestors": _NOTEBOOKS if framed else _NOBODY,
-        "tiles": "" if tiles is None else f" {tiles.origin}",
+        "tiles": "" if archive else origin,
+        "archive": origin if archive else "",
     }
     headers = {key: value.format(**given) for key, value in _HEADERS.items()}
     for path, (name, kind) in _FILES.items():

@@ -22,7 +22,8 @@ __all__ = ["ConsoleServer", "PageServer"]
 _STOPPING = 5.0
 _FAREWELL = 1.0
 """Wall seconds in which watchers are told that the flight is over."""
-_MOST_CONNECTIONS = 256
+_MOST_CONNECTIONS = 640
+"""A page has two that stay, and a few that come and go."""
 _MOST_BYTES_SENT = 4096
 """Bytes of a WebSocket message; watchers have nothing to say."""
 _PING_SECONDS = 5.0

@@ -14,15 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.following.ground_point import EDGE_MARGIN, SMALLEST_SLOPE, reach, slope
 from aerodaas.types.data import Detection, Detections
 from aerodaas.types.geometry import Vector, rotation_from_rpy
 
 __all__ = ["RelativeTarget", "TargetSize", "ends_in_picture", "sight"]
 
-_MARGIN = 0.03
-"""Distance of a box from the image's edge, as a fraction of the side, within which it counts as
-cut: boxes of people whose feet are outside the image end up to 18 of 720 pixels short of its edge
-(three YOLO models, 36 real frames)."""
 _HIDDEN = 1.3
 """Ratio of the distances by height and by width above which part of the height is hidden."""
 _LIES = 0.8
@@ -34,7 +31,6 @@ object is afloat, and the least difference in slope, to allow for an attitude er
 _TWICE = 2.0
 """Ratio of measured depth to the distance by size, above which the depth is that of the background,
 and below whose inverse, for a box entirely in the image, it is that of an object in between."""
-_SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
 
@@ -105,30 +101,32 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Rel
         towards: Vector = level @ camera.ray(at_u * scale_u, at_v * scale_v)
         return towards
 
-    slopes = _slope(ray(u, top)) - _slope(ray(u, bottom))
+    slopes = slope(ray(u, top)) - slope(ray(u, bottom))
     middle, edge_left, edge_right = ray(u, v), ray(left, v), ray(right, v)
     bearing = math.atan2(middle[1], middle[0])
     spread = math.remainder(_azimuth(edge_left) - _azimuth(edge_right), math.tau)
-    if not (slopes > _SMALLEST_SLOPE and _SMALLEST_SLOPE < spread < math.pi):
+    if not (slopes > SMALLEST_SLOPE and SMALLEST_SLOPE < spread < math.pi):
         return None
     by_height, breadth = size.height / slopes, 2 * math.tan(spread / 2)
     by_width = size.width / breadth
     at_most = max(size.width, size.widest or 0.0) / breadth
-    margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
+    margin_u, margin_v = EDGE_MARGIN * detections.width, EDGE_MARGIN * detections.height
     cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
     by_size = by_height if not cut_v else min(by_height, by_width)
-    reach = _reach(ray(u, bottom), lens)
-    lies = reach < _LIES * by_height
+    # A lying target appears small and therefore far away by its size. Where the ground falls off,
+    # the target is only estimated nearer than it is.
+    ends = reach(ray(u, bottom), lens)
+    lies = ends < _LIES * by_height
     depth = _along_ground(detection.depth, middle, level @ camera.body_from_optical[:, 2])
     if depth is not None and not (
         (0.0 if cut_u or cut_v else by_size / _TWICE) <= depth <= by_size * _TWICE
     ):
         depth = None
-    measured = min(by_size, reach) if depth is None else depth
+    measured = min(by_size, ends) if depth is None else depth
     crown = None
     if math.isfinite(lens) and top >= margin_v:
-        crown = lens + measured * _slope(ray(u, top))
+        crown = lens + measured * slope(ray(u, top))
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # Moves the origin from the lens to the body's centre.
     place = measured * direction + mount[:2]
@@ -149,7 +147,7 @@ def ends_in_picture(detection: Detection, detections: Detections) -> bool:
     which a detector cannot distinguish from an object at that distance.
     """
     left, _, right, bottom = detection.box
-    margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
+    margin_u, margin_v = EDGE_MARGIN * detections.width, EDGE_MARGIN * detections.height
     return (
         left >= margin_u
         or right <= detections.width - margin_u
@@ -168,31 +166,13 @@ def _along_ground(depth: float | None, ray: Vector, axis: Vector) -> float | Non
     return depth / towards * math.hypot(ray[0], ray[1])
 
 
-def _reach(lowest: Vector, lens: float) -> float:
-    """Distance in metres from the lens, `lens` metres up, to the ground at a box's lower edge.
-
-    It limits the distance of a lying target, which appears small and therefore far away by its
-    size. Where the ground falls off, the target is only estimated nearer than it is. Infinite if
-    the height is unknown or the ray does not point down.
-    """
-    slope = _slope(lowest)
-    if not (math.isfinite(lens) and lens > 0.0 and slope < -_SMALLEST_SLOPE):
-        return math.inf
-    return -lens / slope
-
-
 def _is_afloat(lowest: Vector, distance: float, lens: float) -> bool:
     """Whether an object at `distance` has its lower edge, along `lowest`, above the ground."""
     if not (math.isfinite(lens) and lens > 0.0 and distance > 0.0):
         return False
-    ground, edge = -lens / distance, _slope(lowest)
+    ground, edge = -lens / distance, slope(lowest)
     return edge > ground / _AFLOAT and edge > ground + _TILTED
 
 
 def _azimuth(ray: Vector) -> float:
     return math.atan2(ray[1], ray[0])
-
-
-def _slope(ray: Vector) -> float:
-    """Slope of a ray, metres up per metre along the ground."""
-    return float(ray[2] / max(math.hypot(ray[0], ray[1]), _SMALLEST_SLOPE))

@@ -10,7 +10,10 @@ from aerodaas.protocol.bases import AnswerModel
 from aerodaas.simulation.ground_plan import ShapeKind, ground_plan
 from aerodaas.simulation.world import World
 
-__all__ = ["SceneryOut", "ShapeOut", "TilesOut"]
+__all__ = ["ARCHIVE_PATH", "SceneryOut", "ShapeOut", "TilesOut"]
+
+ARCHIVE_PATH = "/v1/map.pmtiles"
+"""Where the page finds an archive of tiles that is a file."""
 
 
 class ShapeOut(AnswerModel):
@@ -30,6 +33,9 @@ class TilesOut(AnswerModel):
     """Tiles of the Earth, and where the local frame lies on it."""
 
     url: str
+    """Address with `{z}`, `{x}` and `{y}`, or of an archive."""
+    archive: bool
+    """Whether it is that of one PMTiles archive."""
     attribution: str
     max_zoom: int
     latitude: float
@@ -82,7 +88,8 @@ def _tiles(config: EnvironmentConfig) -> TilesOut | None:
     if tiles is None or home is None:
         return None
     return TilesOut(
-        url=tiles.url,
+        url=tiles.url if tiles.file is None else ARCHIVE_PATH.removeprefix("/"),
+        archive=tiles.is_archive,
         attribution=tiles.attribution,
         max_zoom=tiles.max_zoom,
         latitude=home.latitude,

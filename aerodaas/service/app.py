@@ -11,6 +11,7 @@ from fastapi.security import HTTPBearer
 
 from aerodaas.config.redaction import catalogue
 from aerodaas.console.hub import StreamHub
+from aerodaas.console.map_archive import archive_routes
 from aerodaas.console.page import page_routes
 from aerodaas.service.access import Access, Accounts, Audit, OidcVerifier, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
@@ -104,5 +105,6 @@ def build_service(
     app.include_router(LiveRoutes(desk, hub, admission).router())
     app.include_router(HereRoutes(desk, admission).router())
     app.include_router(page_routes(tiles=settings.config.map_tiles))
+    app.include_router(archive_routes(settings.config.map_tiles))
     app.add_middleware(Gate, admission=admission)
     return app

@@ -1,6 +1,7 @@
 // The state of one mission as the page knows it, live or recorded: newest status, trails, charts.
 
 import { Refused, ask, openSocket } from "./connection";
+import { GroundMarks } from "./ground";
 import type { Spot } from "./place";
 import type { Past, Source } from "./source";
 import type {
@@ -85,13 +86,15 @@ export class Flight {
   /** What the analytics scheduler had done by each time. */
   analytics: AnalyticsOut[] = [];
   readonly clock = new ClockOffset();
+  /** Where what was seen stands. */
+  readonly marks = new GroundMarks();
   private told: string[] = [];
   private orderCount = 0;
 
   constructor(
     mission: MissionOut,
     readonly source: Source,
-    private readonly token: string,
+    readonly token: string,
     private readonly changed: () => void,
   ) {
     this.mission = mission;
@@ -129,6 +132,18 @@ export class Flight {
   /** Whether what is shown may not be so any more. */
   get stale(): boolean {
     return !this.recorded && !this.over && (!this.connected || Date.now() - this.heard > STALE);
+  }
+
+  /** Mission seconds of what is shown. */
+  get now(): number {
+    return Math.max(...Object.values(this.mission.status).map((status) => status.time), 0);
+  }
+
+  /** Take what was found in a picture. */
+  see(message: Record<string, unknown>): void {
+    this.marks.take(message);
+    // Of a live flight, the next state draws it.
+    if (this.recorded) this.changed();
   }
 
   status(robot: string): StatusOut | undefined {

@@ -2,12 +2,14 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type { Flight } from "./flight";
+import { MarkLayer, nameOf } from "./ground";
 import { Drone, Grid, Plan, Scale } from "./map_layers";
 import type { LeasedArea, Place, Point } from "./place";
 import { RulerLayer, measured } from "./ruler";
 import { SceneryLayer } from "./scenery";
 import { Sight, type Size, type View } from "./sight";
 import { type Drawn, SurveyLayer } from "./survey_map";
+import { useArchive } from "./tile_archive";
 import { TileLayer } from "./tiles";
 import { TrafficLayer, heightOf, headingOf, trafficOf } from "./traffic";
 import type { SceneryOut } from "./wire";
@@ -72,6 +74,8 @@ export function FlightMap(props: MapProps) {
   };
 
   const own = props.flight.status(props.robot)?.position?.[2] ?? null;
+  const marks = props.flight.marks.at(props.flight.now, props.flight.recorded);
+  const map = useArchive(props.scenery.tiles, props.flight.token);
   const traffic = trafficOf(props.flight.mission.status, props.robot);
 
   const keys: Record<string, () => void> = {
@@ -148,7 +152,7 @@ export function FlightMap(props: MapProps) {
         }}
       >
         <svg width={size.width} height={size.height} aria-hidden="true">
-          {props.scenery.tiles && <TileLayer tiles={props.scenery.tiles} sight={sight} />}
+          {map.tiles && <TileLayer tiles={map.tiles} archive={map.archive} sight={sight} />}
           <Grid sight={sight} />
           <SceneryLayer shapes={props.scenery.shapes} sight={sight} />
           {props.place.fences.map((fence) => (
@@ -169,6 +173,7 @@ export function FlightMap(props: MapProps) {
             <circle r="9" />
             <text dy="4">H</text>
           </g>
+          <MarkLayer marks={marks} now={props.flight.now} stale={props.flight.stale} sight={sight} />
           {props.flight.mission.robots.map((robot, number) => {
             const status = props.flight.status(robot);
             if (!status) return null;
@@ -198,6 +203,11 @@ export function FlightMap(props: MapProps) {
           <path class="cross" d={`M${size.width / 2 - 6} ${size.height / 2}h12m-6-6v12`} />
         </svg>
         <Scale scale={shown.scale} />
+        {map.problem && (
+          <p class="unmapped" role="status" data-testid="unmapped">
+            {map.problem}
+          </p>
+        )}
         {props.scenery.tiles?.attribution && (
           <div class="attribution">{props.scenery.tiles.attribution}</div>
         )}
@@ -274,6 +284,11 @@ export function FlightMap(props: MapProps) {
         <li class="coming">coming</li>
         <li class="fenced">fence</li>
         <li class="forbidden">no-fly</li>
+        {marks.length > 0 && (
+          <li class="sighted">
+            seen<span class="unseen">: {[...marks].reverse().map((one) => nameOf(one.what)).join(", ")}</span>
+          </li>
+        )}
         {traffic.length > 0 && (
           <li class="aircraft">
             aircraft

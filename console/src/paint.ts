@@ -93,7 +93,7 @@ function drawTarget(
   pen.fillText(text, from + 4, below + size + 1);
 }
 
-function colourOf(one: Detection): string {
+export function colourOf(one: Detection): string {
   return COLOURS[(one.track_id ?? one.label.length) % COLOURS.length] ?? "#ffb000";
 }
 

@@ -39,7 +39,8 @@ export interface Picture {
   depth: Depth | undefined;
 }
 
-interface Header {
+export interface Header {
+  /** Mission nanoseconds. */
   stamp: number;
   source: string;
 }
@@ -80,6 +81,22 @@ function triples(array: unknown): [number, number, number][] {
     view.getFloat32(12 * row + 4, true),
     view.getFloat32(12 * row + 8, true),
   ]);
+}
+
+/** What was found, and in which frame. */
+export function detectionsOf(message: Record<string, unknown>): {
+  header: Header;
+  found: Detection[];
+} {
+  const item = fields<{ header: unknown; items: unknown }>(message["item"]);
+  const found = list(item.items).map((one) => {
+    const { box, label, score, track_id, keypoints } = fields<
+      Detection & { keypoints?: unknown }
+    >(one);
+    const corners = list(box) as Detection["box"];
+    return { box: corners, label, score, track_id, points: triples(keypoints) };
+  });
+  return { header: fields<Header>(item.header), found };
 }
 
 export class Pictures {
@@ -132,23 +149,13 @@ export class Pictures {
   /** Take what was found, or what is followed, in a picture. */
   found(message: Record<string, unknown>): void {
     const item = message["item"] as { is?: string; header?: unknown } & Target;
-    if (item.is !== "Target") this.detections(message);
-    else {
+    if (item.is !== "Target") {
+      const { header, found } = detectionsOf(message);
+      this.of(header).found.set(message["stream"] as string, found);
+    } else {
       const { state, box } = item;
       this.of(fields<Header>(item.header)).target = { state, box };
     }
-  }
-
-  private detections(message: Record<string, unknown>): void {
-    const item = fields<{ header: unknown; items: unknown }>(message["item"]);
-    const found = list(item.items).map((one) => {
-      const { box, label, score, track_id, keypoints } = fields<
-        Detection & { keypoints?: unknown }
-      >(one);
-      const corners = list(box) as Detection["box"];
-      return { box: corners, label, score, track_id, points: triples(keypoints) };
-    });
-    this.of(fields<Header>(item.header)).found.set(message["stream"] as string, found);
   }
 
   /**

@@ -1,9 +1,10 @@
 // Tiles of a map of the Earth below the flight, each where it lies in the local frame.
 
-import { useMemo } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import type { Point } from "./place";
 import type { Sight } from "./sight";
 import { px } from "./sight";
+import type { TileArchive } from "./tile_archive";
 import type { TilesOut } from "./wire";
 
 const TILE = 256;
@@ -66,7 +67,9 @@ function cornerOf(column: number, row: number, level: number): Origin {
 }
 
 interface Tile {
-  url: string;
+  level: number;
+  column: number;
+  row: number;
   /** In the local frame. */
   northWest: Point;
   southEast: Point;
@@ -90,10 +93,7 @@ export function tilesOf(tiles: TilesOut, sight: Sight): Tile[] {
       for (let column = west; column <= east; column += 1) {
         const around = ((column % count) + count) % count;
         found.push({
-          url: tiles.url
-            .replace("{z}", String(level))
-            .replace("{x}", String(around))
-            .replace("{y}", String(row)),
+          ...{ level, column: around, row },
           northWest: localOf(tiles, cornerOf(column, row, level)),
           southEast: localOf(tiles, cornerOf(column + 1, row + 1, level)),
         });
@@ -104,30 +104,63 @@ export function tilesOf(tiles: TilesOut, sight: Sight): Tile[] {
   return [];
 }
 
-export function TileLayer({ tiles, sight }: { tiles: TilesOut; sight: Sight }) {
+interface TileLayerProps {
+  tiles: TilesOut;
+  /** The archive that they are in; null where each has an address. */
+  archive: TileArchive | null;
+  sight: Sight;
+}
+
+export function TileLayer({ tiles, archive, sight }: TileLayerProps) {
   const { east, north, scale } = sight.view;
   return useMemo(
     () => (
       <g class="tiles">
-        {tilesOf(tiles, sight).map(({ url, northWest, southEast }) => {
+        {tilesOf(tiles, sight).map((tile) => {
+          const { level, column, row, northWest, southEast } = tile;
           const [x, y] = [sight.x(northWest[0]), sight.y(northWest[1])];
-          return (
-            <image
-              key={url}
-              href={url}
-              preserveAspectRatio="none"
-              x={px(x)}
-              y={px(y)}
-              // Half a pixel more: no seams.
-              width={px(sight.x(southEast[0]) - x + 0.5)}
-              height={px(sight.y(southEast[1]) - y + 0.5)}
-            />
+          const place = {
+            x: px(x),
+            y: px(y),
+            // Half a pixel more: no seams.
+            width: px(sight.x(southEast[0]) - x + 0.5),
+            height: px(sight.y(southEast[1]) - y + 0.5),
+            preserveAspectRatio: "none",
+          };
+          const key = `${level}/${column}/${row}`;
+          return archive ? (
+            <Archived key={key} archive={archive} tile={tile} place={place} />
+          ) : (
+            <image key={key} href={addressOf(tiles, tile)} {...place} />
           );
         })}
       </g>
     ),
-    [tiles, east, north, scale, sight.size, sight.tilted],
+    [tiles, archive, east, north, scale, sight.size, sight.tilted],
   );
+}
+
+function addressOf({ url }: TilesOut, { level, column, row }: Tile): string {
+  return url
+    .replace("{z}", String(level))
+    .replace("{x}", String(column))
+    .replace("{y}", String(row));
+}
+
+/** A tile of an archive; nothing where that has none. */
+function Archived(props: { archive: TileArchive; tile: Tile; place: Record<string, string> }) {
+  const { archive, tile, place } = props;
+  const [href, setHref] = useState("");
+  useEffect(() => {
+    let gone = false;
+    void archive
+      .picture(tile.level, tile.column, tile.row)
+      .then((found) => !gone && setHref(found));
+    return () => {
+      gone = true;
+    };
+  }, [archive]);
+  return href ? <image href={href} data-tile={`${tile.level}/${tile.column}/${tile.row}`} {...place} /> : null;
 }
 
 function rad(degrees: number): number {

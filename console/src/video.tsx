@@ -59,6 +59,7 @@ export function Video({ flight }: { flight: Flight }) {
     const leave = flight.source.watch(wanted, {
       found: (message) => {
         pictures.found(message);
+        flight.see(message);
         later();
       },
       picture: (message, data) => pictures.take(message, data).then(later),

@@ -336,6 +336,7 @@ export interface ShapeOut {
  * Tiles of the Earth, and where the local frame lies on it.
  */
 export interface TilesOut {
+  archive: boolean;
   attribution: string;
   latitude: number;
   longitude: number;

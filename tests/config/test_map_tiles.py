@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.overrides import located
 from aerodaas.config.redaction import catalogue
 
 TEMPLATE = "https://tiles.example/osm/{z}/{x}/{y}.png?key=a1"
@@ -36,6 +38,26 @@ def test_the_origin_is_what_the_page_may_fetch_from(url: str, origin: str) -> No
     assert tiles.origin == origin
 
 
+def test_an_archive_is_one_file(tmp_path: Path) -> None:
+    """Of an address, with a key or none, or a path, which is relative to the environment's file."""
+    for url in ("https://maps.example/city.pmtiles", "http://localhost:8/city.pmtiles?key=a1"):
+        tiles = config(url).map_tiles
+        assert tiles is not None
+        assert tiles.is_archive
+        assert tiles.file is None
+        assert tiles.origin == url.partition("/city")[0]
+    (tmp_path / "city.pmtiles").touch()
+    for url in ("city.pmtiles", str(tmp_path / "city.pmtiles")):
+        tiles = located(config(url), tmp_path).map_tiles
+        assert tiles is not None
+        assert tiles.is_archive
+        assert tiles.file == tmp_path / "city.pmtiles"
+        assert not tiles.origin
+    template = located(config(TEMPLATE), tmp_path).map_tiles
+    assert template is not None
+    assert (template.is_archive, template.file, template.url) == (False, None, TEMPLATE)
+
+
 @pytest.mark.parametrize(
     "url",
     [
@@ -50,6 +72,14 @@ def test_the_origin_is_what_the_page_may_fetch_from(url: str, origin: str) -> No
         "https://tiles.example *.evil.example/{z}/{x}/{y}.png",
         "https://tiles.example/{z}/{x}/{y}\n.png",
         "javascript:alert(1)//{z}/{x}/{y}",
+        "http://maps.example/city.pmtiles",
+        "https://user@maps.example/city.pmtiles",
+        "https:///city.pmtiles",
+        "ftp://maps.example/city.pmtiles",
+        "https://maps.example/{z}/{x}/{y}.pmtiles",
+        "file:///home/city.pmtiles",
+        "https://maps.example/city.mbtiles",
+        "city.mbtiles",
     ],
 )
 def test_others_are_refused(url: str) -> None:

@@ -25,12 +25,13 @@ _START_SECONDS = 120.0
 class Watched:
     """An application in flight, with the addresses of its console."""
 
-    def __init__(self, application: str, folder: Path, *words: str) -> None:
-        """Fly one of `apps/` at the clock's speed; the recording goes into `folder`."""
+    def __init__(self, application: str | Path, folder: Path, *words: str) -> None:
+        """Fly a file, or one of `apps/`, at the clock's speed; the recording goes into `folder`."""
+        file = application if isinstance(application, Path) else f"apps/{application}.py"
         self.recording = folder / "flight" / "flight.mcap"
         self._log = folder / "log"
         self._command = [
-            sys.executable, "-m", "aerodaas", "run", f"apps/{application}.py", "--console",
+            sys.executable, "-m", "aerodaas", "run", str(file), "--console",
             "--console-address", "127.0.0.1:0", "--record", str(folder / "flight"), *words,
         ]  # fmt: skip
 

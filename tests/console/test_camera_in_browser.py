@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from camera_pages import COUNT_DECODED, DECODES, opened_camera
 from required import needs_peer
 from scripted_camera import SHOWN, Reader, camera_console, require_own_frames
 
 from aerodaas.types.target import TargetState
-from tools.browser import Browser, Page
+from tools.browser import Browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
-
-COUNT = """
-  VideoDecoder.prototype.decode = (decode => function (...words) {
-    window.decoded = (window.decoded ?? 0) + 1;
-    return decode.apply(this, words);
-  })(VideoDecoder.prototype.decode);
-"""
-"""Counts the pictures that come as H.264."""
 
 
 @pytest.fixture(scope="module")
@@ -29,26 +22,21 @@ def browser() -> Iterator[Browser]:
         yield browser
 
 
-def opened(browser: Browser, address: str, form: str, before: str) -> Page:
-    """The page, with the first analysed picture shown; a script runs before its own."""
-    page = browser.open("about:blank")
-    page.before(before)
-    page.go(f"{address}&pictures={form}")
-    page.until("document.querySelector('[data-testid=video]')?.dataset.points > 0")
-    return page
-
-
 @pytest.mark.parametrize(
     ("form", "before", "decodes"),
-    [("jpeg", COUNT, False), ("h264", COUNT, True), ("h264", "delete window.VideoDecoder", False)],
+    [
+        ("jpeg", COUNT_DECODED, False),
+        ("h264", COUNT_DECODED, True),
+        ("h264", "delete window.VideoDecoder", False),
+    ],
 )
 def test_bodies_and_depth_are_drawn_on_their_own_frame(
     browser: Browser, form: str, before: str, *, decodes: bool
 ) -> None:
     """By a grey that tells which frame it is, and a body whose place does."""
     with camera_console() as server:
-        page = opened(browser, server.address(), form, before)
-        assert page.run("(window.decoded ?? 0) > 0") is decodes
+        page = opened_camera(browser, server.address(), form, before)
+        assert page.run(DECODES) is decodes
         assert page.run("document.querySelector('[data-testid=video]').dataset.points") == "2"
         require_own_frames(page.run(SHOWN))
         # By keyboard: the button is pressed, and the legend names the range.
@@ -89,7 +77,7 @@ def test_what_is_followed_is_told_apart_on_its_own_frame(
     """By corners around its box and a word; where no box is known, by the word alone."""
     word = "document.querySelector('[data-testid=target]')"
     with camera_console() as server:
-        page = opened(browser, server.address(), "jpeg", "")
+        page = opened_camera(browser, server.address(), "jpeg", "")
         assert page.run(f"{word}.getAttribute('role')") == "status"
         assert page.run(f"{word}.innerText") == ""
         assert not any(max(one) == 255 for one in page.run(CORNERS))

@@ -97,7 +97,7 @@ def test_pictures_come_from_the_tiles_server_too_and_scripts_do_not() -> None:
         address = server.address(viewer=True)
         status, _, scenery = ask(address, "/v1/missions/own/scenery")
         assert status == 200
-        assert scenery["tiles"] == {**tiles, **home, "max_zoom": 19}
+        assert scenery["tiles"] == {**tiles, **home, "max_zoom": 19, "archive": False}
         library = next(one for one in scenery["shapes"] if one["kind"] == "building")
         assert library["outline"][0] == [30.0, 22.0]
         assert ask(address, "/v1/missions/other/scenery")[0] == 404

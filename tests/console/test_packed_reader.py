@@ -10,12 +10,16 @@ import cv2
 import numpy as np
 import pytest
 from av.video.frame import VideoFrame
+from grounds import ground
 
 from aerodaas.analytics.wire_items import unpack
-from aerodaas.console.packed_reader import PackedReader
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.console.packed_reader import PackedReader, ground_of
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.protocol.schemas import PictureForm
-from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.terrain.ground import Ground
+from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.geometry import CameraModel
 from aerodaas.types.status import Message
 from aerodaas.types.target import FollowedTarget, TargetState
 from aerodaas.types.waypoints import NavigationType, VelocityCommand
@@ -143,3 +147,40 @@ def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands
         one.commands[0] for one in commands
     ]
     assert PackedReader(Commands(), "follower", PictureForm.DEPTH).next_packed(0.1) is None
+
+
+PLATEAU = ground(lambda east, _: np.where(east > 10, 5.0, 0.0))
+"""Five metres up, from a cliff east of home on."""
+
+
+@pytest.mark.parametrize(("over", "up"), [(None, 0.0), (PLATEAU, 5.0)])
+def test_a_page_is_told_where_what_was_found_stands(over: Ground | None, up: float) -> None:
+    """On the terrain where there is one; programs get what they need to know it themselves."""
+    pose = Odometry(np.array([30.0, 0.0, 25.0]), np.zeros(3), 0.0)
+    camera = CameraModel.from_fov(64, 48, 1.0, pitch=np.pi / 2)
+    seen = Frame(Header(1, 0, SOURCE), np.zeros((48, 64, 3), np.uint8), camera, pose)
+    boxes = ((30.0, 10.0, 34.0, 24.0), (30.0, 20.0, 34.0, 48.0))
+    found = Detections.of(seen, [Detection(box, "person", 0.9) for box in boxes])
+    for form in (PictureForm.JPEG, PictureForm.H264):
+        one = PackedReader(Stream(found), SOURCE, form, over).next_packed(0.1)
+        assert one is not None
+        place, cut = one[0]["places"]
+        assert place[:3] == pytest.approx([30.0, 0.0, up], abs=0.01)
+        assert cut is None
+        assert len(unpack(one[0]["item"])) == 2
+    ((message, _),) = packed(PictureForm.WHOLE, found)
+    assert "places" not in message
+    assert unpack(message["item"]).camera == camera
+    assert packed(PictureForm.DEPTH, found) == []
+
+
+def test_ground_that_is_not_known_at_home_is_the_plane() -> None:
+    """As without a terrain: the flight's own refusal says why."""
+    robots = [{"id": "drone"}]
+    assert ground_of(EnvironmentConfig.model_validate({"robots": robots})) is None
+    content = {
+        "robots": robots,
+        "home": {"latitude": 47.1, "longitude": 8.1},
+        "terrain": {"files": ["nowhere.hgt"], "clearance": 1},
+    }
+    assert ground_of(EnvironmentConfig.model_validate(content)) is None

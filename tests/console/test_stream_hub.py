@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import queue
 from collections.abc import Awaitable, Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from aerodaas.analytics.wire_items import pack
+from aerodaas.console import packed_reader
 from aerodaas.console.hub import StreamHub, Watcher
+from aerodaas.console.packed_reader import PackedReader
 from aerodaas.protocol.schemas import PictureForm
+from aerodaas.recording.h264 import H264Encoder
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.status import Message
 
 GROUP = 30
 """Pictures from one key frame to the next."""
+COUNT = 12
 
 
 class Camera:
@@ -45,9 +55,9 @@ async def _numbers(watcher: Watcher, last: int) -> list[int]:
     """The pictures that come, up to this one."""
     found: list[int] = []
     while not found or found[-1] != last:
-        packed = await asyncio.wait_for(watcher.next(), 20)
-        assert packed is not None
-        found.append(packed[0]["n"])
+        item = await asyncio.wait_for(watcher.next(), 20)
+        assert item is not None
+        found.append(json.loads(item.text)["n"])
     return found
 
 
@@ -127,3 +137,49 @@ def test_a_beginning_that_is_too_long_is_not_kept() -> None:
         assert await _numbers(second, 10**4 * GROUP) == [10**4 * GROUP]
 
     _run(check)
+
+
+@pytest.mark.parametrize("form", [PictureForm.H264, PictureForm.JPEG])
+def test_each_frame_is_encoded_and_written_once_for_all(
+    monkeypatch: pytest.MonkeyPatch, form: PictureForm
+) -> None:
+    """Five watch a camera; what they are sent is one and the same."""
+    encoded: list[int] = []
+
+    class Counting(H264Encoder):
+        def encode(self, image: NDArray[np.uint8], stamp: int) -> bytes:
+            encoded.append(stamp)
+            return super().encode(image, stamp)
+
+    def counting(item: object, **words: bool) -> tuple[Any, bytes]:
+        if isinstance(item, Frame):
+            encoded.append(item.header.stamp)
+        return pack(item, **words)
+
+    monkeypatch.setattr(packed_reader, "H264Encoder", Counting)
+    monkeypatch.setattr(packed_reader, "pack", counting)
+    frames: queue.Queue[Frame] = queue.Queue()
+
+    class Stream:
+        def next_message(self, timeout: float) -> Message[Any]:
+            """The next frame."""
+            item = frames.get(timeout=20 * timeout)
+            return Message("cam", item.header.id, 0, item.header, 0, (), item)
+
+    def items(*_: object) -> Iterator[tuple[dict[str, Any], bytes]]:
+        reader = PackedReader(Stream(), "cam", form)
+        for _number in range(COUNT):
+            yield reader.next_packed(1.0) or ({}, b"")
+
+    async def check() -> None:
+        hub = StreamHub(items)
+        watchers = [hub.watch("m", "cam", form) for _ in range(5)]
+        for number in range(COUNT):
+            frames.put(Frame(Header(number, number, "cam"), np.zeros((48, 64, 3), np.uint8)))
+            first, *others = [await asyncio.wait_for(one.next(), 20) for one in watchers]
+            assert first is not None
+            assert first.blob
+            assert all(one is first for one in others)
+
+    asyncio.run(check())
+    assert encoded == list(range(COUNT))

@@ -183,7 +183,7 @@ def _camera(
         parent_frame_id=body_frame(source),
         child_frame_id=source,
         translation=vector(camera.mount),
-        rotation=quaternion(compose(from_rpy(0.0, camera.pitch, camera.yaw), OPTICAL)),
+        rotation=quaternion(compose(from_rpy(camera.roll, camera.pitch, camera.yaw), OPTICAL)),
     )
     yield Entry(topic(stream, "mount"), TRANSFORM, mount.encode(), stamp)
 

@@ -5,18 +5,25 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.cameras.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.pictures import Shot, detections, shots
-from aerodaas.recording.playback.page_items import packed_depth, packed_picture, packed_target
+from aerodaas.recording.playback.page_items import (
+    packed_depth,
+    packed_picture,
+    packed_places,
+    packed_target,
+)
 from aerodaas.recording.playback.target import target_of
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import SourceError
+from aerodaas.types.geometry import CameraModel
 from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 
 __all__ = ["Captures", "Film", "Packed"]
@@ -78,6 +85,7 @@ class Film:
         pictures: Mapping[str, tuple[str, Captures]],
         found: Mapping[str, tuple[str, Captures]],
         navigation: Mapping[str, tuple[str, Captures]],
+        mounts: Mapping[str, tuple[str, str, Captures]],
     ) -> None:
         """Show an open recording.
 
@@ -86,11 +94,14 @@ class Film:
             pictures: Topic and captures of each stream of pictures.
             found: The same of detections.
             navigation: The same of navigation.
+            mounts: Of a stream of pictures, the topic of its camera's calibration, and topic and
+                captures of the mount; each is recorded anew, with the other one, when it changes.
         """
         self._recording = recording
         self._pictures = pictures
         self._found = found
         self._navigation = navigation
+        self._mounts = mounts
         self._schemas = {name: one.schema for name, one in recording.topics.items()}
         self._reels: dict[str, _Reel] = {}
 
@@ -114,7 +125,7 @@ class Film:
             packed = None if shot is None else _packed(stream, shot)
             if shot is not None and packed is not None:
                 measured = list(_measured(stream, shot)) if depth else []
-                known = [*self._detections(shot.header), *self._targets(shot.header)]
+                known = [*self._detections(stream, shot), *self._targets(shot.header)]
                 return [*known, *measured, packed]
         return []
 
@@ -163,14 +174,30 @@ class Film:
                 return first if key is None else key
             look *= 4
 
-    def _detections(self, header: Header) -> Iterator[Packed]:
+    def _detections(self, camera: str, shot: Shot) -> Iterator[Packed]:
+        header = shot.header
         for stream, (topic, captures) in self._found.items():
             times = {captures.recorded[place] for place in captures.at(header.stamp)}
             for time in sorted(times):
                 for _, found in detections(self._recording, [topic], time, time):
                     if (found.header.stamp, found.header.source) == (header.stamp, header.source):
                         message = _message(stream, header.stamp, header.stamp)
-                        yield {**message, "item": pack(found)[0], "blob": False}, b""
+                        model = self._camera(camera, header.stamp)
+                        posed = replace(found, camera=model, odometry=shot.odometry)
+                        item = {"item": pack(found)[0], "blob": False, **packed_places(posed)}
+                        yield {**message, **item}, b""
+
+    def _camera(self, stream: str, stamp: int) -> CameraModel | None:
+        """The camera as it was when a picture was captured; None where that was not recorded."""
+        calibration, mount, captures = self._mounts.get(stream, ("", "", Captures()))
+        place = captures.last(stamp)
+        if place < 0:
+            return None
+        time, found = captures.recorded[place], {}
+        for record in self._recording.records(topics=[calibration, mount], since=time, until=time):
+            if record.captured == captures.captured[place]:
+                found[record.topic] = record.value
+        return camera_of(found[calibration], found[mount]) if len(found) > 1 else None
 
     def _targets(self, header: Header) -> Iterator[Packed]:
         for stream, (topic, captures) in self._navigation.items():

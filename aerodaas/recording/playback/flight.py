@@ -17,6 +17,7 @@ from aerodaas.recording.playback.film import Captures, Film
 from aerodaas.recording.playback.target import NAVIGATION_SCHEMA
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.recorded_camera import CALIBRATION_SCHEMA, MOUNT_SCHEMA
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
 from aerodaas.simulation.scenario import scenario_names
 from aerodaas.types.clock import NANOSECONDS, seconds
@@ -54,8 +55,10 @@ class _Reading:
         pictures = picture_topics(recording)[:MAX_KEYS]
         found = sorted(n for n, one in known.items() if one.schema == DETECTIONS_SCHEMA)[:MAX_KEYS]
         flown = sorted(n for n, one in known.items() if one.schema == NAVIGATION_SCHEMA)[:MAX_KEYS]
-        self._captures = {name: Captures() for name in (*pictures, *found, *flown)}
         self._pictures = _streams(pictures, "/image")
+        self._mounts = _mounts(recording, self._pictures)
+        mounts = [mount for _, mount in self._mounts.values()]
+        self._captures = {name: Captures() for name in (*pictures, *found, *flown, *mounts)}
         self._found = _streams(found, "/detections")
         self._flown = _streams(flown, "/navigation")
         self._told = [name for name, one in known.items() if one.schema in _SCHEMAS]
@@ -80,7 +83,12 @@ class _Reading:
                 self._take(record)
         for captures in self._captures.values():
             captures.sort()
-        film = Film(recording, *map(self._named, (self._pictures, self._found, self._flown)))
+        mounts = {
+            name: (calibration, mount, self._captures[mount])
+            for name, (calibration, mount) in self._mounts.items()
+        }
+        pictures, found, flown = map(self._named, (self._pictures, self._found, self._flown))
+        film = Film(recording, pictures, found, flown, mounts)
         return self._told_of(first or 0, last), film
 
     def _named(self, streams: dict[str, str]) -> dict[str, tuple[str, Captures]]:
@@ -137,6 +145,19 @@ def _streams(topics: list[str], kind: str) -> dict[str, str]:
     for topic in topics:
         name = topic.strip("/").removesuffix(kind)
         found[topic if name in found or not name else name] = topic
+    return found
+
+
+def _mounts(recording: Recording, pictures: dict[str, str]) -> dict[str, tuple[str, str]]:
+    """Topics of calibration and mount of each stream of pictures that has both."""
+    known = recording.topics
+    found = {}
+    for name, topic in pictures.items():
+        stream = topic.removesuffix("/image")
+        wanted = {f"{stream}/calibration": CALIBRATION_SCHEMA, f"{stream}/mount": MOUNT_SCHEMA}
+        if all(one in known and known[one].schema == schema for one, schema in wanted.items()):
+            calibration, mount = wanted
+            found[name] = calibration, mount
     return found
 
 

@@ -1,4 +1,4 @@
-"""A picture, its depth and its target as a page takes them, live as recorded."""
+"""What a page takes of a picture, live as recorded: itself, its depth, finds and target."""
 
 from __future__ import annotations
 
@@ -8,11 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.wire_items import pack
+from aerodaas.following.ground_point import ground_point
 from aerodaas.recording.playback.depth_picture import depth_picture
-from aerodaas.types.data import Header
+from aerodaas.terrain.ground import Ground
+from aerodaas.types.data import Detection, Detections, Header
 from aerodaas.types.target import FollowedTarget
 
-__all__ = ["packed_depth", "packed_picture", "packed_target"]
+__all__ = ["packed_depth", "packed_picture", "packed_places", "packed_target"]
+
+_MOST_PLACES = 64
+"""Most places of one frame's detections, the surest first: a map has no room for more."""
 
 
 def packed_picture(header: Header, size: int, form: str, *, measured: bool) -> dict[str, Any]:
@@ -48,3 +53,25 @@ def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
         "state": target.state.value,
         "box": None if target.box is None else list(target.box),
     }
+
+
+def packed_places(found: Detections, ground: Ground | None = None) -> dict[str, Any]:
+    """What a page is told of where on the ground each detection stands, beside the detections.
+
+    Args:
+        found: The detections, best first, with the camera and the odometry of their frame.
+        ground: The terrain; None for the plane of the local frame's zero.
+
+    Returns:
+        `places`: for each detection metres east, north and up, and its ellipse's standard
+        deviations in metres and direction in radians; null where that is not known.
+    """
+    return {"places": [_place(one, found, ground) for one in found[:_MOST_PLACES]]}
+
+
+def _place(one: Detection, found: Detections, ground: Ground | None) -> list[float] | None:
+    place = ground_point(one, found, ground)
+    if place is None:
+        return None
+    numbers = (place.east, place.north, place.up, place.major, place.minor, place.angle)
+    return [round(number, 3) for number in numbers]

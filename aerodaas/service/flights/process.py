@@ -12,6 +12,7 @@ import secrets
 import socket
 import threading
 import time
+from functools import cached_property
 from pathlib import Path
 
 from pydantic import SecretStr
@@ -22,7 +23,7 @@ from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.console.meter import FlightMeter
-from aerodaas.console.packed_reader import PackedReader, drawn_streams
+from aerodaas.console.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
@@ -36,6 +37,7 @@ from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.terrain.ground import Ground
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 
 __all__ = ["Flying", "fly"]
@@ -226,7 +228,12 @@ class Flying:
         graph = self._environment.graph if self._environment is not None else None
         if graph is None or stream not in graph.nodes or graph.reader is None:
             raise ConfigError(f"no stream of this mission is called {stream!r}")
-        return PackedReader(graph.reader(stream), stream, form)
+        return PackedReader(graph.reader(stream), stream, form, self._ground)
+
+    @cached_property
+    def _ground(self) -> Ground | None:
+        """What is flown over; it is read when something is watched."""
+        return None if self.config is None else ground_of(self.config)
 
     @property
     def over(self) -> bool:

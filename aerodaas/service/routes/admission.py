@@ -41,6 +41,17 @@ class Admission:
             raise
         connection.scope[_SENDER] = principal
 
+    def renew(
+        self, connection: HTTPConnection, role: Role, scope: Scope | None = None
+    ) -> Principal:
+        """Look anew at the sender of a request that lasts; raises RefusedError as `require`.
+
+        It counts as no further request.
+        """
+        token, address = bearer(connection.headers), _address(connection)
+        connection.scope[_SENDER] = self._access.of(token, address)
+        return self.require(connection, role, scope)
+
     def require(
         self, connection: HTTPConnection, role: Role, scope: Scope | None = None
     ) -> Principal:

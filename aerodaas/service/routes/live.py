@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from http import HTTPStatus
 
 from fastapi import APIRouter, WebSocket
 
@@ -10,11 +11,15 @@ from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.protocol.schemas import PictureForm, Role, Scope
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.errors import RefusedError
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LiveRoutes"]
+
+_GONE = frozenset({HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN, HTTPStatus.NOT_FOUND})
+"""Refusals of who may not watch; any other one is the service's own trouble."""
 
 
 class LiveRoutes:
@@ -46,12 +51,25 @@ class LiveRoutes:
         Pictures come in a form, with the depth of those that `depth` names beside them.
         """
         wanted = wanted_streams(streams, pictures, depth)
+        scope = Scope.SENSE if wanted else None
         try:
-            scope = Scope.SENSE if wanted else None
             principal = self._admission.require(socket, Role.VIEWER, scope)
             await asyncio.to_thread(self._desk.mission, principal, mission)
             own = await asyncio.to_thread(self._desk.flies, principal, mission)
         except AeroDaaSError as error:
             await refuse(socket.scope, socket.send, error)
             return
-        await LiveSession(socket, self._desk, self._hub, mission).run(rate, wanted, own=own)
+
+        def allowed() -> bool:
+            try:
+                principal = self._admission.renew(socket, Role.VIEWER, scope)
+                self._desk.mission(principal, mission)
+            except RefusedError as error:
+                return error.status not in _GONE
+            except AeroDaaSError:
+                # The database may not answer for a while.
+                return True
+            return True
+
+        session = LiveSession(socket, self._desk, self._hub, mission)
+        await session.run(rate, wanted, own=own, allowed=allowed)
