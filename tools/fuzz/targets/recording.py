@@ -42,11 +42,12 @@ from aerodaas.recording.report.comparison import comparison_page
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import key_moments, picture_moments
-from aerodaas.recording.report.page.figures import plots_of
+from aerodaas.recording.report.page.figures import log_plots, plots_of
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.recording.vehicle_log.attachment import attached_logs
 from aerodaas.types.data import (
     Alert,
     Battery,
@@ -149,11 +150,12 @@ def _report(path: Path, _folder: Path, plotted: bool) -> None:  # noqa: FBT001
         flight = RecordedFlight.read(recording)
         moments = picture_moments(recording, key_moments(flight))
         summary = FlightSummary.of(recording, flight)
-    plots = plots_of(flight) if plotted else []
-    report = Report(summary, plots, moments)
+        logs = attached_logs(recording)
+    plots = [*plots_of(flight), *log_plots(logs)] if plotted else []
+    report = Report(summary, plots, moments, logs)
     if moments:
         contact_sheet(moments)
-    flight_page(summary, plots, moments).encode()
+    flight_page(summary, plots, moments, logs).encode()
     json.dumps(summary.as_dict()).encode()
     f"{summary}".encode()
     comparison_page("A", report, "B", report).encode()
