@@ -187,6 +187,37 @@ def test_an_order_that_another_one_overtakes_is_told() -> None:
     assert camera.filmed == [True, False]
 
 
+def test_what_may_have_begun_is_ended_though_it_is_refused_later() -> None:
+    """The camera was silent at first, and then refuses to begin again."""
+    vehicle = Surveyor()
+    camera = camera_of(vehicle)
+    camera.films = False
+    made = begun(vehicle, BEGIN, Waypoint("east", 5, 5, 2, video=True))
+    made.run(until=lambda: bool(told(made)))
+    camera.film_refuses = "denied"
+    made.run()
+    made.expect(MissionState.LANDED)
+    assert camera.filmed == [True, True, False]
+
+
+class Broken(Camera):
+    """Raises where it should tell of a fault, once it has been told something."""
+
+    def __getattribute__(self, name: str) -> object:
+        if name == "film_fault" and super().__getattribute__("filmed"):
+            raise ValueError("nonsense")
+        return super().__getattribute__(name)
+
+
+def test_a_driver_that_raises_ends_no_flight() -> None:
+    """It is told."""
+    vehicle = Surveyor()
+    vehicle.photo_camera = Broken(vehicle.clock, None)
+    made = flown(vehicle, BEGIN, PLAIN)
+    assert list(made.status.visited) == ["north", "east"]
+    assert told(made)[0].startswith("video not begun at north: ValueError: nonsense")
+
+
 @dataclass
 class PhotoOnly:
     """Takes pictures."""

@@ -236,6 +236,8 @@ def test_a_video_begins_and_ends_at_the_waypoint_before(tmp_path: Path) -> None:
     assert [one.photo for one in waypoints] == [True, False, False]
     assert [one.gimbal is not None for one in waypoints] == [True, False, True]
     assert [one.zoom for one in waypoints] == [30.0, None, None]
+    both = read(tmp_path, waypoint(0.001), do(2500), do(2501))[0]
+    assert [one.video for one in both] == [True, False]
     begun = read(tmp_path, waypoint(0.001), do(1000, -45, 30, None, None, x=12), do(2500))[0]
     assert begun[0].gimbal_pitch == pytest.approx(math.radians(-45))
 

@@ -302,7 +302,7 @@ def test_a_camera_that_was_off_in_between_is_told(ends: Stepped) -> None:
         ends.watch(4.0)
         ends.autopilot.components[CAMERA].vanished = True
         ends.watch(7.0)
-        assert camera.filming is None
+        assert (camera.filming, camera.film_fault) == (None, "")
         payload(ends).recording = None
         ends.autopilot.components[CAMERA].vanished = False
         ends.watch(14.0)
@@ -312,3 +312,81 @@ def test_a_camera_that_was_off_in_between_is_told(ends: Stepped) -> None:
         camera.film(on=True)
         wait(ends, lambda: camera.filming)
         assert payload(ends, OTHER).recording is not None
+
+
+def test_an_order_ends_the_one_before(ends: Stepped) -> None:
+    """A beginning that were repeated after the end would record on."""
+    with ends:
+        camera = known(ends)
+        ends.autopilot.components[CAMERA].stalls = True
+        camera.film(on=True)
+        camera.film(on=True)
+        ends.turn()
+        assert (camera.filming, camera.film_fault) == (None, "")
+        camera.film(on=False)
+        ends.watch(3.0)
+        orders = [one[0] for one in heard(ends)]
+        assert orders[:3] == [START, START, STOP]
+        assert set(orders[2:]) == {STOP}
+
+
+def test_a_refusal_changes_nothing(ends: Stepped) -> None:
+    """What was known before is known after it."""
+    with ends:
+        camera = known(ends)
+        payload(ends).video_refuses = True
+        camera.film(on=True)
+        wait(ends, lambda: camera.film_fault)
+        assert camera.filming is False
+
+
+def test_an_end_whose_acknowledgement_is_lost_is_no_fault(ends: Stepped) -> None:
+    """The status that tells of it is not compared with the beginning."""
+    with ends:
+        camera = known(ends)
+        camera.film(on=True)
+        ends.watch(4.0)
+        ends.autopilot.components[CAMERA].stalls = True
+        camera.film(on=False)
+        ends.watch(8.0)
+        payload(ends).recording = None
+        ends.autopilot.components[CAMERA].stalls = False
+        late = payload(ends).message(mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
+        ends.autopilot.components[CAMERA].say(late)
+        ends.turn()
+        assert (camera.filming, camera.film_fault) == (False, "")
+
+
+@pytest.mark.parametrize("sticks", [False, True])
+def test_its_status_is_asked_for_often_until_it_is_clear(ends: Stepped, *, sticks: bool) -> None:
+    """It agrees, or does not: then every ten seconds again."""
+
+    def asked() -> int:
+        return sum(
+            one.get_type() == "COMMAND_LONG"
+            and one.param1 == mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS
+            for one in ends.autopilot.components[CAMERA].heard
+        )
+
+    with ends:
+        camera = known(ends)
+        payload(ends).video_sticks = sticks
+        camera.film(on=True)
+        ends.watch(6.0)
+        before = asked()
+        ends.watch(18.0)
+        assert asked() - before <= 2
+
+
+def test_of_a_camera_that_is_back_nothing_is_known_at_first(ends: Stepped) -> None:
+    """Its word from before it went is old."""
+    with ends:
+        camera = known(ends)
+        camera.film(on=True)
+        ends.watch(4.0)
+        ends.autopilot.components[CAMERA].vanished = True
+        ends.watch(7.0)
+        payload(ends).counts = False
+        ends.autopilot.components[CAMERA].vanished = False
+        ends.watch(3.0)
+        assert camera.filming is None

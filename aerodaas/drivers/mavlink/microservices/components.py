@@ -130,7 +130,6 @@ class PayloadComponent:
         self._own = own
         self._heard_at: float | None = None
         self._asked_at = -math.inf
-        self._informed = False
         self._begin()
 
     def _begin(self) -> None:
