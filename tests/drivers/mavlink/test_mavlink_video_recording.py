@@ -57,6 +57,21 @@ def known(ends: Stepped) -> VideoCamera:
     return camera_of(ends)
 
 
+def recording(ends: Stepped) -> VideoCamera:
+    """The camera, which records and has said so."""
+    camera = known(ends)
+    camera.film(on=True)
+    ends.watch(4.0)
+    assert camera.filming is not None
+    return camera
+
+
+def vanish(ends: Stepped) -> None:
+    """Let the camera be gone."""
+    ends.autopilot.components[CAMERA].vanished = True
+    ends.watch(7.0)
+
+
 def heard(ends: Stepped, number: int = CAMERA) -> list[tuple[float, ...]]:
     """Orders of video that it has heard: the command and its parameters."""
     return [
@@ -279,8 +294,7 @@ def test_a_camera_that_is_gone_begins_nothing_when_it_is_back(ends: Stepped) -> 
         ends.autopilot.components[CAMERA].stalls = True
         camera.film(on=True)
         ends.turn()
-        ends.autopilot.components[CAMERA].vanished = True
-        ends.watch(7.0)
+        vanish(ends)
         assert (camera.filming, camera.film_fault) == (None, "")
         with pytest.raises(VehicleError, match="no camera answers"):
             camera.film(on=False)
@@ -297,18 +311,14 @@ def test_a_camera_that_is_gone_begins_nothing_when_it_is_back(ends: Stepped) -> 
 def test_a_camera_that_was_off_in_between_is_told(ends: Stepped) -> None:
     """It has acknowledged, and records no more; the other one takes over by a new order."""
     with ends:
-        camera = known(ends)
-        camera.film(on=True)
-        ends.watch(4.0)
-        ends.autopilot.components[CAMERA].vanished = True
-        ends.watch(7.0)
+        camera = recording(ends)
+        vanish(ends)
         assert (camera.filming, camera.film_fault) == (None, "")
         payload(ends).recording = None
         ends.autopilot.components[CAMERA].vanished = False
         ends.watch(14.0)
         assert (camera.filming, camera.film_fault) == (False, NOT)
-        ends.autopilot.components[CAMERA].vanished = True
-        ends.watch(7.0)
+        vanish(ends)
         camera.film(on=True)
         wait(ends, lambda: camera.filming)
         assert payload(ends, OTHER).recording is not None
@@ -343,9 +353,7 @@ def test_a_refusal_changes_nothing(ends: Stepped) -> None:
 def test_an_end_whose_acknowledgement_is_lost_is_no_fault(ends: Stepped) -> None:
     """The status that tells of it is not compared with the beginning."""
     with ends:
-        camera = known(ends)
-        camera.film(on=True)
-        ends.watch(4.0)
+        camera = recording(ends)
         ends.autopilot.components[CAMERA].stalls = True
         camera.film(on=False)
         ends.watch(8.0)
@@ -381,11 +389,8 @@ def test_its_status_is_asked_for_often_until_it_is_clear(ends: Stepped, *, stick
 def test_of_a_camera_that_is_back_nothing_is_known_at_first(ends: Stepped) -> None:
     """Its word from before it went is old."""
     with ends:
-        camera = known(ends)
-        camera.film(on=True)
-        ends.watch(4.0)
-        ends.autopilot.components[CAMERA].vanished = True
-        ends.watch(7.0)
+        camera = recording(ends)
+        vanish(ends)
         payload(ends).counts = False
         ends.autopilot.components[CAMERA].vanished = False
         ends.watch(3.0)
