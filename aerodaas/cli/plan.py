@@ -76,7 +76,11 @@ def _pictures(waypoint: Waypoint) -> str:
     for name, percent in (("zoom", waypoint.zoom), ("focus", waypoint.focus)):
         if percent is not None:
             said.append(f", {name} at {percent:g} %")
-    return "".join([*said, ", a picture" if waypoint.photo else ""])
+    if waypoint.photo:
+        said.append(", a picture")
+    if waypoint.video is not None:
+        said.append(f", video {'begins' if waypoint.video else 'ends'}")
+    return "".join(said)
 
 
 @app.command()

@@ -117,6 +117,8 @@ class WaypointEntry(BaseModel):
     zoom: _Percent | None = None
     """Of the camera's zoom, set on the way there; 0 sees most."""
     focus: _Percent | None = None
+    video: bool | None = None
+    """Whether the camera's recording is begun or ended there; None leaves it as it is."""
 
     @classmethod
     def of(cls, waypoint: Waypoint) -> WaypointEntry:

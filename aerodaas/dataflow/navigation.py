@@ -104,7 +104,7 @@ class AeroNavigation(AeroListData[NavigationItem]):
         """Write the waypoints as a new `.plan` or `.waypoints` file, for a ground station.
 
         It begins with a take-off and ends with a return. What the file cannot hold (a priority, a
-        deadline, zoom and focus; in `.waypoints` a yaw) is told by one warning.
+        deadline; in `.waypoints` a yaw) is told by one warning.
 
         Args:
             path: The file, with the format as its suffix.

@@ -118,4 +118,5 @@ def _stays(waypoint: Waypoint) -> bool:
         or waypoint.actuate
         or waypoint.gimbal is not None
         or waypoint.lens is not None
+        or waypoint.video is not None
     )

@@ -574,10 +574,8 @@ class Mission:
         drift = math.hypot(*state.odometry.velocity[:2])
         arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
         if late or (arrived and drift <= _DRIFT):
-            reason = self._machine.reason
-            self._to(
-                MissionState.LANDING, f"the return took too long; {reason}" if late else reason
-            )
+            why = "the return took too long; " if late else ""
+            self._to(MissionState.LANDING, f"{why}{self._machine.reason}")
             return Land()
         place = self._route.towards(above, position)
         if place is None:
@@ -598,3 +596,5 @@ class Mission:
             self.take_back(reason or state.value)
         self._machine.to(state, self._now, reason)
         self.actuation.turn(self._now, home=self.finished or state in _LEAVING)
+        if self.finished:
+            self.photographer.end(self._now)

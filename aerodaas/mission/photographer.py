@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.mission.filming import Filming
 from aerodaas.mission.gaze import Gaze, fresh, near
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
@@ -59,6 +60,7 @@ class Photographer:
         self._log = log
         self._timeout = timeout
         self._shutter = Shutter(self._vehicle, log, timeout)
+        self._filming = Filming(self._vehicle, log, timeout)
         self._gaze = Gaze()
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
@@ -112,14 +114,24 @@ class Photographer:
         return task.trigger if task is not None and task.stop is stop else None
 
     def look(self, now: int) -> None:
-        """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
+        """Take note of pictures and video that were taken, and of what failed, at `now` (ns)."""
         self._shutter.look(now)
+        self._filming.look(now)
+
+    def end(self, now: int) -> None:
+        """End what goes on after the mission, at `now` (ns)."""
+        self._filming.end(now)
 
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, to which the drone flies or at which it is.
 
-        Returns whether the drone has to stay there for it; never for longer than the time-out.
+        Returns whether the drone has to stay there for it; never for longer than the time-out, and
+        then as long again for a video.
         """
+        return self._photograph(stop, odometry, now) or self._filming.attend(stop, now)
+
+    def _photograph(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
+        """Do what is due for pictures; returns whether the drone has to stay for it."""
         task = self._task(stop, odometry, now)
         if not stop.arrived:
             task.began = None

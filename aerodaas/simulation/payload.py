@@ -61,7 +61,7 @@ class SimulatedGimbal:
 
 
 class SimulatedPhotoCamera:
-    """A camera on board; implements `aerodaas.types.payload.PhotoCamera`."""
+    """A camera on board; implements `LensCamera` and `VideoCamera`."""
 
     def __init__(self, settings: CameraConfig) -> None:
         """Have taken nothing yet."""
@@ -73,7 +73,9 @@ class SimulatedPhotoCamera:
         self.zoom: float | None = 0.0 if settings.zoom > 1.0 else None
         """Percent; None for a lens without."""
         self.adjusted = True
-        self.lens_fault = ""
+        self.lens_fault = self.film_fault = ""
+        self.filming = False
+        """Whether it records. Its frames are the video stream's; no other file is written."""
         self._taken = 0
         self._asked: list[tuple[int, str]] = []
         self._storing: list[Photo] = []
@@ -92,6 +94,10 @@ class SimulatedPhotoCamera:
         if self.zoom is None:
             raise VehicleError("the camera has no zoom")
         self.zoom = target.zoom
+
+    def film(self, on: bool) -> None:  # noqa: FBT001 - it is all that is said
+        """Record from now on, or no more."""
+        self.filming = on
 
     def outcomes(self) -> list[PhotoOutcome]:
         """Pictures that are stored by now."""

@@ -28,6 +28,7 @@ __all__ = [
     "PhotoFailure",
     "PhotoOutcome",
     "PhotoPlace",
+    "VideoCamera",
     "levelled",
     "zoomed",
 ]
@@ -219,6 +220,34 @@ class LensCamera(PhotoCamera, Protocol):
     @property
     def lens_fault(self) -> str:
         """Why the last target was not taken, in a few words; empty if nothing is known."""
+        ...
+
+
+@runtime_checkable
+class VideoCamera(PhotoCamera, Protocol):
+    """A camera that records video on its own card; every method returns at once."""
+
+    def film(self, on: bool) -> None:  # noqa: FBT001 - it is all that is said
+        """Have a recording begun, or ended; nothing changes where it is so already.
+
+        The driver repeats what is not acknowledged. Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    @property
+    def filming(self) -> bool | None:
+        """Whether it records, by its newest word; None while that is not known.
+
+        It is not known from an order until the camera has acknowledged it.
+        """
+        ...
+
+    @property
+    def film_fault(self) -> str:
+        """Why the camera refused the last order, or how it belies its acknowledgement.
+
+        In a few words; empty if nothing is known.
+        """
         ...
 
 

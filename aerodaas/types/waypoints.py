@@ -187,6 +187,10 @@ class Waypoint:
     it as it is."""
     focus: float | None = None
     """The same for the focus, 0 (near) to 100 (far)."""
+    video: bool | None = None
+    """Whether the camera's recording on its own card is begun there (True) or ended (False), after
+    the picture and before actuators move; None leaves it as it is. One that the mission has begun
+    ends with it."""
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -216,6 +220,10 @@ class Waypoint:
         photo: object = self.photo
         if not isinstance(photo, bool):
             message = f"{owner}: photo must be True or False, not {photo!r}"
+            raise InvalidWaypointError(message)
+        video: object = self.video
+        if not isinstance(video, bool | None):
+            message = f"{owner}: video must be True, False or None, not {video!r}"
             raise InvalidWaypointError(message)
         for name in ("trigger_distance", "trigger_interval"):
             value = getattr(self, name)

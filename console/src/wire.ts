@@ -272,6 +272,7 @@ export interface WaypointEntry {
   speed?: number | null;
   trigger_distance?: number | null;
   trigger_interval?: number | null;
+  video?: boolean | null;
   waypoint_type?: "relative" | "local" | "global" | "global_relative";
   x: number;
   y: number;

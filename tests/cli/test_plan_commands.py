@@ -49,17 +49,20 @@ def test_a_plan_is_shown(plan: Callable[..., Result]) -> None:
 
 
 def test_what_is_photographed_is_shown(plan: Callable[..., Result], tmp_path: Path) -> None:
-    """Triggers, single pictures, the gimbal, and what is looked at."""
+    """Triggers, single pictures, the gimbal, what is looked at, and video."""
     rows = [
         *("2 205 -90 0 0 0 0 0 2", "3 16 0 0 0 0 47.001 8 20", "2 2000 0 0 1 0 0 0 0"),
+        "2 2500 0 0 0 0 0 0 0",
         *("2 206 5 0 1 0 0 0 0", "3 195 0 0 0 0 47.1 8.1 3", "3 16 0 0 0 0 47.002 8 20"),
+        "2 2501 0 0 0 0 0 0 0",
     ]
     fields = [f"{n} 0 {row} 1".replace(" ", "\t") for n, row in enumerate(rows, start=1)]
     path = tmp_path / "b.waypoints"
     path.write_text("\n".join([*LINES.splitlines()[:2], *fields]))
     first, second, *_ = plan("show", "b.waypoints").output.splitlines()
-    assert first.endswith("gimbal at pitch -90, yaw 0 degrees, a picture")
-    assert second.endswith("a picture every 5 m on the way, looks at 47.1000000, 8.1000000, 3 m")
+    assert first.endswith("gimbal at pitch -90, yaw 0 degrees, a picture, video begins")
+    looks = "a picture every 5 m on the way, looks at 47.1000000, 8.1000000, 3 m"
+    assert second.endswith(f"{looks}, video ends")
 
 
 def test_a_plan_is_converted(plan: Callable[..., Result], tmp_path: Path) -> None:

@@ -80,6 +80,13 @@ class Camera:
     lens_refuses: str = ""
     lens_hangs: bool = False
     lens: list[LensTarget] = field(default_factory=list)
+    films: bool = True
+    """Acknowledges orders of video."""
+    filming: bool | None = None
+    film_fault: str = ""
+    film_refuses: str = ""
+    filmed: list[bool] = field(default_factory=list)
+    """Orders of video."""
     lies: bool = False
     """Answers with other numbers."""
     asked: list[str] = field(default_factory=list)
@@ -110,6 +117,13 @@ class Camera:
     def lens_fault(self) -> str:
         """Why it is not."""
         return self.lens_refuses
+
+    def film(self, on: bool) -> None:  # noqa: FBT001 - it is all that is said
+        """Begin or end a video."""
+        self.filmed.append(on)
+        self.film_fault = self.film_refuses
+        if not self.film_refuses:
+            self.filming = on if self.films else None
 
     def outcomes(self) -> list[PhotoOutcome]:
         """What came of it."""

@@ -98,10 +98,11 @@ def test_a_waypoint_on_a_straight_line_is_flown_through_at_full_speed() -> None:
         {"photo": True},
         {"gimbal_pitch": -0.5},
         {"zoom": 50.0},
+        {"video": False},
     ],
 )
 def test_a_drone_stops_where_it_has_something_to_do(change: dict[str, Any]) -> None:
-    """A stay, a picture, the gimbal, the lens."""
+    """A stay, a picture, the gimbal, the lens, a video."""
     one = flight(add(ROW[0], replace(ROW[1], **change), ROW[2]), limits=LIMITS)
     assert passed_at(one, "w1") > 1.5
     assert passed_at(one, "w2") == 0.0

@@ -27,7 +27,7 @@ def survey(env: Environment) -> None:
     """Two pictures, straight down and ahead."""
     drone = env.get_robot_by_id("drone")
     stops = [
-        Waypoint("nadir", 4, 0, 4, gimbal_pitch=DOWN, photo=True),
+        Waypoint("nadir", 4, 0, 4, gimbal_pitch=DOWN, photo=True, video=True),
         Waypoint("aside", 4, 4, 4, gimbal_pitch=-0.5, gimbal_yaw=0.6, zoom=50, photo=True),
     ]
     drone.navigate(AeroNavigation(data=stops))
@@ -53,6 +53,10 @@ def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None
         calibrations = recording.records(schemas=("foxglove.CameraCalibration",))
         lenses = [one.value for one in calibrations]
         states = [one.value for one in recording.records(schemas=("aerodaas.VehicleState",))]
+        plans = [one.value for one in recording.records(schemas=("aerodaas.Plan",))]
+        alerts = [one.value for one in recording.records(schemas=("aerodaas.Alert",))]
+    assert [one["video"] for one in plans[0]["waypoints"]] == [True, None]
+    assert not [one for one in alerts if one["kind"] == "video"]
     assert [photo["label"] for photo in photos] == ["nadir", "aside"]
     assert [photo["zoom"] for photo in photos] == [0.0, 50.0]
     assert [state["zoom"] for state in (states[0], states[-1])] == [0.0, 50.0]

@@ -61,6 +61,7 @@ def test_a_waypoint_says_where_the_gimbal_looks() -> None:
         ({"gimbal_yaw": 45.0}, "radians"),
         ({"gimbal_pitch": math.nan}, "finite"),
         ({"photo": "yes"}, "True or False"),
+        ({"video": 1}, "video must be True, False or None, not 1"),
         ({"zoom": 101}, "zoom is in percent, from 0 to 100"),
         ({"focus": -1}, "focus is in percent"),
         ({"zoom": float("nan")}, "zoom must be a finite number"),
@@ -75,7 +76,7 @@ def test_degrees_and_nonsense_are_refused(fields: dict[str, object], said: str) 
 def test_a_mission_document_holds_it() -> None:
     """The same waypoint comes back, and one without says nothing of it."""
     waypoint = Waypoint(
-        "a", 0, 0, 2, gimbal_pitch=-1.0, gimbal_yaw=0.5, zoom=5, focus=80, photo=True
+        "a", 0, 0, 2, gimbal_pitch=-1.0, gimbal_yaw=0.5, zoom=5, focus=80, photo=True, video=False
     )
     entry = WaypointEntry.of(waypoint)
     assert entry.waypoint() == waypoint

@@ -63,6 +63,10 @@ class EmulatedPayload:
         """Seconds between pictures that it says that it takes by itself."""
         self.recording: float | None = None
         """Seconds for which it says that it has been recording video."""
+        self.video_refuses = False
+        self.video_sticks = False
+        """Video is acknowledged, and what it does stays as it is."""
+        self._filming_since: float | None = None
         self.counts = True
         """It tells how many pictures it has taken."""
         self.blind = False
@@ -96,6 +100,8 @@ class EmulatedPayload:
                 return mavlink.MAV_RESULT_DENIED
             self.lens[_LENS[number]] = values[1]
             return _OK
+        if number in {mavlink.MAV_CMD_VIDEO_START_CAPTURE, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE}:
+            return self._film(on=number == mavlink.MAV_CMD_VIDEO_START_CAPTURE)
         if number == mavlink.MAV_CMD_IMAGE_START_CAPTURE:
             if self.camera_refuses:
                 return mavlink.MAV_RESULT_FAILED
@@ -103,6 +109,14 @@ class EmulatedPayload:
                 self._due.append(self._firmware.now + _SHUTTER)
             return _OK
         return None
+
+    def _film(self, *, on: bool) -> Any:  # noqa: ANN401
+        if self.video_refuses:
+            return mavlink.MAV_RESULT_DENIED
+        if not self.video_sticks:
+            self.recording = 0.0 if on else None
+            self._filming_since = self._firmware.now if on else None
+        return _OK
 
     def track(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """Turn as a GIMBAL_MANAGER_SET_PITCHYAW says, which nothing answers."""
@@ -122,6 +136,8 @@ class EmulatedPayload:
         if not self.stuck:
             self.pitch += min(max(self._wanted[0] - self.pitch, -most), most)
             self.right += min(max(self._wanted[1] - self.right, -most), most)
+        if self._filming_since is not None and self.recording is not None:
+            self.recording = now - self._filming_since
         while self._due and now >= self._due[0]:
             self._due.pop(0)
             self._take()

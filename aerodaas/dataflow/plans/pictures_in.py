@@ -1,8 +1,9 @@
-"""Pictures, gimbal, lens and region of interest of a plan's items, as waypoints have them.
+"""Pictures, video, gimbal, lens and region of interest of a plan's items, as waypoints have them.
 
 A plan says what goes on from an item; a waypoint says what is done on the way to it and there. So
 what begins at an item is given to the waypoints behind it; a single picture is the waypoint's
-before it, and so is a turn of the gimbal, or of the lens, that comes before pictures there.
+before it, and so is a turn of the gimbal, or of the lens, that comes before pictures there, and
+the beginning or end of a video.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ from aerodaas.dataflow.plans.commands import (
     OF_RANGE,
     SET_CAMERA_FOCUS,
     SET_CAMERA_ZOOM,
+    VIDEO_START_CAPTURE,
+    VIDEO_STOP_CAPTURE,
     why_not,
 )
 from aerodaas.dataflow.plans.numbers import LatLon, place
@@ -66,6 +69,7 @@ def same_place(waypoint: Waypoint, item: PlanItem) -> Waypoint:
         photo=False,
         zoom=None,
         focus=None,
+        video=None,
         actuate={},
     )
 
@@ -105,6 +109,7 @@ class PictureItems:
             *(DO_MOUNT_CONTROL, DO_GIMBAL_MANAGER_PITCHYAW),
             *(DO_SET_ROI_LOCATION, DO_SET_ROI_NONE, DO_SET_ROI),
             *(SET_CAMERA_ZOOM, SET_CAMERA_FOCUS),
+            *(VIDEO_START_CAPTURE, VIDEO_STOP_CAPTURE),
         }
     )
     """What `take` knows."""
@@ -136,6 +141,8 @@ class PictureItems:
             DO_SET_ROI_NONE: self._look_away,
             SET_CAMERA_ZOOM: partial(self._set_lens, "zoom"),
             SET_CAMERA_FOCUS: partial(self._set_lens, "focus"),
+            VIDEO_START_CAPTURE: partial(self._film, on=True),
+            VIDEO_STOP_CAPTURE: partial(self._film, on=False),
         }
 
     def take(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
@@ -207,6 +214,9 @@ class PictureItems:
             return why_not(item.command)
         if not waypoints:
             return _NOT_HERE
+        if waypoints[-1].video is not None:
+            # The picture of a waypoint is taken before.
+            waypoints.append(same_place(waypoints[-1], item))
         if waypoints[-1].photo:
             return "one picture is taken at a waypoint"
         self._aim_here(waypoints)
@@ -250,6 +260,21 @@ class PictureItems:
             told = "none" if percent is None else f"{percent:g}"
             return f"a {name} is 0 to 100 % of the range, not {told}"
         self._lens[name] = (item, percent)
+        return ""
+
+    def _film(self, item: PlanItem, waypoints: list[Waypoint], *, on: bool) -> str:
+        """Begin or end a video at the waypoint before."""
+        if stream := item.values[0]:
+            return f"the camera's video is recorded whole, not its stream {stream:g}"
+        if not waypoints:
+            return _NOT_HERE
+        last = waypoints[-1]
+        if last.video is not None or last.hover_duration or last.actuate:
+            # A waypoint has one order for its video, which comes before stay and actuators.
+            waypoints.append(same_place(last, item))
+        if on:
+            self._aim_here(waypoints)
+        waypoints[-1] = replace(waypoints[-1], video=on)
         return ""
 
     def _mount(self, item: PlanItem, _: list[Waypoint]) -> str:

@@ -1,4 +1,4 @@
-"""Pictures, gimbal, lens and places to look at of waypoints, as a plan's items."""
+"""Pictures, video, gimbal, lens and places to look at of waypoints, as a plan's items."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from aerodaas.dataflow.plans.commands import (
     IMAGE_START_CAPTURE,
     IMAGE_STOP_CAPTURE,
     MOUNT_MAVLINK_TARGETING,
+    NAV_DELAY,
     OF_RANGE,
     SET_CAMERA_FOCUS,
     SET_CAMERA_ZOOM,
+    VIDEO_START_CAPTURE,
+    VIDEO_STOP_CAPTURE,
 )
 from aerodaas.dataflow.plans.plan import PlanItem
 from aerodaas.types.waypoints import Waypoint
@@ -57,6 +60,10 @@ class PictureWriter:
         """What is done at `waypoint`."""
         if waypoint.photo:
             yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
+        if waypoint.video is not None:
+            yield _item(VIDEO_START_CAPTURE if waypoint.video else VIDEO_STOP_CAPTURE)
+            if waypoint.hover_duration:
+                yield _item(NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
 
     def end(self) -> Iterator[PlanItem]:
         """What ends with the last waypoint."""

@@ -135,7 +135,9 @@ def _items(
             values = (_GROUND_SPEED, _DEFAULT_SPEED if speed is None else speed, -1.0, 0.0)
             yield PlanItem(0, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
         yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
-        held = (waypoint.hover_duration, 0.0, 0.0, yaw)
+        # An autopilot does what stands behind a waypoint after its stay; a video comes before it.
+        stay = waypoint.hover_duration if waypoint.video is None else 0.0
+        held = (stay, 0.0, 0.0, yaw)
         above = HeightReference(waypoint.above or HeightReference.HOME)
         frame = _FRAMES.get(above, FRAME_RELATIVE)
         yield from pictures.before(waypoint, frame, _spot(waypoint, home))

@@ -56,8 +56,7 @@ __all__ = ["MavlinkVehicle"]
 _log = logging.getLogger(__name__)
 
 _PARTING = 4.0
-"""Seconds that `close` waits for a vehicle in the air to begin its landing, and for starting motors
-to stop."""
+"""Seconds that `close` waits for a landing in the air to begin, and for starting motors to stop."""
 
 
 class MavlinkVehicle:
@@ -224,6 +223,7 @@ class MavlinkVehicle:
             return
         if self._connection is not None:
             self._part(self._connection)
+            self.payload.part(self._name, self._pause)
             if self._settings.fallback == "set" and not self._settings.observe:
                 self._connection.put_back(self._name, stands=self._stands())
         link.close()

@@ -70,6 +70,8 @@ def _asks(waypoint: Waypoint) -> Iterator[str]:
         yield "it turns the gimbal"
     if waypoint.lens is not None:
         yield "it sets the camera's lens"
+    if waypoint.video is not None:
+        yield "it begins or ends a video"
     if waypoint.actuate:
         yield "it moves actuators"
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from plan_files import item, lines, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, Waypoint
+from aerodaas.config.actuators import GripperConfig
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.types.geometry import GeodeticOrigin
 
@@ -181,6 +182,8 @@ def test_mission_planners_lens_is_read(tmp_path: Path) -> None:
         ([do(532, 2, -1), waypoint(0.001)], "a focus is 0 to 100 % of the range, not -1"),
         ([do(532, 2, None), waypoint(0.001)], "a focus is 0 to 100 % of the range, not none"),
         ([waypoint(0.001), do(531, 2, 9)], "no waypoint comes after it"),
+        ([do(2500), waypoint(0.001)], "no waypoint comes before it"),
+        ([waypoint(0.001), do(2501, 2)], "is recorded whole, not its stream 2"),
     ],
 )
 def test_what_still_is_not_done_is_said(tmp_path: Path, items: list[Any], why: str) -> None:
@@ -214,19 +217,71 @@ triggers = st.one_of(
 )
 
 
+def test_a_video_begins_and_ends_at_the_waypoint_before(tmp_path: Path) -> None:
+    """With the view that was set before it; what follows is the next waypoint's."""
+    waypoints, notices = read(
+        tmp_path,
+        waypoint(0.001),
+        do(1000, -45, 30, None, None, x=12),
+        do(531, 2, 30),
+        do(2000, 0, 0, 1),
+        do(2500),
+        waypoint(0.002),
+        do(1000, -90, 0, None, None, x=12),
+        do(2501),
+        waypoint(0.003),
+    )
+    assert notices == []
+    assert [one.video for one in waypoints] == [True, False, None]
+    assert [one.photo for one in waypoints] == [True, False, False]
+    assert [one.gimbal is not None for one in waypoints] == [True, False, True]
+    assert [one.zoom for one in waypoints] == [30.0, None, None]
+    both = read(tmp_path, waypoint(0.001), do(2500), do(2501))[0]
+    assert [one.video for one in both] == [True, False]
+    begun = read(tmp_path, waypoint(0.001), do(1000, -45, 30, None, None, x=12), do(2500))[0]
+    assert begun[0].gimbal_pitch == pytest.approx(math.radians(-45))
+
+
+def test_a_video_keeps_its_place_among_stay_picture_and_actuators(tmp_path: Path) -> None:
+    """In the plan's order, where need be at a waypoint of its own in the same place."""
+    path = plan(
+        tmp_path / "a.plan",
+        *(waypoint(0.001, hover=5.0), do(2500), item(93, [7, -1, -1, -1, 0, 0, 0], 2), do(2501)),
+        *(do(2000, 0, 0, 1), waypoint(0.002), do(211, 1, 0), do(2500)),
+    )
+    hook = GripperConfig(id="hook", type="gripper")
+    waypoints, notices = flown_plan(path, actuators=[hook])
+    assert notices == []
+    assert [one.video for one in waypoints] == [None, True, False, None, None, True]
+    assert [one.hover_duration for one in waypoints] == [5.0, 7.0, 0.0, 0.0, 0.0, 0.0]
+    assert [one.photo for one in waypoints] == [False, False, False, True, False, False]
+    assert [bool(one.moves) for one in waypoints] == [False] * 4 + [True, False]
+    assert len({one.id for one in waypoints}) == 6
+    assert len({one.x for one in waypoints}) == 2
+
+
 percents = st.one_of(st.none(), st.floats(0.0, 100.0))
+videos = st.builds(
+    lambda video, hover: {"video": video, "hover_duration": hover},
+    st.sampled_from([None, True, False]),
+    st.sampled_from([0.0, 5.0]),
+)
 lenses = st.builds(lambda zoom, focus: {"zoom": zoom, "focus": focus}, percents, percents)
 
 
 @pytest.mark.parametrize("suffix", ["plan", "waypoints"])
-@given(legs=st.lists(st.tuples(metres, metres, st.booleans(), aims, triggers, lenses), max_size=7))
+@given(
+    legs=st.lists(
+        st.tuples(metres, metres, st.booleans(), aims, triggers, lenses, videos), max_size=7
+    )
+)
 def test_pictures_come_back(
     tmp_path_factory: pytest.TempPathFactory, suffix: str, legs: list[tuple[Any, ...]]
 ) -> None:
     """Each waypoint's own, whatever stood at the one before."""
     asked = [
-        Waypoint(f"w{n}", x, y, 20.0, waypoint_type="local", photo=photo, **aim, **trigger, **lens)
-        for n, (x, y, photo, aim, trigger, lens) in enumerate(legs)
+        Waypoint(f"w{n}", x, y, 20.0, waypoint_type="local", photo=photo, **(a | b | c | d))
+        for n, (x, y, photo, a, b, c, d) in enumerate(legs)
     ]
     path = tmp_path_factory.mktemp("out") / f"a.{suffix}"
     with warnings.catch_warnings():
@@ -236,6 +291,8 @@ def test_pictures_come_back(
     assert [notice.command for notice in notices] == ["NAV_TAKEOFF"]
     came = [one.resolve(np.zeros(3), HOME) for one in waypoints]
     assert [one.photo for one in came] == [one.photo for one in asked]
+    assert [one.video for one in came] == [one.video for one in asked]
+    assert [one.hover_duration for one in came] == [one.hover_duration for one in asked]
     for ours, theirs in zip(asked, came, strict=True):
         assert theirs.trigger_distance == pytest.approx(ours.trigger_distance)
         assert theirs.trigger_interval == pytest.approx(ours.trigger_interval)

@@ -76,7 +76,7 @@ def test_global_relative_needs_a_home(tmp_path: Path) -> None:
     ("command", "line"),
     [
         (202, "items 2, 3: DO_DIGICAM_CONFIGURE: no picture is taken"),
-        (2500, "items 2, 3: VIDEO_START_CAPTURE: no picture is taken"),
+        (530, "items 2, 3: SET_CAMERA_MODE: no picture is taken"),
         (204, "items 2, 3: DO_MOUNT_CONFIGURE: no gimbal is moved"),
         (196, "items 2, 3: DO_SET_ROI_WPNEXT_OFFSET: no gimbal is moved"),
         (183, "items 2, 3: DO_SET_SERVO: no payload is moved"),

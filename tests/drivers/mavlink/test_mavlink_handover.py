@@ -524,6 +524,7 @@ UNFLYABLE: dict[str, tuple[Waypoint, str]] = {
     "trigger": (Waypoint("w", 0, 9, 3, trigger_distance=2.0), "w: it takes pictures"),
     "gimbal": (Waypoint("w", 0, 9, 3, gimbal_pitch=-1.0), "w: it turns the gimbal"),
     "lens": (Waypoint("w", 0, 9, 3, zoom=20.0), "w: it sets the camera's lens"),
+    "video": (Waypoint("w", 0, 9, 3, video=True), "w: it begins or ends a video"),
     "look_at": (Waypoint("w", 0, 9, 3, look_at=(0, 0, 0)), "the gimbal is kept on a place"),
     "yaw": (Waypoint("w", 0, 9, 3, yaw=1.0), "turns to no yaw"),
     "no-fly zone": (Waypoint("w", 0, 9, 3), "w: the way there leads around a no-fly zone"),

@@ -24,6 +24,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
+from aerodaas.drivers.mavlink.microservices.recorder import MavlinkRecorder
 from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -50,7 +51,8 @@ _CARD_AGAIN = 20.0
 _CAPTURE_AGAIN = 10.0
 """The same, of what it does."""
 _CAPTURE_SOON = 1.0
-"""The same, while it does not tell of a picture that is overdue."""
+"""The same, while it does not tell of a picture that is overdue, or has just begun or ended a
+recording."""
 _MOST_STREAMS = 8
 """Streams of one camera that are remembered."""
 _VALUES = 7
@@ -128,7 +130,6 @@ class PayloadComponent:
         self._own = own
         self._heard_at: float | None = None
         self._asked_at = -math.inf
-        self._informed = False
         self._begin()
 
     def _begin(self) -> None:
@@ -138,6 +139,7 @@ class PayloadComponent:
         if self._own:
             wanted = cameras if self.number in CAMERAS else gimbals
         self._searches = [_Search(one) for one in wanted]
+        self._informed = False
 
     @property
     def name(self) -> str:
@@ -196,6 +198,7 @@ class PayloadComponent:
             self._answered(_CAPTURE)
             if self.camera is not None:
                 self.camera.compare(self._capture, now)
+                self.camera.recorder.heed(self._capture, now)
 
     def _answered(self, message: int) -> None:
         """Ask for it again later: it changes."""
@@ -203,12 +206,13 @@ class PayloadComponent:
             search.left = _REQUESTS if search.message == message else search.left
 
     def _inform(self, information: Message) -> None:
-        self._informed = True
+        self._informed, flags = True, int(information.flags)
         self._model = camera_model_told(information)
         if self.camera is None and _takes_pictures(information):
-            lens = MavlinkLens(self.commander, int(information.flags))
-            self.camera = MavlinkCamera(self.commander, lens, self._moment, self._count)
-        films = int(information.flags) & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
+            lens = MavlinkLens(self.commander, flags)
+            recorder = MavlinkRecorder(self.commander, flags)
+            self.camera = MavlinkCamera(self.commander, lens, recorder, self._moment, self._count)
+        films = flags & mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM
         wanted = [_STORAGE, _CAPTURE] if self.camera is not None else []
         for message in [*wanted, _VIDEO] if films else wanted:
             if all(search.message != message for search in self._searches):
@@ -238,8 +242,9 @@ class PayloadComponent:
         if message == _STORAGE:
             return now - self._card_at < _CARD_AGAIN
         if message == _CAPTURE:
-            overdue = self.camera is not None and self.camera.is_overdue(now)
-            return now - self._capture_at < (_CAPTURE_SOON if overdue else _CAPTURE_AGAIN)
+            camera = self.camera
+            soon = camera is not None and (camera.is_overdue(now) or camera.recorder.unconfirmed)
+            return now - self._capture_at < (_CAPTURE_SOON if soon else _CAPTURE_AGAIN)
         if message == _VIDEO:
             return bool(self.streams)
         return self._informed if message == _CAMERA else self.gimbal is not None
@@ -250,6 +255,7 @@ class PayloadComponent:
             if self.gone(now):
                 if self.camera is not None:
                     self.camera.give_up("the camera says nothing any more")
+                    self.camera.recorder.give_up()
                 return
             self.commander.turn(now)
         if self.camera is not None:

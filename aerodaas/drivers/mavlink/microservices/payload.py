@@ -8,8 +8,10 @@ under one lock.
 from __future__ import annotations
 
 import itertools
+import logging
 import math
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import ClassVar
@@ -37,6 +39,11 @@ from aerodaas.types.payload import (
 from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["Payload"]
+
+_log = logging.getLogger(__name__)
+
+_PARTING = 2.0
+"""Seconds that a recording that is to end is awaited for before the link is closed."""
 
 
 class Payload:
@@ -67,6 +74,8 @@ class Payload:
         self._odometry: Odometry | None = None
         self._count = itertools.count(1)
         """Numbers of pictures, over all cameras."""
+        self._filmed: PayloadComponent | None = None
+        """Whose recording was begun or ended last."""
 
     def search(self, commander: Commander) -> None:
         """Begin to search, by the autopilot's `commander`."""
@@ -107,6 +116,31 @@ class Payload:
         """The camera that takes the next picture; the caller locks."""
         found = (one.camera_now(time.monotonic()) for one in self._ranked())
         return next((one for one in found if one is not None), None)
+
+    def film(self, now: float, *, on: bool) -> None:
+        """Have the camera record that takes pictures, or that end which was told; locked."""
+        if on or self._filmed is None:
+            self._filmed = next((one for one in self._ranked() if one.camera_now(now)), None)
+        camera = self.filming_camera(now)
+        if camera is None:
+            raise VehicleError("no camera answers any more")
+        camera.recorder.film(now, on=on)
+
+    def filming_camera(self, now: float) -> MavlinkCamera | None:
+        """The camera that was told to record or to end, while it answers; the caller locks.
+
+        Before, the one that takes pictures.
+        """
+        return self.used_camera() if self._filmed is None else self._filmed.camera_now(now)
+
+    def part(self, name: str, pause: Callable[[], None]) -> None:
+        """Wait a little for a recording that is to end; `pause` waits for the next message."""
+        end = time.monotonic() + _PARTING
+        while any(one.camera is not None and one.camera.recorder.ending for one in self._ranked()):
+            if time.monotonic() >= end:
+                _log.warning("%s: its camera has not acknowledged that its video is to end", name)
+                return
+            pause()
 
     def outcomes(self) -> list[PhotoOutcome]:
         """What became of pictures of all cameras; the caller locks."""
@@ -261,6 +295,25 @@ class _Cameras:
         with self._lock:
             camera = self._payload.used_camera()
             return "" if camera is None else camera.lens.fault
+
+    def film(self, on: bool) -> None:  # noqa: FBT001 - it is all that is said
+        """See `VideoCamera`."""
+        with self._lock:
+            self._payload.film(time.monotonic(), on=on)
+
+    @property
+    def filming(self) -> bool | None:
+        """See `VideoCamera`."""
+        with self._lock:
+            camera = self._payload.filming_camera(time.monotonic())
+            return None if camera is None else camera.recorder.filming
+
+    @property
+    def film_fault(self) -> str:
+        """See `VideoCamera`."""
+        with self._lock:
+            camera = self._payload.filming_camera(time.monotonic())
+            return "" if camera is None else camera.recorder.fault
 
     def outcomes(self) -> list[PhotoOutcome]:
         """See `PhotoCamera`."""

@@ -20,6 +20,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
+from aerodaas.drivers.mavlink.microservices.recorder import MavlinkRecorder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.types.data import Odometry
@@ -58,11 +59,13 @@ class MavlinkCamera:
         self,
         commander: Commander,
         lens: MavlinkLens,
+        recorder: MavlinkRecorder,
         moment: Moment,
         count: Iterator[int],
     ) -> None:
         """Command it by `commander`; `count` numbers the pictures of all cameras."""
         self.lens = lens
+        self.recorder = recorder
         self._commander = commander
         self._moment = moment
         self._count = count
@@ -117,6 +120,7 @@ class MavlinkCamera:
     def turn(self, now: float) -> None:
         """Give up a picture that is not told."""
         self._now = now
+        self.recorder.turn(now)
         if self._request is not None and now >= self._request.deadline:
             self._fail(self._request, "the camera does not tell of the picture")
 
