@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerodaas.config.robot import LimitsConfig
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
@@ -23,6 +24,8 @@ _FACING = 0.2
 """Yaw error in radians that counts as facing the requested direction."""
 _PROGRESS = 0.1
 """Metres of approach that count as progress: more than the position's noise."""
+_KEPT = 0.5
+"""Metres within which a rangefinder's word is the clearance that is kept by it."""
 
 
 class LegPhase(enum.Enum):
@@ -45,11 +48,24 @@ def setpoint_towards(
     return PositionSetpoint(place, yaw, speed)
 
 
-def unreachable(stop: QueuedWaypoint, phase: LegPhase) -> str:
+def unreachable(
+    stop: QueuedWaypoint, phase: LegPhase, state: VehicleState | None, limits: LimitsConfig
+) -> str:
     """Why a stop is given up in this phase of the flight to it, one sentence."""
-    stalled = phase is LegPhase.STALLED
-    why = "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
+    why = "no way inside the geofence leads there"
+    if phase is LegPhase.STALLED:
+        why = "the drone comes no nearer"
+        if state is not None and _kept_up(stop, state, limits):
+            kept = f"{limits.rangefinder_clearance:g} m above what is below it"
+            why += f", for it stays {kept} (limits.rangefinder_clearance)"
     return f"{stop.id} cannot be reached: {why}"
+
+
+def _kept_up(stop: QueuedWaypoint, state: VehicleState, limits: LimitsConfig) -> bool:
+    """Whether the clearance by a rangefinder holds the drone above a stop."""
+    higher = state.odometry.height - stop.waypoint.position[2] > limits.arrival_radius
+    kept = limits.rangefinder_clearance
+    return bool(higher and state.below is not None and state.below <= kept + _KEPT)
 
 
 def velocity_setpoint(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:

@@ -522,7 +522,7 @@ class Mission:
         if phase is LegPhase.DONE:
             self._log.visit(stop.id)
         else:
-            self._log.give_up(self._now, stop.id, unreachable(stop, phase))
+            self._log.give_up(self._now, stop.id, unreachable(stop, phase, self._last, self.limits))
         self._navigator.finish(stop)
 
     def _follow(self, live: LiveCommand, state: VehicleState) -> Action:

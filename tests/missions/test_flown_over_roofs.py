@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from flying import FLAT, Flyer, recorded, robot
 
-from aerodaas import AeroNavigation, Environment, Waypoint
+from aerodaas import AeroNavigation, Environment, SchedulingType, Waypoint
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
 
@@ -24,6 +26,22 @@ _HALL = {
 _CLEARANCE = 3.0
 
 
+def _flown_over_the_hall(
+    flyer: Flyer, build: Callable[[Environment], None], **mission: object
+) -> Run:
+    """A flight in a yard with a hall of 6 m; the drone keeps 3 m above what is below it."""
+    world = flyer.folder / "yard.json"
+    scenario = {"name": "yard", "description": "A yard.", "entities": [_HALL]}
+    world.write_text(json.dumps(scenario))
+    limits = {"rangefinder_clearance": _CLEARANCE, "takeoff_height": 7.0, "cruise_speed": 1.0}
+    content: dict[str, Any] = {
+        **FLAT,
+        "robots": [{**robot(), "limits": limits, "mission": mission}],
+        "simulation": {"world": str(world)},
+    }
+    return flyer.fly(build, content, lockstep=True)
+
+
 @pytest.mark.wall_clock
 def test_a_drone_keeps_its_clearance_over_a_roof(flyer: Flyer) -> None:
     """Sent across 7 m high, over a flat roof of 6 m: it climbs over it, and back down behind."""
@@ -32,16 +50,7 @@ def test_a_drone_keeps_its_clearance_over_a_roof(flyer: Flyer) -> None:
         drone = environment.get_robot_by_id("drone")
         drone.navigate(AeroNavigation(data=[Waypoint("across", 45, 0, 7.0)]))
 
-    world = flyer.folder / "yard.json"
-    scenario = {"name": "yard", "description": "A yard.", "entities": [_HALL]}
-    world.write_text(json.dumps(scenario))
-    limits = {"rangefinder_clearance": _CLEARANCE, "takeoff_height": 7.0, "cruise_speed": 1.0}
-    content: dict[str, Any] = {
-        **FLAT,
-        "robots": [{**robot(), "limits": limits}],
-        "simulation": {"world": str(world)},
-    }
-    run = flyer.fly(build, content, lockstep=True)
+    run = _flown_over_the_hall(flyer, build)
     drone = recorded(run).robots["drone"]
     assert drone.visited == ("across",)
     assert run.recording is not None
@@ -54,3 +63,22 @@ def test_a_drone_keeps_its_clearance_over_a_roof(flyer: Flyer) -> None:
     assert np.abs(below - (heights - 6.0)).max() < 0.3
     behind = [one.truth.position[2] for one in states if one.truth and one.truth.position[0] > 44.5]
     assert min(behind) < 7.5
+
+
+@pytest.mark.wall_clock
+def test_a_place_that_is_too_low_over_a_roof_is_given_up_for_the_clearance(flyer: Flyer) -> None:
+    """Two metres above the roof of 6 m, where three are kept: told so, and the next is visited."""
+
+    def build(environment: Environment) -> None:
+        drone = environment.get_robot_by_id("drone")
+        stops = [Waypoint("low", 20, 0, 8.0), Waypoint("behind", 35, 0, 7.0)]
+        drone.navigate(AeroNavigation(data=stops, scheduling_type=SchedulingType.ORDERED))
+
+    run = _flown_over_the_hall(flyer, build, stall_timeout=5.0)
+    drone = recorded(run).robots["drone"]
+    assert drone.visited == ("behind",)
+    (text,) = [text for _, _, text in recorded(run).alerts if "low" in text]
+    assert text == (
+        "low cannot be reached: the drone comes no nearer, for it stays 3 m above what is below it "
+        "(limits.rangefinder_clearance)"
+    )
