@@ -50,7 +50,9 @@ def test_the_wheel_holds_nothing_else(built: Path) -> None:
     assert {path.parts[0].partition("-")[0] for path in paths} == {"aerodaas"}
     package = [path for path in paths if path.parts[0] == "aerodaas"]
     kinds = {path.suffix for path in package if path.name != "py.typed"}
-    assert kinds <= {".py", ".pyi", ".json", ".csv", ".onnx", ".css", ".js", ".html", ".md", ".svg"}
+    assert kinds <= {
+        *(".py", ".pyi", ".json", ".csv", ".onnx", ".css", ".js", ".html", ".md", ".svg", ".txt")
+    }
     assert not [path for path in package if path.name.startswith((".", "test_", "conftest"))]
 
 

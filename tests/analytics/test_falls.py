@@ -114,7 +114,7 @@ def test_a_fall_is_told_wherever_it_goes(
 @LENSES
 @given(
     turn=st.floats(-math.pi, math.pi),
-    away=st.floats(3.0, 8.0),
+    away=st.floats(3.1, 8.0),
     height=st.floats(0.8, 2.0),
     tall=st.floats(1.5, 1.95),
     rate=st.sampled_from([5.0, 10.0]),
@@ -133,7 +133,11 @@ def test_boxes_alone_tell_a_fall_in_the_picture(
     *,
     forward: bool,
 ) -> None:
-    """Rough boxes, and no joint of who lies; in more than half of the frames from then on."""
+    """Rough boxes, and no joint of who lies; in more than half of the frames from then on.
+
+    Nearer than 3.1 m to a low drone the head of who stands may be above the picture, and nobody is
+    known to have stood.
+    """
     scene = Scene(camera, rate)
     scene.turn, scene.place, scene.tall = turn, lambda _: (away, 0.0), tall
     scene.drone = lambda _: hovering(height)
