@@ -63,9 +63,10 @@ def unreachable(
 
 def _kept_up(stop: QueuedWaypoint, state: VehicleState, limits: LimitsConfig) -> bool:
     """Whether the clearance by a rangefinder holds the drone above a stop."""
-    higher = state.odometry.height - stop.waypoint.position[2] > limits.arrival_radius
-    kept = limits.rangefinder_clearance
-    return bool(higher and state.below is not None and state.below <= kept + _KEPT)
+    kept, below = limits.rangefinder_clearance, state.below
+    if kept <= 0.0 or below is None or below > kept + _KEPT:
+        return False
+    return bool(state.odometry.height - stop.waypoint.position[2] > limits.arrival_radius)
 
 
 def velocity_setpoint(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:

@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards
+from aerodaas.config.robot import LimitsConfig
+from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
 
@@ -112,3 +114,25 @@ def test_a_leg_is_given_up_after_its_time_out_without_coming_nearer() -> None:
     assert look(0.11, 11.0) is LegPhase.UNDER_WAY
     assert look(0.11, 21.0) is LegPhase.UNDER_WAY
     assert look(0.11, 21.01) is LegPhase.STALLED
+
+
+@pytest.mark.parametrize(
+    ("clearance", "below", "height", "kept"),
+    [
+        (3.0, 3.2, 3.0, True),
+        (3.0, 3.6, 3.0, False),
+        (3.0, None, 3.0, False),
+        (3.0, 3.0, 2.2, False),
+        (0.0, 0.4, 3.0, False),
+    ],
+)
+def test_the_clearance_is_named_where_it_keeps_the_drone_above(
+    clearance: float, below: float | None, height: float, *, kept: bool
+) -> None:
+    """Not far above what is below, nor as high as the place, nor where nothing is kept."""
+    odometry = Odometry(np.array([10.0, 0.0, height]), np.zeros(3), 0.0)
+    state = VehicleState(0, odometry, Battery(0.9), VehicleMode.GUIDED, armed=True, below=below)
+    limits = LimitsConfig(rangefinder_clearance=clearance, takeoff_height=5.0)
+    why = unreachable(stop(), LegPhase.STALLED, state, limits)
+    assert why.startswith("wp cannot be reached: the drone comes no nearer")
+    assert ("limits.rangefinder_clearance" in why) is kept

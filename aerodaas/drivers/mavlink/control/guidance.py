@@ -162,12 +162,15 @@ def _excess_aside(vehicle: Vector, velocity: Vector, start: Vector, end: Vector)
     What draws it to the line is no excess.
     """
     direction = _unit(end - start)
-    beside = vehicle - start
-    offset = beside - float(beside @ direction) * direction
-    aside = velocity - float(velocity @ direction) * direction
+    offset, aside = _across(vehicle - start, direction), _across(velocity, direction)
     way = _unit(aside)
     allowed = _ASIDE + _PULL * max(0.0, -float(offset @ way))
     return _EXCESS * max(0.0, float(np.linalg.norm(aside)) - allowed) * way
+
+
+def _across(vector: Vector, direction: Vector) -> Vector:
+    """The part of `vector` across a unit vector."""
+    return vector - float(vector @ direction) * direction
 
 
 def _unit(way: Vector) -> Vector:
