@@ -11,6 +11,7 @@ from aerodaas.cameras.base import (
     Camera,
     GimballedCamera,
     Picture,
+    PlacingCamera,
     ToldCamera,
     ZoomingCamera,
     most_memory,
@@ -64,6 +65,8 @@ class SensorActor(StreamActor):
         self._gimballed = self._camera if isinstance(self._camera, GimballedCamera) else None
         self._zooming = self._camera if isinstance(self._camera, ZoomingCamera) else None
         self._frames = self.publisher(self._stream)
+        if isinstance(self._camera, PlacingCamera):
+            self._camera.place_in(self._frames.picture_memory)
         self._commands = self.publisher(end_stream(self._stream))
 
     def _run(self) -> None:

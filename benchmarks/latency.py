@@ -24,7 +24,16 @@ import numpy as np
 import psutil
 import ray
 import typer
-from _latency_ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, StampedVehicle, Steer
+from _latency_ours import (
+    HEIGHT,
+    RATE,
+    WIDTH,
+    PatternCamera,
+    PlacingPatternCamera,
+    ReadFrame,
+    StampedVehicle,
+    Steer,
+)
 from _report import Report
 from ray.cluster_utils import Cluster
 from rich.progress import Progress
@@ -62,10 +71,8 @@ def _cpu_seconds(processes: list[psutil.Process]) -> float:
     return total
 
 
-def _environment(folder: Path, *, far: bool) -> Path:
-    plugin, vehicle = (
-        f"{one.__module__}:{one.__name__}" for one in (PatternCamera, StampedVehicle)
-    )
+def _environment(folder: Path, camera_class: type[PatternCamera], *, far: bool) -> Path:
+    plugin, vehicle = (f"{one.__module__}:{one.__name__}" for one in (camera_class, StampedVehicle))
     camera = {"id": "camera", "type": "camera", "driver": plugin, "rate": RATE}
     content = {
         "name": "latency",
@@ -78,10 +85,16 @@ def _environment(folder: Path, *, far: bool) -> Path:
     return path
 
 
-def measure_ours(seconds: float, folder: Path, *, far: bool = False) -> Round:
+def measure_ours(
+    seconds: float,
+    folder: Path,
+    *,
+    camera: type[PatternCamera] = PatternCamera,
+    far: bool = False,
+) -> Round:
     """Fly the four actors for `seconds`; `far` puts the analysis on another Ray node."""
     current_options.set(RunOptions(speed=1.0, lockstep=False, view=False))
-    env = Environment(_environment(folder, far=far))
+    env = Environment(_environment(folder, camera, far=far))
     drone = env.get_robot_by_id("drone")
     frames = drone.get_sensor_by_id("camera").get_data_stream()
     place = env.get_compute_resource_by_id("place")
@@ -156,6 +169,19 @@ def _add(report: Report, name: str, rounds: list[Round]) -> None:
     )
 
 
+def _ratios(ours: list[Round], theirs: list[Round]) -> str:
+    pairs = [
+        (
+            np.median(a.latencies) / np.median(b.latencies),
+            np.percentile(a.latencies, 99) / np.percentile(b.latencies, 99),
+            a.cpu / b.cpu,
+        )
+        for a, b in zip(ours, theirs, strict=True)
+    ]
+    middle, high, cpu = (statistics.median(ratio) for ratio in zip(*pairs, strict=True))
+    return f"latency {middle:.2f}, p99 {high:.2f}, CPU {cpu:.2f}"
+
+
 @contextmanager
 def _two_nodes() -> Iterator[None]:
     cluster = Cluster(
@@ -185,13 +211,15 @@ def main(
     packages = ("ray", *(("dora-rs",) if dora else ()))
     report = Report(title, UNITS, packages=packages)
     ours: list[Round] = []
+    placed: list[Round] = []
     theirs: list[Round] = []
     with tempfile.TemporaryDirectory() as name, Progress() as progress:
         folder = Path(name)
-        task = progress.add_task("measuring", total=rounds * (2 if dora else 1) + 1)
+        task = progress.add_task("measuring", total=rounds * (3 if dora else 2) + 1)
         for _ in range(rounds):
-            ours.append(measure_ours(seconds, folder))
-            progress.advance(task)
+            for rounds_of, camera in ((ours, PatternCamera), (placed, PlacingPatternCamera)):
+                rounds_of.append(measure_ours(seconds, folder, camera=camera))
+                progress.advance(task)
             if dora:
                 theirs.append(measure_dora(seconds, folder))
                 progress.advance(task)
@@ -200,14 +228,11 @@ def main(
             far = [measure_ours(seconds, folder, far=True)]
         progress.advance(task)
     _add(report, "AeroDaaS, one node", ours)
+    _add(report, "AeroDaaS, captured where it is read", placed)
     if theirs:
         _add(report, "dora, one node", theirs)
-        pairs = [
-            (np.median(a.latencies) / np.median(b.latencies), a.cpu / b.cpu)
-            for a, b in zip(ours, theirs, strict=True)
-        ]
-        latency, cpu = (statistics.median(ratio) for ratio in zip(*pairs, strict=True))
-        report.note(f"ours over dora's, median of pairs: latency {latency:.2f}, CPU {cpu:.2f}")
+        report.note(f"ours over dora's, medians of pairs: {_ratios(ours, theirs)}")
+        report.note(f"captured where it is read: {_ratios(placed, theirs)}")
     _add(report, "AeroDaaS, analysis on a second Ray node (ObjectRefs)", far)
     report.note("CPU: all processes of the system together, Ray's own included; 100 % = one core")
     report.show()

@@ -1,23 +1,17 @@
-"""Codec of messages: pickle 5 with large arrays out of band, so that a reader copies nothing.
+"""Codec of messages: plain values by `marshal`, large arrays out of band, so that none is copied.
 
-Vectors of a few numbers are in the pickle itself: apart, each would cost several times as much.
-
-Layout: u32 number of buffers, u32 length of the envelope, u32 length of the item's pickle, u64
-length of each buffer, envelope, pickle, then each buffer, aligned to 64 bytes. Little-endian. The
-envelope is separate so that it can be read even if the item cannot. It is of numbers and strings
-only, which `marshal` writes and reads several times faster than pickle does its named tuples; both
-ends run one version of Python, as Ray requires of a cluster.
+Layout: u32 number of buffers, u32 length of the head, then the head, and each buffer, aligned to 64
+bytes. Little-endian. The head is of plain values only: the envelope, the name of the item's class,
+the offset and length of each buffer, and the item: as a plain value, or, where it has none, its
+pickle in a tuple of its own. So the envelope can be read even if the item cannot. Both ends run one
+version of Python, as `marshal` needs and Ray requires of a cluster.
 """
 
 from __future__ import annotations
 
-import copyreg
-import io
 import marshal
 import pickle
 import struct
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +19,7 @@ from numpy.typing import NDArray
 
 from aerodaas.actors.streams import definitions as _definitions
 from aerodaas.actors.streams.pickling_errors import culprit
+from aerodaas.actors.streams.plain import NotPlainError, Plain, flatten, rebuild
 from aerodaas.types.data import Header
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.status import Message, TraceSpan
@@ -32,10 +27,10 @@ from aerodaas.types.status import Message, TraceSpan
 __all__ = ["Encoded", "UnreadableError", "UnsendableError", "decode", "encode"]
 
 _ALIGNMENT = 64
-_HEAD = struct.Struct("<III")
-_FLOAT = np.dtype(np.float64)
-_LONGEST_VECTOR = 256
-"""Bytes up to which an array of one dimension of floats is in the pickle."""
+_LENGTHS = struct.Struct("<II")
+_WITHOUT_REFERENCES = 2
+"""Version of marshal's format that does not look for what occurs twice: little does, and to look
+takes longer."""
 _defined: set[str] = set()
 """Streams with items of classes that pickle cannot refer to by name."""
 
@@ -53,6 +48,15 @@ class UnreadableError(AeroDaaSError):
         self.message = message
 
 
+def _bytes_of(array: Any) -> memoryview:  # noqa: ANN401 - a contiguous array, a buffer for NumPy
+    return pickle.PickleBuffer(array).raw()
+
+
+def _address(array: NDArray[Any]) -> int:
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
 def _aligned(offset: int) -> int:
     return -(-offset // _ALIGNMENT) * _ALIGNMENT
 
@@ -61,41 +65,61 @@ class Encoded:
     """A message ready to be written into a buffer of `size` bytes."""
 
     def __init__(self, message: Message[Any]) -> None:
-        """Pickle the message without copying its arrays.
+        """Encode the message without copying its large arrays.
 
-        Raises UnsendableError for an item that cannot be pickled.
+        Raises UnsendableError for an item that cannot be sent.
         """
-        item, buffers = _pickled(message)
-        envelope = _envelope(message)
-        self._buffers = [buffer.raw() for buffer in buffers]
-        lengths = [buffer.nbytes for buffer in self._buffers]
-        self._head = _HEAD.pack(len(lengths), len(envelope), len(item)) + struct.pack(
-            f"<{len(lengths)}Q", *lengths
-        )
-        self._pickle = envelope + item
-        self._offsets: list[int] = []
-        end = len(self._head) + len(self._pickle)
-        for length in lengths:
-            start = _aligned(end)
-            self._offsets.append(start)
-            end = start + length
-        self.size = end
+        self._arrays: list[NDArray[Any]] = []
+        pickled = b""
+        try:
+            plain = flatten(message.item, self._arrays)
+            self._buffers = [_bytes_of(array) for array in self._arrays]
+        except (NotPlainError, RecursionError):
+            self._arrays, plain = [], None
+            pickled, self._buffers = _pickled(message)
+        self._places: list[int] = []
+        """Where each buffer begins, from the first on."""
+        end = 0
+        for buffer in self._buffers:
+            self._places.append(_aligned(end))
+            end = self._places[-1] + buffer.nbytes
+        places = [
+            (place, one.nbytes) for place, one in zip(self._places, self._buffers, strict=True)
+        ]
+        self._head = _head(message, tuple(places), pickled, plain)
+        self._start = _LENGTHS.size + len(self._head)
+        if places:
+            self._start = _aligned(self._start)
+        self._length = end
+        self.size = self._start + end
 
-    def write_into(self, target: memoryview) -> None:
-        """Write all `size` bytes into `target`."""
-        start = len(self._head)
-        target[:start] = self._head
-        target[start : start + len(self._pickle)] = self._pickle
-        for offset, buffer in zip(self._offsets, self._buffers, strict=True):
-            target[offset : offset + buffer.nbytes] = buffer
+    def size_around(self, array: NDArray[np.uint8], room: int) -> int | None:
+        """Return the size that it has in a buffer that holds `array` from byte `room` on.
+
+        None if its first buffer is not all of `array`, or the rest does not fit into `room`.
+        """
+        if not self._arrays or _LENGTHS.size + len(self._head) > room:
+            return None
+        first = self._arrays[0]
+        same = first.nbytes == array.nbytes and _address(first) == _address(array)
+        return room + self._length if same else None
+
+    def write_into(self, target: memoryview, room: int = 0) -> None:
+        """Write all into `target`; not its first buffer, if that is there, from byte `room` on."""
+        start = room or self._start
+        target[: _LENGTHS.size] = _LENGTHS.pack(len(self._head), start)
+        target[_LENGTHS.size : _LENGTHS.size + len(self._head)] = self._head
+        for place, buffer in zip(self._places, self._buffers, strict=True):
+            if place or not room:
+                target[start + place : start + place + buffer.nbytes] = buffer
 
     def to_bytes(self, suffix: bytes = b"") -> bytes:
         """The encoded message as one bytes object, with `suffix` after it."""
-        parts: list[bytes | memoryview] = [self._head, self._pickle]
-        end = len(self._head) + len(self._pickle)
-        for offset, buffer in zip(self._offsets, self._buffers, strict=True):
-            parts += bytes(offset - end), buffer
-            end = offset + buffer.nbytes
+        parts: list[bytes | memoryview] = [_LENGTHS.pack(len(self._head), self._start), self._head]
+        end = _LENGTHS.size + len(self._head)
+        for place, buffer in zip(self._places, self._buffers, strict=True):
+            parts += bytes(self._start + place - end), buffer
+            end = self._start + place + buffer.nbytes
         return b"".join((*parts, suffix))
 
 
@@ -110,53 +134,46 @@ def decode(source: memoryview) -> Message[Any]:
     Raises UnreadableError if its item cannot be rebuilt.
     """
     source = source.toreadonly()
-    count, first, second = _HEAD.unpack_from(source)
-    lengths = struct.unpack_from(f"<{count}Q", source, _HEAD.size)
-    start = _HEAD.size + 8 * count
-    middle = start + first
-    end = middle + second
-    buffers = []
-    cursor = end
-    for length in lengths:
-        cursor = _aligned(cursor)
-        buffers.append(source[cursor : cursor + length])
-        cursor += length
-    stream, seq, stamp, header, captured, spans, kind = marshal.loads(source[start:middle])  # noqa: S302
-    header, spans = Header._make(header), tuple(map(TraceSpan._make, spans))
-    make: Callable[[Any], Message[Any]] = partial(
-        Message, stream, seq, stamp, header, captured, spans
+    length, start = _LENGTHS.unpack_from(source)
+    stream, seq, stamp, header, captured, spans, kind, places, pickled, plain = marshal.loads(  # noqa: S302 - our own bytes
+        source[_LENGTHS.size : _LENGTHS.size + length]
     )
+    buffers = [source[start + place : start + place + size] for place, size in places]
+    envelope = stream, seq, stamp, Header._make(header), captured, _spans(spans)
     try:
-        item = pickle.loads(source[middle:end], buffers=buffers)  # noqa: S301 - our own bytes
+        if pickled:
+            return Message(*envelope, pickle.loads(pickled, buffers=buffers))  # noqa: S301 - our own
+        return Message(*envelope, rebuild(plain, buffers))
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        raise UnreadableError(make(None), kind, reason) from error
-    return make(item)
+        raise UnreadableError(Message(*envelope, None), kind, reason) from error
 
 
-def _envelope(message: Message[Any]) -> bytes:
-    return marshal.dumps(
-        (
-            message.stream,
-            message.seq,
-            message.stamp,
-            tuple(message.header),
-            message.captured,
-            tuple(map(tuple, message.spans)),
-            type(message.item).__name__,
-        )
+def _spans(spans: tuple[tuple[str, int, int], ...]) -> tuple[TraceSpan, ...]:
+    return tuple([TraceSpan._make(span) for span in spans])
+
+
+def _head(
+    message: Message[Any], places: tuple[tuple[int, int], ...], pickled: bytes, plain: Plain
+) -> bytes:
+    envelope: tuple[Any, ...] = (
+        message.stream,
+        message.seq,
+        message.stamp,
+        tuple(message.header),
+        message.captured,
+        tuple([tuple(span) for span in message.spans]),
+        type(message.item).__name__,
     )
+    return marshal.dumps((*envelope, places, pickled, plain), _WITHOUT_REFERENCES)
 
 
-def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
+def _pickled(message: Message[Any]) -> tuple[bytes, list[memoryview]]:
     buffers: list[pickle.PickleBuffer] = []
     if message.stream not in _defined:
         try:
-            file = io.BytesIO()
-            pickler = pickle.Pickler(file, protocol=5, buffer_callback=buffers.append)
-            pickler.dispatch_table = {**copyreg.dispatch_table, np.ndarray: _reduced}
-            pickler.dump(message.item)
-            return file.getvalue(), buffers
+            data = pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append)
+            return data, [buffer.raw() for buffer in buffers]
         except Exception:  # noqa: BLE001 - the attempt below reports the reason
             buffers = []
     try:
@@ -164,11 +181,4 @@ def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
     except Exception as error:
         raise UnsendableError(culprit(message.item, error)) from error
     _defined.add(message.stream)
-    return data, buffers
-
-
-def _reduced(array: NDArray[Any]) -> Any:  # noqa: ANN401 - pickle's
-    """Reduce an array for pickle: a short vector to its bytes, any other as NumPy does."""
-    if array.ndim == 1 and array.dtype is _FLOAT and 0 < array.nbytes <= _LONGEST_VECTOR:
-        return np.frombuffer, (array.tobytes(),)
-    return array.__reduce_ex__(5)
+    return data, [buffer.raw() for buffer in buffers]

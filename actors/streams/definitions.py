@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import io
 import pickle
-import sys
 import threading
 import uuid
 from collections.abc import Callable, Mapping
-from operator import attrgetter
 from typing import Any
 
 from ray import cloudpickle
+
+from aerodaas.actors.streams.plain import importable
 
 __all__ = ["define", "name_of", "named", "pickled", "pickled_class", "register"]
 
@@ -85,7 +85,7 @@ def pickled(item: object, buffers: Callable[[pickle.PickleBuffer], Any]) -> byte
 
 class _Pickler(cloudpickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:  # noqa: ANN401 - pickle's
-        if isinstance(obj, type) and not _importable(obj):
+        if isinstance(obj, type) and not importable(obj):
             return _reference(obj)
         known: Any = super()
         return known.reducer_override(obj)
@@ -109,14 +109,3 @@ def _find(definition: type) -> bool:
         if named(name) is definition:
             return True
     return id(definition) in _references
-
-
-def _importable(definition: type) -> bool:
-    module = definition.__module__
-    if module == "builtins":
-        return True
-    try:
-        found = attrgetter(definition.__qualname__)(sys.modules[module])
-    except (AttributeError, KeyError):
-        return False
-    return found is definition and module != "__main__"

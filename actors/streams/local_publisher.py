@@ -13,6 +13,10 @@ import select
 import socket
 import threading
 from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.actors.streams.codec import Encoded
 from aerodaas.actors.streams.completion import Publication
@@ -39,6 +43,15 @@ MAX_DEPTH = 32
 """Largest queue depth of a reader."""
 MAX_BORROWED = 16
 """Most messages in slots that a reader may hold beside those in its queue."""
+_ROOM = 4096
+"""Bytes before the array in a lent slot, for the rest of its message."""
+
+
+class _Lent(NamedTuple):
+    """A slot that the publisher's owner fills before it sends the message."""
+
+    slot: Slot
+    array: NDArray[np.uint8]
 
 
 class _ReaderLink:
@@ -168,6 +181,7 @@ class LocalPublisher:
         self._news = select.epoll()
         self._news.register(self._arrivals.bell, select.EPOLLIN)
         self._pool: SlotPool | None = None
+        self._lent: _Lent | None = None
         self._publication: Publication | None = None
         self._number = 0
         """Messages queued so far."""
@@ -186,6 +200,23 @@ class LocalPublisher:
                     self._admit(arrival)
             if self._readers:
                 self._send(encoded)
+
+    def lend(self, size: int) -> NDArray[np.uint8] | None:
+        """Return `size` bytes of a slot for the first large array of the next message.
+
+        None if nobody reads the stream, or no memory is left.
+        """
+        with self._lock:
+            if not self._readers:
+                return None
+            if self._lent is not None:
+                self._put_back([self._lent.slot])
+                self._lent = None
+            slot = self._take(_ROOM + 2 * size)  # room for its depth; unwritten pages cost nothing
+            if slot is None:
+                return None
+            self._lent = _Lent(slot, np.frombuffer(slot.memory, np.uint8, size, _ROOM))
+            return self._lent.array
 
     def close(self) -> None:
         """Close the stream."""
@@ -207,21 +238,38 @@ class LocalPublisher:
         if encoded.size <= LONGEST_INLINE:
             self._queue(encoded.to_bytes(TRAILER.pack(number, INLINE)), None)
             return
-        try:
-            self._pool = self._pool or SlotPool()
-            slot = self._pool.take(encoded.size)
-        except OSError:
-            slot = None
+        slot, size = self._written(encoded)
         if slot is None:
             self.refused += 1
             return
         slot.users = 1  # ourselves: a reader that ends must not free it for the next message
-        encoded.write_into(slot.memory)
-        where = SLOT.pack(slot.offset, len(slot.memory), encoded.size)
+        where = SLOT.pack(slot.offset, len(slot.memory), size)
         self._queue(where + TRAILER.pack(number, IN_SLOT), slot)
         slot.users -= 1
         if not slot.users:
             self._put_back([slot])
+
+    def _written(self, encoded: Encoded) -> tuple[Slot | None, int]:
+        """Write a message into a slot, of a lent one only what is not there yet; and its size."""
+        lent, self._lent = self._lent, None
+        if lent is not None:
+            size = encoded.size_around(lent.array, _ROOM)
+            if size is not None and size <= len(lent.slot.memory):
+                encoded.write_into(lent.slot.memory, _ROOM)
+                return lent.slot, size
+        slot = self._take(encoded.size)
+        if slot is not None:
+            encoded.write_into(slot.memory)
+        if lent is not None:  # not before: what was written may be a part of it
+            self._put_back([lent.slot])
+        return slot, encoded.size
+
+    def _take(self, size: int) -> Slot | None:
+        try:
+            self._pool = self._pool or SlotPool()
+            return self._pool.take(size)
+        except OSError:
+            return None
 
     def _queue(self, data: bytes, slot: Slot | None) -> None:
         """Queue the next message to all readers, then wake all of them."""

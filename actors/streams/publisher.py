@@ -8,10 +8,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aerodaas.actors.streams.availability import shared_memory_available
 from aerodaas.actors.streams.codec import Encoded, UnsendableError
 from aerodaas.actors.streams.local_publisher import LocalPublisher
 from aerodaas.actors.streams.remote import RemoteReader, send_to
+from aerodaas.cameras.base import own_memory
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message, TraceSpan
@@ -99,6 +103,15 @@ class Publisher:
             self._kept = deque(maxlen=_MESSAGES_KEPT)
         first = seq if seq <= self.sent else 0
         return [data for number, data in list(self._kept) if number >= first]
+
+    def picture_memory(self, height: int, width: int) -> NDArray[np.uint8]:
+        """Memory for the picture of the next message, where its readers will look at it.
+
+        A `PictureMemory` of cameras: height x width x 3. It must not be written to once the message
+        is published.
+        """
+        lent = None if self._local is None else self._local.lend(height * width * 3)
+        return own_memory(height, width) if lent is None else lent.reshape(height, width, 3)
 
     def close(self) -> None:
         """Close the stream."""

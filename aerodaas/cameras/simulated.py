@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from aerodaas.cameras.base import Picture
+from aerodaas.cameras.base import Picture, PictureMemory, own_memory
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.simulation.world import World
@@ -22,7 +22,7 @@ __all__ = ["SimulatedCamera"]
 
 
 class SimulatedCamera:
-    """A pinhole camera in the simulated world: a `GimballedCamera` and a `ZoomingCamera`.
+    """A pinhole camera in the simulated world, which can turn, zoom and place its pictures.
 
     Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
     environment's world is invalid.
@@ -47,6 +47,7 @@ class SimulatedCamera:
         self._gimbal: GimbalAttitude | None = None
         self._zoom = 1.0
         self._depth_range = config.depth_range
+        self._memory: PictureMemory = own_memory
         self._renderer: Renderer | None = None
 
     @property
@@ -72,6 +73,10 @@ class SimulatedCamera:
 
             self._renderer = renderer_for(self._world, self._model, self._depth_range)
 
+    def place_in(self, memory: PictureMemory) -> None:
+        """Render into what `memory` returns."""
+        self._memory = memory
+
     def follow_gimbal(self, attitude: GimbalAttitude | None) -> None:
         """Look as the gimbal does at the next image."""
         self._gimbal = attitude
@@ -93,7 +98,8 @@ class SimulatedCamera:
             model = zoomed(self._mounted, self._zoom)
             self._model = model if self._gimbal is None else levelled(model, self._gimbal, pose)
             self._renderer.turn(self._model)
-        image = self._renderer.render(seconds(stamp), pose)
+        memory = self._memory(self._model.height, self._model.width)
+        image = self._renderer.render(seconds(stamp), pose, memory)
         return Picture(image, stamp, depth=self._renderer.depth())
 
     def close(self) -> None:

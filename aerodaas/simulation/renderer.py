@@ -77,6 +77,7 @@ class Renderer:
         self._scene = Scene(world, looks)
         self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
         self._pixels = self._open(self._eye, HAZE)
+        self._upside_down = np.empty((camera.height, camera.width, 3), np.uint8)
 
     def _open(self, eye: NodePath, clear: ArrayLike) -> Texture:
         """Open an offscreen buffer for the camera `eye`, and return its texture."""
@@ -108,8 +109,13 @@ class Renderer:
             self._eye.node().get_lens().set_focal_length(camera.fx)
         self._camera, self._optical = camera, camera.body_from_optical
 
-    def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
-        """Render (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""
+    def render(
+        self, time: float, pose: Odometry, into: NDArray[np.uint8] | None = None
+    ) -> NDArray[np.uint8]:
+        """Render (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`.
+
+        Into memory of its own, or `into`, which is returned.
+        """
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
         right, down, ahead = (body @ self._optical).T
         x, y, z = np.asarray(pose.position) + body @ np.array(self._camera.mount)
@@ -118,9 +124,11 @@ class Renderer:
         self._scene.update(time, (float(x), float(y), float(z)))
         self._engine.render_frame()
         shape = (self._camera.height, self._camera.width, 4)
-        upside_down = np.frombuffer(self._pixels.get_ram_image(), np.uint8).reshape(shape)
-        picture = cv2.flip(cv2.cvtColor(upside_down, cv2.COLOR_BGRA2BGR), 0)
-        return picture.astype(np.uint8, copy=False)
+        rendered = np.frombuffer(self._pixels.get_ram_image(), np.uint8).reshape(shape)
+        cv2.cvtColor(rendered, cv2.COLOR_BGRA2BGR, dst=self._upside_down)
+        picture = np.empty_like(self._upside_down) if into is None else into
+        cv2.flip(self._upside_down, 0, dst=picture)
+        return picture
 
     def depth(self) -> NDArray[np.uint16] | None:
         """Depth of the last image; None, as this camera measures none."""

@@ -17,6 +17,8 @@ import numpy as np
 import pymap3d
 from numpy.typing import NDArray
 
+from aerodaas.types.records import shared_pickle
+
 __all__ = [
     "FLU_FROM_OPTICAL",
     "Box",
@@ -216,6 +218,7 @@ class GeodeticOrigin:
         )
 
 
+@shared_pickle
 @dataclass(frozen=True)
 class CameraModel:
     """A pinhole camera bolted to a body: intrinsics in pixels, mount in metres and radians.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-__all__ = ["fast_pickle", "shared_pickle", "valued"]
+__all__ = ["Record", "fast_pickle", "record_of", "shared_pickle", "valued"]
 
 C = TypeVar("C", bound=type[Any])
 _PLAIN = frozenset({bool, float, int, str})
@@ -19,6 +19,24 @@ _MOST_SHARED = 4096
 """Records that came last and are kept to be found again."""
 _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
+
+
+class Record(NamedTuple):
+    """How a record is taken apart and made anew."""
+
+    fields: tuple[str, ...]
+    values: Callable[[Any], tuple[Any, ...]]
+    """Its fields' values."""
+    make: Callable[[list[Any]], Any] | None
+    """Finds or makes a shared one; None where its fields may be set, which passed all checks."""
+
+
+_records: dict[type[Any], Record] = {}
+
+
+def record_of(cls: type[Any]) -> Record | None:
+    """Return what is known of a class of `fast_pickle` or `shared_pickle`; None of any other."""
+    return _records.get(cls)
 
 
 def valued(cls: C) -> C:
@@ -59,6 +77,7 @@ def fast_pickle(cls: C) -> C:
         return cls, values(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
+    _records[cls] = Record(tuple(field.name for field in dataclasses.fields(cls)), values, None)
     return valued(cls)
 
 
@@ -76,7 +95,12 @@ def shared_pickle(cls: C) -> C:
         return (_found, (cls, *values(self))) if type(self) is cls else otherwise(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
+    _records[cls] = _records[cls]._replace(make=partial(_make_shared, cls))
     return cls
+
+
+def _make_shared(cls: Any, parts: list[Any]) -> object:  # noqa: ANN401 - a class
+    return _found(cls, *parts)
 
 
 @lru_cache(maxsize=_MOST_SHARED, typed=True)

@@ -41,10 +41,11 @@ def test_arrays_of_any_shape_come_back_equal(items: list[NDArray[Any]]) -> None:
 
 
 @pytest.mark.parametrize("vector", [np.array([1.0, -2.5, np.nan]), np.arange(6.0)[::2]])
-def test_a_short_vector_is_in_the_pickle_and_read_only(vector: NDArray[np.float64]) -> None:
-    """No buffer of its own, with its alignment, for 24 bytes; nobody changes it for the others."""
+def test_a_short_vector_has_no_buffer_and_is_read_only(vector: NDArray[np.float64]) -> None:
+    """Not one of its own, with its alignment, for 24 bytes; nobody changes it for the others."""
     data = Encoded(_message(vector)).to_bytes()
-    assert struct.unpack_from("<I", data) == (0,)
+    head, start = struct.unpack_from("<II", data)
+    assert len(data) == start == 8 + head
     restored = decode(memoryview(data)).item
     assert isinstance(restored, np.ndarray)
     np.testing.assert_array_equal(restored, vector)
@@ -62,3 +63,27 @@ def test_a_frame_is_a_view_of_the_buffer_and_read_only() -> None:
     assert frame.image[-1, -1, -1] == image[-1, -1, -1] ^ 0xFF
     with pytest.raises(ValueError, match="read-only"):
         frame.image[0, 0, 0] = 1
+
+
+@pytest.mark.parametrize(
+    ("part", "room", "fits"),
+    [(slice(None), 4096, True), (slice(None), 64, False), (slice(1, None), 4096, False)],
+)
+def test_a_message_is_written_around_an_array_that_is_there(
+    part: slice, room: int, *, fits: bool
+) -> None:
+    """If that is all of its first array, and the rest has room before it."""
+    whole = np.zeros(room + 200_000, np.uint8)
+    array = np.frombuffer(whole, np.uint8, 48 * 64 * 3, room)
+    image = array.reshape(48, 64, 3)
+    image[...] = np.arange(48 * 64 * 3, dtype=np.uint8).reshape(48, 64, 3)
+    depth = np.arange(48 * 64, dtype=np.uint16).reshape(48, 64)
+    frame = Frame(Header(0, 0, "c"), image[part], depth=depth[part])
+    encoded = Encoded(_message(frame))
+    size = encoded.size_around(array, room)
+    assert (size is not None) is fits
+    if size is not None:
+        encoded.write_into(whole.data, room)
+        assert decode(whole[:size].data).item == frame
+    assert encoded.size_around(image.copy().reshape(-1), room) is None
+    assert decode(memoryview(encoded.to_bytes())).item == frame
