@@ -8,6 +8,7 @@ each, and the medians over the rounds are shown. `pip install -e '.[benchmarks]'
 from __future__ import annotations
 
 import json
+import math
 import os
 import statistics
 import subprocess
@@ -34,6 +35,7 @@ from _latency_ours import (
     StampedVehicle,
     Steer,
 )
+from _latency_ray import frames_by_ray
 from _report import Report
 from ray.cluster_utils import Cluster
 from rich.progress import Progress
@@ -155,6 +157,14 @@ def measure_dora(seconds: float, folder: Path) -> Round:
     return Round(ages[-int(seconds * RATE) :], 100 * used)
 
 
+def measure_ray(seconds: float) -> Round:
+    """Send the same bytes to an actor on the other node, by a Ray call and nothing else."""
+    if not ray.is_initialized():
+        ray.init(address=os.environ["RAY_ADDRESS"], log_to_driver=False)
+    ages = frames_by_ray(int((_WARM_UP + seconds) * RATE), ("edge", "cloud"))
+    return Round(ages[-int(seconds * RATE) :], math.nan)
+
+
 def _add(report: Report, name: str, rounds: list[Round]) -> None:
     medians = [float(np.median(one.latencies)) for one in rounds]
     highs = [float(np.percentile(one.latencies, 99)) for one in rounds]
@@ -215,7 +225,7 @@ def main(
     theirs: list[Round] = []
     with tempfile.TemporaryDirectory() as name, Progress() as progress:
         folder = Path(name)
-        task = progress.add_task("measuring", total=rounds * (3 if dora else 2) + 1)
+        task = progress.add_task("measuring", total=rounds * (3 if dora else 2) + 2)
         for _ in range(rounds):
             for rounds_of, camera in ((ours, PatternCamera), (placed, PlacingPatternCamera)):
                 rounds_of.append(measure_ours(seconds, folder, camera=camera))
@@ -226,14 +236,17 @@ def main(
         ray.shutdown()
         with _two_nodes():
             far = [measure_ours(seconds, folder, far=True)]
-        progress.advance(task)
+            progress.advance(task)
+            by_ray = [measure_ray(seconds)]
+            progress.advance(task)
     _add(report, "AeroDaaS, one node", ours)
     _add(report, "AeroDaaS, captured where it is read", placed)
     if theirs:
         _add(report, "dora, one node", theirs)
         report.note(f"ours over dora's, medians of pairs: {_ratios(ours, theirs)}")
         report.note(f"captured where it is read: {_ratios(placed, theirs)}")
-    _add(report, "AeroDaaS, analysis on a second Ray node (ObjectRefs)", far)
+    _add(report, "AeroDaaS, analysis on a second Ray node", far)
+    _add(report, "Ray alone, a frame's bytes to a second node", by_ray)
     report.note("CPU: all processes of the system together, Ray's own included; 100 % = one core")
     report.show()
     if json_path is not None:

@@ -19,7 +19,7 @@ from typing import Annotated
 import _stamps
 import ray
 import typer
-from _latency_ours import HEIGHT, RATE, WIDTH
+from _latency_ours import HEIGHT, RATE, WIDTH, PlacingPatternCamera
 from _report import Report
 from latency import measure_ours
 
@@ -73,7 +73,7 @@ def main(
     """
     with tempfile.TemporaryDirectory() as name:
         os.environ[_stamps.FOLDER] = name
-        measured = measure_ours(seconds, Path(name))
+        measured = measure_ours(seconds, Path(name), camera=PlacingPatternCamera)
         ray.shutdown()
         stamps = _read(Path(name))
     worked = [stream for stream, steps in stamps.items() if "work" in steps and "encode" in steps]
