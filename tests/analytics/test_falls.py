@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,7 @@ def falling(time: float, *, forward: bool) -> Posture:
 
 @LENSES
 @given(turn=st.floats(-math.pi, math.pi), away=st.floats(1.6, 2.2), forward=st.booleans())
+@example(turn=0.4375, away=1.75, forward=False)  # past the edge, and gone
 @settings(max_examples=40)
 def test_a_fall_is_told_wherever_it_goes(
     camera: CameraModel, turn: float, away: float, *, forward: bool
@@ -346,6 +348,8 @@ def test_a_drone_that_moves_makes_nobody_fall(
 @given(course=st.floats(-math.pi, math.pi), speed=st.floats(0.3, 2.5), height=st.floats(0.8, 3.0))
 @example(course=3.0, speed=1.0, height=1.75)
 @example(course=3.08, speed=1.69, height=1.65)
+@example(course=3.0, speed=2.0, height=2.0)
+@example(course=3.0, speed=2.5, height=2.0)
 @settings(max_examples=40)
 def test_walking_out_of_the_picture_is_no_fall(
     camera: CameraModel, course: float, speed: float, height: float
@@ -377,3 +381,48 @@ def test_a_camera_that_knows_neither_height_nor_lens_tells_nothing() -> None:
     seen = Scene(TELLO).seen(0.0)
     blind = Detections(seen.header, seen.items, seen.width, seen.height)
     assert not FallDetector(0.35).shows(seen.items[0], blind)
+
+
+def test_a_fall_that_a_braking_drone_saw_five_times_a_second_is_told() -> None:
+    """As a flight recorded it: it begins between two frames, and ends at the lower edge."""
+    falls, told = FallDetector(0.35), []
+    for stamp, box, position, yaw, roll, pitch in _SEEN_BY_A_BRAKING_DRONE:
+        camera = replace(WIDE, mount=(0.1, 0.0, 0.08))
+        pose = Odometry(np.array(position), np.zeros(3), yaw, roll, pitch)
+        body = Detection(box, "person", 0.9)
+        header = Header(0, round(stamp * NANOSECONDS), "drone/cam")
+        if falls.shows(body, Detections(header, (body,), 640, 360, camera, pose)):
+            told.append(stamp)
+    assert told == [row[0] for row in _SEEN_BY_A_BRAKING_DRONE[3:]]
+
+
+def test_who_sits_down_on_the_ground_as_quickly_as_people_do_has_not_fallen() -> None:
+    """Slower than 1.3 m/s at every moment, though it begins and ends slowly."""
+    for rate in (5.0, 10.0, 30.0):
+        scene = Scene(WIDE, rate)
+        scene.place = lambda _: (3.0, 0.0)
+
+        def sink(time: float, scene: Scene = scene) -> float:
+            share = min(max((time - TURN_OFF) / 1.0, 0.0), 1.0)
+            return 0.46 * scene.tall * share * share * (3 - 2 * share)
+
+        scene.sink = sink
+        assert scene.play() == [], rate
+
+
+_SEEN_BY_A_BRAKING_DRONE = (
+    (120.8, (250, 69, 348, 326), (29.712, 0.402, 1.479), 0.483, -0.009, 0.076),
+    (121.0, (256, 59, 341, 287), (29.735, 0.434, 1.487), 0.511, -0.013, 0.111),
+    (121.2, (254, 74, 337, 282), (29.819, 0.459, 1.507), 0.543, -0.014, 0.131),
+    (121.4, (261, 191, 354, 346), (29.963, 0.564, 1.513), 0.569, -0.007, 0.023),
+    (121.6, (268, 285, 350, 360), (30.091, 0.638, 1.501), 0.605, -0.002, -0.118),
+    (121.8, (279, 290, 355, 360), (30.159, 0.688, 1.490), 0.627, 0.001, -0.127),
+    (122.0, (282, 280, 366, 360), (30.207, 0.707, 1.492), 0.648, 0.004, -0.102),
+    (122.2, (287, 270, 375, 360), (30.221, 0.689, 1.497), 0.659, 0.001, -0.068),
+    (122.4, (289, 260, 384, 359), (30.213, 0.699, 1.509), 0.668, 0.016, -0.041),
+    (122.6, (291, 250, 388, 359), (30.163, 0.663, 1.494), 0.667, 0.002, -0.027),
+    (122.8, (293, 243, 390, 360), (30.151, 0.638, 1.487), 0.667, 0.004, -0.003),
+    (123.0, (293, 237, 389, 360), (30.123, 0.659, 1.502), 0.674, 0.001, 0.001),
+    (123.2, (292, 236, 387, 359), (30.093, 0.635, 1.529), 0.673, 0.001, -0.006),
+)
+"""Seconds; the box; the drone's position, yaw, roll and pitch."""

@@ -30,9 +30,9 @@ _LOW = 1.1
 lengthwise before the camera, as its far end is above its near end in the image."""
 
 _SEEN, _GONE = (0.5, 1.3), (0.2, 1.0)
-"""Least drop of a falling body's top in metres, and its speed in m/s: sitting down or bending is
-slower than 1.3 m/s (Bourke, O'Donovan and O'Laighin, Medical Engineering & Physics 30, 2008). Less
-suffices for a person who is out of the image in the next frame."""
+"""Least drop of a falling body's top in metres, and its greatest speed on the way in m/s: sitting
+down or bending is slower than 1.3 m/s (Bourke, O'Donovan and O'Laighin, Medical Engineering &
+Physics 30, 2008). Less suffices for a person who is out of the image in the next frame."""
 
 _FLAT = 0.48
 """Share of the standing height below which a body lies, however slowly it sank, or between however
@@ -47,12 +47,19 @@ _CHEST = 1.2
 _CUT = 0.03
 """Distance of a box from an edge, in heights or widths of the image, within which it is cut off."""
 
-_FASTEST = 2.0
+_SLENDER = 1.5
+"""Widths in its height from which what is left of a body beside an edge is upright. A body that
+falls past the edge is wider."""
+
+_FASTEST = 2.5
 """Greatest speed in m/s at which a person whose feet are below the image may come nearer: who
 walks up to a camera above their head sinks in the image, too."""
 
 _NEAREST = 0.3
 """Metres from the camera nearer than which nobody stands."""
+
+_NARROWEST = 0.25
+"""Least width in metres of a person, from the side: who is near is wide in the image."""
 
 _LOWEST = 0.5
 """Least height of the camera in metres: the error of a box's lower edge is a share of the body, and
@@ -97,7 +104,7 @@ class FallDetector:
         """Recent standing positions, metres east, north and up of home."""
         self._looks: deque[_Look] = deque(maxlen=_KEPT)
         self._stature = 0.0
-        """Height of the body's top when it last stood, metres."""
+        """Height of the body's top when it last stood, metres; not while it already sank."""
         self._stood = 0
         self._fell = False
 
@@ -146,8 +153,8 @@ class FallDetector:
             top = max(top, self._looks[-1].top)
         self._stood = seen.header.stamp
         self._places.append(place)
-        self._stature = top
         self._look(body, self._stood, top)
+        self._stature = max(look.top for look in self._recent())
         return True
 
     def _standing_at(self, body: Detection, seen: Detections, view: GroundView) -> Array | None:
@@ -161,9 +168,7 @@ class FallDetector:
 
     def _feet(self, seen: Detections) -> Array:
         """Median standing position, metres in the level body frame (forward, left)."""
-        assert seen.odometry is not None  # noqa: S101 - a view has one
-        way = np.median(self._places, axis=0) - seen.odometry.position
-        return enu_to_body(way, seen.odometry.yaw)[:2]
+        return _from_drone(np.median(self._places, axis=0), seen)
 
     def _top(self, body: Detection, feet: Array, seen: Detections, view: GroundView) -> float:
         """Height of a body's top that stands, or fell, at `feet`."""
@@ -172,9 +177,11 @@ class FallDetector:
             return view.height_above(_end_of(body, view), crown)
         top = view.height_above(feet, crown)
         if not self._fell:
-            away = max(_NEAREST, np.hypot(*feet))
+            # Not the median, which lags behind who walks.
+            last = _from_drone(self._places[-1], seen)
+            away = max(_NEAREST, np.hypot(*last))
             walked = _FASTEST * seconds(seen.header.stamp - self._stood)
-            nearest = feet * max(_NEAREST, away - walked) / away
+            nearest = last * max(_nearest(body, seen), away - walked) / away
             if view.height_above(nearest, crown) >= self._stature - _TALLER:
                 return max(top, self._stature)
         return top
@@ -184,13 +191,23 @@ class FallDetector:
         self.last = body
 
     def _sinks(self, least: float, speed: float) -> bool:
-        """Whether the body sank by `least` metres at `speed` m/s up to the last observation."""
-        *earlier, now = self._looks
+        """Whether the body sank by `least` metres up to now, at `speed` m/s on the way."""
+        now, *earlier = reversed(self._recent())
+        later, fastest = [now], 0.0
         for look in earlier:
-            span, drop = seconds(now.stamp - look.stamp), look.top - now.top
-            if _SPAN[0] <= span <= _SPAN[1] and drop >= max(least, speed * span):
+            for after in later:
+                span = seconds(after.stamp - look.stamp)
+                if span >= _SPAN[0]:
+                    fastest = max(fastest, (look.top - after.top) / span)
+            if look.top - now.top >= least and fastest >= speed:
                 return True
+            later.append(look)
         return False
+
+    def _recent(self) -> list[_Look]:
+        """The observations of the last second, which are compared."""
+        newest = self._looks[-1].stamp
+        return [look for look in self._looks if seconds(newest - look.stamp) <= _SPAN[1]]
 
     def _forget_by(self, stamp: int) -> None:
         """Reset if the last observation is too old at `stamp`, or if time ran backwards."""
@@ -209,6 +226,12 @@ def _view_of(seen: Detections) -> GroundView | None:
     return view if view.height >= _LOWEST else None
 
 
+def _from_drone(place: Array, seen: Detections) -> Array:
+    """A place, metres in the level body frame (forward, left)."""
+    assert seen.odometry is not None  # noqa: S101 - a view has one
+    return enu_to_body(place - seen.odometry.position, seen.odometry.yaw)[:2]
+
+
 def _crown(body: Detection) -> Array:
     """Pixel at the middle of the box's upper edge."""
     left, top, right, _ = body.box
@@ -220,6 +243,13 @@ def _end_of(body: Detection, view: GroundView) -> Array:
     left, _, right, bottom = body.box
     (point,) = view.points(np.array([[(left + right) / 2, bottom]]))
     return np.asarray(point)
+
+
+def _nearest(body: Detection, seen: Detections) -> float:
+    """Metres from the camera nearer than which this body cannot stand, as wide as it appears."""
+    left, _, right, _ = body.box
+    assert seen.camera is not None  # noqa: S101 - a view has one
+    return max(_NEAREST, _NARROWEST * seen.camera.fx / max(right - left, 1.0))
 
 
 def _is_there(body: Detection, seen: Detections, feet: Array, view: GroundView) -> bool:
@@ -241,11 +271,11 @@ def _is_cut(body: Detection, seen: Detections) -> bool:
 def _hides_top(body: Detection, seen: Detections) -> bool:
     """Whether the image cuts off the body's top, so that it is unknown.
 
-    The upper edge does; and a side does, of a body that is upright: an arm and a leg remain.
+    The upper edge does; and a side does, of a body that is slender: an arm and a leg remain.
     """
     left, top, right, bottom = body.box
     if top <= _CUT * seen.height:
         return True
     edge = _CUT * seen.width
     beside = left <= edge or right >= seen.width - edge
-    return beside and bottom - top > right - left
+    return beside and bottom - top > _SLENDER * (right - left)
