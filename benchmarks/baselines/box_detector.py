@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 MODELS = Path(__file__).resolve().parents[2] / "aerodaas/analytics/models"
 NAMES = ("vest", "person", "car", "tower")
-ROWS, COLUMNS = 256, 384
+ROWS, COLUMNS, STRIDE = 256, 384, 32
 OVERLAP = 0.45
 
 
@@ -59,20 +59,21 @@ class BoxDetector:
         height, width = image.shape[:2]
         ratio = min(ROWS / height, COLUMNS / width)
         inner = cv2.resize(image, (round(width * ratio), round(height * ratio)))
-        top, left = (ROWS - inner.shape[0]) // 2, (COLUMNS - inner.shape[1]) // 2
-        padded = np.full((ROWS, COLUMNS, 3), 114, np.uint8)
+        rows, columns = (-(-side // STRIDE) * STRIDE for side in inner.shape[:2])
+        top, left = (rows - inner.shape[0]) // 2, (columns - inner.shape[1]) // 2
+        padded = np.full((rows, columns, 3), 114, np.uint8)
         padded[top : top + inner.shape[0], left : left + inner.shape[1]] = inner
         padded = padded if rgb else padded[:, :, ::-1]
         pixels = padded.transpose(2, 0, 1)[None].astype(np.float32) / 255
         (output,) = self.network.run(None, {"images": pixels})
-        rows = output[0].T
-        corners = np.hstack([rows[:, :2] - rows[:, 2:4] / 2, rows[:, :2] + rows[:, 2:4] / 2])
+        cells = output[0].T
+        corners = np.hstack([cells[:, :2] - cells[:, 2:4] / 2, cells[:, :2] + cells[:, 2:4] / 2])
         corners = (corners - [left, top, left, top]) / ratio
         corners = corners.clip(0, [width, height, width, height])
         sizes = np.hstack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
         found = {}
         for number, name in enumerate(NAMES):
-            scores = rows[:, 4 + number]
+            scores = cells[:, 4 + number]
             kept = cv2.dnn.NMSBoxes(sizes.tolist(), scores.tolist(), self.score, OVERLAP)
             found[name] = [Box(float(scores[one]), *map(float, corners[one])) for one in kept]
         return found

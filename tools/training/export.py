@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import onnx
@@ -18,7 +19,13 @@ from tools.training.yolox import CAR, PERSON, FrozenYolox
 __all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "fused", "save_onnx"]
 
 SIZE = (256, 384)
-"""Height and width of the input, between 4:3 and 16:9: either leaves a seventh of it empty."""
+"""Height and width of the input at most, between 4:3 and 16:9: either leaves a seventh of it empty.
+
+The file takes any multiples of 32 instead, so that nothing need be spent on what is empty.
+"""
+
+_AXES = {"images": {2: "height", 3: "width"}, "output0": {2: "boxes"}}
+"""Names of the axes that vary."""
 
 NOMINAL_SCORE = 0.3
 """What a score at the best threshold is turned into, so that one threshold suits all classes."""
@@ -35,7 +42,6 @@ class _Detector(nn.Module):
     ) -> None:
         super().__init__()
         self.frozen, self.network = frozen, network
-        self.centres, self.strides = anchors_of(SIZE)
         shifts = [_logit(NOMINAL_SCORE) - _logit(threshold) for threshold in thresholds]
         self.shifts = torch.tensor(shifts)[None, :, None]
 
@@ -44,14 +50,17 @@ class _Detector(nn.Module):
         features = self.frozen.features(pixels)
         own = self.frozen.own(features)  # first: `released_weights` reads the file in this order
         raw, logits = self.network(features)
-        boxes = _centred(decode_boxes(raw, self.centres, self.strides))
+        height, width = pixels.shape[2:]
+        anchors = anchors_of((height, width))
+        boxes = _centred(decode_boxes(raw, *anchors))
         learnt = torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
-        return torch.cat([learnt, self._released(own)], 2)
+        return torch.cat([learnt, self._released(own, *anchors)], 2)
 
-    def _released(self, levels: list[Tensor]) -> Tensor:
+    @staticmethod
+    def _released(levels: list[Tensor], cells: Tensor, strides: Tensor) -> Tensor:
         rows = torch.cat([level.flatten(2) for level in levels], 2)
-        centres = (rows[:, :2] - 0.5) * self.strides + self.centres
-        sizes = rows[:, 2:4].exp() * self.strides
+        centres = (rows[:, :2] - 0.5) * strides + cells
+        sizes = rows[:, 2:4].exp() * strides
         objectness, kinds = rows[:, 4:5], rows[:, 5:]
         scores = [torch.zeros_like(objectness)] * len(DETECTOR_CLASSES)
         for name, numbers in _RELEASED.items():
@@ -106,7 +115,7 @@ def export_detector(
     if kept is not None:
         mix(network, *kept)
     detector = _Detector(frozen, network, thresholds)
-    save_onnx(detector, path, ("images", "output0"), picture, metadata)
+    save_onnx(detector, path, ("images", "output0"), picture, metadata, axes=_AXES)
 
 
 def _load(weights: Path) -> DetectorNetwork:
@@ -123,11 +132,11 @@ def save_onnx(
     example: Tensor,
     metadata: dict[str, str],
     *,
-    varying: bool = False,
+    axes: Mapping[str, Mapping[int, str]],
 ) -> None:
     """Write `model` with one input and one output, called `ports`, and `metadata`.
 
-    `varying`: the first axis of both is free.
+    `axes` names those of each port whose length is free.
     """
     torch.onnx.export(
         model.eval(),
@@ -135,11 +144,16 @@ def save_onnx(
         str(path),
         input_names=[ports[0]],
         output_names=[ports[1]],
-        dynamic_axes={port: {0: "count"} for port in ports} if varying else None,
+        dynamic_axes=axes,
         opset_version=17,
         dynamo=False,
     )
     file = onnx.load(str(path))
+    # What the export does not infer of the output's shape the example shows.
+    shape = file.graph.output[0].type.tensor_type.shape.dim
+    for number, (axis, length) in enumerate(zip(shape, model(example).shape, strict=True)):
+        if number not in axes.get(ports[1], {}):
+            axis.dim_value = length
     properties = {
         "description": "AeroDaaS, trained on rendered pictures",
         "author": "AeroDaaS",

@@ -80,9 +80,9 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
     card = Card(
         "Detector",
         "Finds hazard vests, people, cars and lattice towers. Ultralytics layout, detect: "
-        f"1 x 8 x 4032 for {SIZE[1]} x {SIZE[0]} pixels. Scores of what is learnt from renders are "
-        f"shifted, class by class, so that {NOMINAL_SCORE} leaves two boxes in a hundred rendered "
-        "pictures beside everything.",
+        f"1 x 8 x 4032 for {SIZE[1]} x {SIZE[0]} pixels; sides may be any multiples of 32. Scores "
+        f"of what is learnt from renders are shifted, class by class, so that {NOMINAL_SCORE} "
+        "leaves two boxes in a hundred rendered pictures beside everything.",
         _recipe_rows(places, recipe),
     )
     card.figures["Held-out pictures"] = f"{len(test)}, of other worlds; things of 8 pixels and more"

@@ -38,5 +38,5 @@ def export_pose(weights: Path, path: Path) -> None:
         ("cuts", "keypoints"),
         torch.zeros(1, 3, CUT, CUT),
         {"task": "keypoints", "imgsz": str([CUT, CUT])},
-        varying=True,
+        axes={port: {0: "count"} for port in ("cuts", "keypoints")},
     )

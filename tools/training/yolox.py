@@ -26,6 +26,9 @@ PERSON, CAR = (0,), (2, 5, 7)
 """COCO's classes that its own head is asked for; cars, buses and trucks are one."""
 
 _STAGES = (16, 32, 64, 128, 256)
+_FOCUS = (2, 2, 3, 3, 3)
+"""Column and row in 2 x 2 pixels, colour, row and column of the kernel."""
+_SPREAD = (16, 3, 6, 6)
 _HEAD = 64
 _KINDS = 80
 
@@ -150,9 +153,10 @@ class FrozenYolox(nn.Module):
 
     def features(self, images: Tensor) -> Features:
         """See `images` (b, 3, rows, columns), RGB from 0 to 1, sides multiples of 32."""
-        pixels = images.flip(1) * 255.0
-        corners = [pixels[..., v::2, u::2] for u, v in ((0, 0), (0, 1), (1, 0), (1, 1))]
-        stride4 = self.stage4(self.focus(torch.cat(corners, 1)))
+        focus = functional.conv2d(
+            images * 255.0, _spread(self.focus.conv.weight), self.focus.conv.bias, 2, 2
+        )
+        stride4 = self.stage4(functional.silu(focus))
         stride8 = self.stage8(stride4)
         stride16 = self.stage16(stride8)
         stride32 = self.stage32(stride16)
@@ -167,6 +171,23 @@ class FrozenYolox(nn.Module):
         """Its own answers (b, 85, rows, columns) at strides 8, 16 and 32."""
         levels = (features.neck8, features.neck16, features.neck32)
         return [head(level) for head, level in zip(self.heads, levels, strict=True)]
+
+
+def _spread(weight: Tensor) -> Tensor:
+    """Megvii's first kernel (n, 12, 3, 3) as one of plain RGB pixels (n, 3, 6, 6), by strides of 2.
+
+    Theirs takes the pixels of 2 x 2 side by side, BGR. The sums are the same, and no picture has to
+    be rearranged.
+    """
+    parts = weight.reshape(-1, *_FOCUS).permute(0, 3, 4, 2, 5, 1).reshape(-1, 3, 6, 6)
+    # Not flipped, which an export would leave to be done for each picture.
+    return torch.cat([parts[:, 2:], parts[:, 1:2], parts[:, :1]], 1)
+
+
+def _gathered(kernel: Tensor) -> Tensor:
+    """Undo `_spread`."""
+    parts = kernel.flip(1).reshape(-1, 3, 3, 2, 3, 2).permute(0, 5, 3, 1, 2, 4)
+    return parts.reshape(-1, 12, 3, 3)
 
 
 def _doubled(x: Tensor) -> Tensor:
@@ -189,6 +210,8 @@ def released_weights(path: Path) -> FrozenYolox:
     for number, (conv, (_, *names)) in enumerate(zip(convs, found, strict=False)):
         for parameter, name in zip((conv.weight, conv.bias), names, strict=True):
             value = torch.from_numpy(numpy_helper.to_array(constants[name]).copy())
+            if value.shape == _SPREAD:
+                value = _gathered(value)
             if parameter is None or value.shape != parameter.shape:
                 raise ValueError(f"{path} is not made of YOLOX-nano: convolution {number} differs")
             parameter.data.copy_(value)

@@ -34,6 +34,8 @@ _log = logging.getLogger(__name__)
 _MOST_CANDIDATES = 1000
 _MOST_DETECTIONS = 300
 _WARM_UP_RUNS = 2
+_USUAL_FRAMES = ((720, 1280), (720, 960))
+"""Height and width of frames for which a network of variable size is warmed up: 16:9 and 4:3."""
 
 
 class _Desk(threading.local):
@@ -151,11 +153,16 @@ class OnnxDetector(Analytics[Detections]):
         return twin
 
     def open(self) -> None:
-        """Create the session and warm it up, so that the mission's first frame is not slow."""
+        """Create the session and warm it up, so that the mission's first frame is not slow.
+
+        On a GPU what is made for one size of input is made again for another.
+        """
         self._session = open_session(self._content, self.path, self.providers, self.threads)
-        blank = np.zeros((1, 3, *self.size), self._dtype)
-        for _ in range(_WARM_UP_RUNS):
-            self.infer(blank)
+        for frame in _USUAL_FRAMES:
+            letterbox = Letterbox(frame, self.size, self.style, flexible=self._flexible)
+            blank = letterbox.buffer(1, self._dtype)
+            for _ in range(_WARM_UP_RUNS):
+                self.infer(blank)
 
     def close(self) -> None:
         """Release the session, and log the numbers of dropped outputs and boxes."""

@@ -2,9 +2,9 @@
 
 They are trained by `tools.training` on rendered images alone, the detector on the features of
 YOLOX-nano, which learnt from photographs and whose notice is in `NOTICE.md`. `detector.md` and
-`pose.md` describe the training and the accuracy. The detector takes 384 x 256 pixels and has the
-layout of Ultralytics exports, so that `OnnxDetector` and other tools load it; the pose model takes
-crops around people, which `PoseAnalytics` makes.
+`pose.md` describe the training and the accuracy. The detector takes up to 384 x 256 pixels and
+has the layout of Ultralytics exports, so that `OnnxDetector` and other tools load it; the pose
+model takes crops around people, which `PoseAnalytics` makes.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -35,12 +36,19 @@ def plain_suppression(boxes: list[Box], iou: float) -> list[Box]:
 
 
 def plain_ultralytics(model: Path, image: NDArray[np.uint8], least: float) -> list[Box]:
-    """As ultralytics' LetterBox and non_max_suppression do it, one anchor at a time."""
+    """As ultralytics' LetterBox and non_max_suppression do it, one anchor at a time.
+
+    An input of variable size is padded to the next multiples of 32 (LetterBox's `auto`).
+    """
     session = ort.InferenceSession(str(model), providers=["CPUExecutionProvider"])
-    rows, columns = session.get_inputs()[0].shape[2:]
+    rows, columns = declared = session.get_inputs()[0].shape[2:]
+    if isinstance(rows, str):
+        rows, columns = json.loads(session.get_modelmeta().custom_metadata_map["imgsz"])
     height, width = image.shape[:2]
     ratio = min(rows / height, columns / width)
     new_width, new_height = round(width * ratio), round(height * ratio)
+    if isinstance(declared[0], str):
+        rows, columns = -(-new_height // 32) * 32, -(-new_width // 32) * 32
     resized = cv2.resize(image, (new_width, new_height), interpolation=cv2.INTER_LINEAR)
     top, left = (rows - new_height) / 2, (columns - new_width) / 2
     padded = cv2.copyMakeBorder(

@@ -140,6 +140,26 @@ def test_dynamic_shapes_take_batches_and_leave_out_padding(tmp_path: Path) -> No
     assert detector.detect([bright])[0].items == results[1].items
 
 
+class _Noted(OnnxDetector):
+    """Notes the sizes that it runs with."""
+
+    def infer(self, pixels: NDArray[Any]) -> list[NDArray[Any]]:
+        """Note, and run."""
+        self.sizes = {*getattr(self, "sizes", ()), pixels.shape[2:]}
+        return super().infer(pixels)
+
+
+def test_warming_up_takes_inputs_of_a_cameras_form(tmp_path: Path) -> None:
+    """What is made ready for one size, as on a GPU, is made again at the first frame of another."""
+    detector = _Noted(patchwork_model(tmp_path / "a.onnx", classes=80), size=256)
+    detector.open()
+    assert detector.sizes == {(160, 256), (192, 256)}, "16:9 and 4:3"
+    path = patchwork_model(tmp_path / "b.onnx", classes=80, shape=(1, 3, 256, 256))
+    fixed = _Noted(path)
+    fixed.open()
+    assert fixed.sizes == {(256, 256)}
+
+
 def query_boxes() -> NDArray[np.float32]:
     """Centre, width and height of 30 queries as fractions of the input; the third is a thing's."""
     boxes = np.random.default_rng(3).uniform(0.3, 0.6, (30, 4)).astype(np.float32)

@@ -75,15 +75,19 @@ def test_features_are_those_that_are_promised(frozen: FrozenYolox) -> None:
     ]
 
 
+@pytest.mark.parametrize("size", [SIZE, (224, 384), (256, 352)])
 def test_people_and_vehicles_of_its_own_head_are_listed(
-    frozen: FrozenYolox, tmp_path: Path
+    frozen: FrozenYolox, tmp_path: Path, size: tuple[int, int]
 ) -> None:
-    """Behind what is learnt, with its own scores, cell by cell; nothing else has any."""
+    """Behind what is learnt, with its own scores, cell by cell; nothing else has any.
+
+    Pictures of any size, in the same file.
+    """
     torch.manual_seed(0)
     torch.save(DetectorNetwork().state_dict(), tmp_path / "weights.pt")
     path = tmp_path / "detector.onnx"
     export_detector(frozen, tmp_path / "weights.pt", path, [0.3] * len(DETECTOR_CLASSES))
-    picture = np.random.default_rng(1).random((1, 3, *SIZE), np.float32)
+    picture = np.random.default_rng(1).random((1, 3, *size), np.float32)
     listed = answer(path, picture)[0]
     cells = listed.shape[1] // 2
     row = 0
