@@ -70,13 +70,19 @@ def test_one_that_fails_is_told_and_the_others_run(
 ) -> None:
     """By name, with its last line; the figures of the others are written."""
     out = tmp_path / "new" / "results.json"
-    suite = [Benchmark("hop", ("--nonsense",)), Benchmark("decision", QUICK)]
+    suite = [
+        Benchmark("hop", ("--nonsense",)),
+        Benchmark("lab", ("--help",)),
+        Benchmark("decision", QUICK),
+    ]
     done = invoke(monkeypatch, suite, "--json", str(out))
     assert done.exit_code == 1
+    assert "lab failed: it wrote no figures" in done.output
     assert "hop failed: No such option: --nonsense" in done.output
     assert "edf 5" in done.output
     found = json.loads(out.read_text())
-    assert found["failed"] == {"hop": "No such option: --nonsense"}
+    failed = {"hop": "No such option: --nonsense", "lab": "it wrote no figures"}
+    assert found["failed"] == failed
     assert list(found["benchmarks"]) == ["decision"]
     assert found["benchmarks"]["decision"]["reports"][0]["units"]["mean"] == "us"
     assert {"made", "revision", "machine", "load", "versions", "seconds"} < found.keys()
