@@ -119,11 +119,37 @@ def test_only_those_named_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     suite = [Benchmark("hop", ("--nonsense",)), Benchmark("decision", QUICK)]
     done = invoke(monkeypatch, suite, "--only", "decision", "--json", str(out))
     assert done.exit_code == 0
-    assert list(json.loads(out.read_text())["benchmarks"]) == ["decision"]
+    found = json.loads(out.read_text())
+    assert list(found["benchmarks"]) == ["decision"]
+    assert found["left_out"] == found["without"] == found["failed"] == {}
     for name, told in (("nothing", "decision"), ("paper", "benchmarks/paper.py")):
         refused = invoke(monkeypatch, suite, "--only", name)
         assert refused.exit_code == 2
         assert told in refused.output
+
+
+def test_a_busy_machine_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One on which others wanted to run when it began."""
+    for load, told in ((3.0, True), (0.1, False)):
+        monkeypatch.setattr(suite_run.psutil, "getloadavg", lambda load=load: (load, 0.0, 0.0))
+        done = invoke(monkeypatch, [Benchmark("decision", QUICK)])
+        assert ("not a quiet machine: 3 processes" in done.output) is told
+
+
+def test_further_files_come_after_the_first(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Whatever their names: some benchmarks write two."""
+
+    def wrote(words: list[str], said: Path) -> int:
+        said.touch()
+        first = Path(words[-1])
+        for path, content in ((first.with_stem(f"{first.stem}-more"), 2), (first, 1)):
+            path.write_text(json.dumps(content), encoding="utf-8")
+        return 0
+
+    monkeypatch.setattr(suite_run, "_end_of", wrote)
+    assert suite_run.run(Benchmark("routes"), tmp_path / "routes").reports == [1, 2]
 
 
 def test_a_benchmark_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -204,18 +230,24 @@ def test_aims_are_shown_with_whether_they_are_met(monkeypatch: pytest.MonkeyPatc
     assert "p99 at most 0.5 (0.5 of rival): not measured" in text
     assert "1 of 2 aims met" in text
     assert "nothing to compare with" in text
+    assert f"factor at least 30: {GREEN}met" in printed(results(factor=30.0), None)
     rival = {"case": "rival", "median": 1.0, "factor": 1.0, "p99": 4.0}
     now["benchmarks"]["latency"]["reports"][0]["rows"].append(rival)
     assert f"p99 at most 2 (0.5 of rival): {GREEN}met" in printed(now, None)
 
 
 def test_rows_of_one_name_are_no_figures() -> None:
-    """One would take the other's place."""
+    """One would take the other's place: the benchmark has failed, and is not in the results."""
     twice = results(median=1.0)
     rows = twice["benchmarks"]["latency"]["reports"][0]["rows"]
     rows.append(copy.copy(rows[0]))
     with pytest.raises(ValueError, match="latency has two rows 'one node'"):
         figures(twice)
+    reports = [{**report, "versions": {}} for report in twice["benchmarks"]["latency"]["reports"]]
+    found: dict[str, Any] = {"benchmarks": {}, "failed": {}, "versions": {}}
+    suite_run._add(found, Benchmark("latency"), suite_run.Outcome(1.0, reports))
+    assert found["failed"] == {"latency": "latency has two rows 'one node'"}
+    assert found["benchmarks"] == {}
 
 
 def test_the_committed_results_are_those_of_the_last_commit(tmp_path: Path) -> None:
