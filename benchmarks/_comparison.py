@@ -29,7 +29,7 @@ _NOISE = 0.1
 """Share by which a figure may differ without being coloured: short runs are no more certain."""
 _COUNTED = frozenset(("", "k", "frames", "files", "lines", "1000 lines", "asked for", "a frame"))
 """Units of what is counted, and is neither better nor worse for being more."""
-_NEITHER = frozenset(("simulated", "fullest", "link", "analysis", "bare ort"))
+_NEITHER = frozenset(("simulated", "link", "analysis", "bare ort"))
 """Figures that say what was measured, not how well."""
 _MORE_IS_BETTER = frozenset(("factor", "speed-up", "rate", "within 5 ms", "within 20 ms"))
 

@@ -134,7 +134,7 @@ def run_all(chosen: list[Benchmark]) -> Results:
     }
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with (
-        tempfile.TemporaryDirectory(prefix="bench-", dir="/tmp") as name,
+        tempfile.TemporaryDirectory(prefix="bench-") as name,
         Progress(*columns, TimeElapsedColumn(), transient=True) as progress,
     ):
         task = progress.add_task("", total=len(running))

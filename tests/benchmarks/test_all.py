@@ -202,6 +202,16 @@ def test_ratios_are_coloured_by_what_is_better() -> None:
     assert "latency no longer measures all of: one node" in text
 
 
+def test_what_is_counted_or_given_is_neither_better_nor_worse() -> None:
+    """More frames, or a longer flight that was simulated, have a ratio without a colour."""
+    now, before = results(seen=2.0, simulated=2.0), results(seen=1.0, simulated=1.0)
+    for one in (now, before):
+        one["benchmarks"]["latency"]["reports"][0]["units"]["seen"] = "frames"
+    text = printed(now, before)
+    assert text.count("x2.00") == 2
+    assert RED not in text
+
+
 def test_ratios_between_machines_and_units_mean_little() -> None:
     """Another machine's are told as such and have no colour; other units are not compared."""
     before = results(median=1.0)
