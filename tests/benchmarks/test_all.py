@@ -214,11 +214,12 @@ def test_what_is_counted_or_given_is_neither_better_nor_worse() -> None:
 
 def test_ratios_between_machines_and_units_mean_little() -> None:
     """Another machine's are told as such and have no colour; other units are not compared."""
-    before = results(median=1.0)
-    before["machine"]["cores"] = 64
-    text = printed(results(median=2.0), before)
-    assert "x2.00" in text
-    assert RED not in text
+    for what, value in (("cpu", "another processor"), ("cores", 64)):
+        before = results(median=1.0)
+        before["machine"][what] = value
+        text = printed(results(median=2.0), before)
+        assert "x2.00" in text
+        assert RED not in text
     assert "another machine, so that ratios mean little: a processor, 64 cores" in text
     other = results(median=1.0)
     other["benchmarks"]["latency"]["reports"][0]["units"]["median"] = "us"
@@ -271,6 +272,7 @@ def test_the_committed_results_are_those_of_the_last_commit(tmp_path: Path) -> N
     subprocess.run([*git, "add", "results.json"], check=True)
     subprocess.run([*git, "commit", "--quiet", "--message", "one"], check=True)
     path.write_text(json.dumps(results(median=2.0)), encoding="utf-8")
+    subprocess.run([*git, "add", "results.json"], check=True)
     assert committed(path) == results(median=1.0)
 
 
