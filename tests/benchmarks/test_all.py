@@ -131,7 +131,7 @@ def test_only_those_named_are_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 def test_a_busy_machine_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """One on which others wanted to run when it began."""
     for load, told in ((3.0, True), (0.1, False)):
-        monkeypatch.setattr(suite_run.psutil, "getloadavg", lambda load=load: (load, 0.0, 0.0))
+        monkeypatch.setattr(psutil, "getloadavg", lambda load=load: (load, 0.0, 0.0))
         done = invoke(monkeypatch, [Benchmark("decision", QUICK)])
         assert ("not a quiet machine: 3 processes" in done.output) is told
 
@@ -149,7 +149,8 @@ def test_further_files_come_after_the_first(
         return 0
 
     monkeypatch.setattr(suite_run, "_end_of", wrote)
-    assert suite_run.run(Benchmark("routes"), tmp_path / "routes").reports == [1, 2]
+    reports: list[Any] = suite_run.run(Benchmark("routes"), tmp_path / "routes").reports
+    assert reports == [1, 2]
 
 
 def test_a_benchmark_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
