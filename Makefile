@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SLOWEST := $(if $(CI),--durations=25 --durations-min=20)
 
-.PHONY: fly test lint mypy pyright docs console training lock audit licences matrix clean
+.PHONY: fly test bench lint mypy pyright docs console training lock audit licences matrix clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
@@ -17,6 +17,10 @@ CLOCK := slow and wall_clock
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not ($(CLOCK)),not slow)" $(SLOWEST)
 	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "$(CLOCK)" $(SLOWEST))
+
+# Speed and size beside what was committed last; the machine must have nothing else to do.
+bench: $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/all.py --json benchmarks/results.json
 
 # The two type checkers, which take minutes, side by side.
 lint: $(VENV)/.installed-dev

@@ -22,7 +22,7 @@ from rich.table import Table
 
 from aerodaas.recording.provenance import processor_name
 
-__all__ = ["Report", "machine_line", "plain"]
+__all__ = ["Report", "machine", "machine_line", "plain", "revision", "shown", "wide_enough"]
 
 _WIDEST = 400
 _ROOT = Path(__file__).resolve().parent.parent
@@ -67,12 +67,8 @@ class Report:
         for figure, unit in self.units.items():
             table.add_column(f"{figure}\n{unit}", justify="right", no_wrap=True)
         for case, figures in self.rows:
-            table.add_row(case, *map(_shown, figures.values()))
-        console = Console()
-        # A figure cut short is worth nothing: a narrow terminal wraps instead.
-        wide = Console(width=_WIDEST)
-        whole = Measurement.get(wide, wide.options, table).maximum
-        console.width = max(console.width, whole)
+            table.add_row(case, *map(shown, figures.values()))
+        console = wide_enough(table)
         console.print(table)
         for text in self.notes:
             console.print(text)
@@ -87,8 +83,8 @@ class Report:
         return {
             "benchmark": self.name,
             "made": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-            "revision": _revision(),
-            "machine": _machine(),
+            "revision": revision(),
+            "machine": machine(),
             "versions": {name: importlib.metadata.version(name) for name in self.packages}
             | {"python": platform.python_version()},
             "command": sys.argv,
@@ -101,7 +97,15 @@ class Report:
         }
 
 
-def _shown(value: float) -> str:
+def wide_enough(table: Table) -> Console:
+    """A console that cuts no figure of `table` short, which is worth nothing: it wraps instead."""
+    console, wide = Console(), Console(width=_WIDEST)
+    console.width = max(console.width, Measurement.get(wide, wide.options, table).maximum)
+    return console
+
+
+def shown(value: float) -> str:
+    """The value by three digits, or a dash for NaN."""
     return "-" if math.isnan(value) else f"{value:.3g}"
 
 
@@ -110,7 +114,8 @@ def plain(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def _machine() -> dict[str, Any]:
+def machine() -> dict[str, Any]:
+    """What of this machine the figures go by."""
     return {
         "cpu": processor_name(),
         "cores": len(os.sched_getaffinity(0)),
@@ -119,12 +124,13 @@ def _machine() -> dict[str, Any]:
     }
 
 
-def machine_line() -> str:
-    machine = _machine()
-    return f"{machine['cpu']}, {machine['cores']} cores, {machine['memory_gib']} GiB"
+def machine_line(of: Mapping[str, Any] | None = None) -> str:
+    """This machine, or another one as `machine` gives it, in a line."""
+    known = of or machine()
+    return f"{known['cpu']}, {known['cores']} cores, {known['memory_gib']} GiB"
 
 
-def _revision() -> str:
+def revision() -> str:
     """The git revision, with a mark if the tree differs from it; "unknown" outside git."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:

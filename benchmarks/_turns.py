@@ -35,7 +35,9 @@ class _Controller(VehicleController):
 class _Nowhere:
     """A publisher without readers."""
 
-    sent = 0
+    def __init__(self, stream: str) -> None:
+        self.stream = stream
+        self.sent = 0
 
     def measure(self, *_: Any) -> None:  # noqa: ANN401 - as a publisher's
         self.sent += 1
@@ -50,7 +52,8 @@ def turn_cost() -> float:
     sensors = tuple(sensor for sensor in robot.sensors if sensor.type != "camera")
     spec = RobotSpec(robot, sensors, (), (), (), (survey,), OrderedScheduler())
     controller = _Controller(spec, Session(config, None), BackgroundPublisher())
-    controller.open({stream: cast("Any", _Nowhere()) for stream in controller.streams(spec)})
+    controller.connect()
+    controller.open({stream: cast("Any", _Nowhere(stream)) for stream in controller.streams(spec)})
     controller.start(LockstepClock())
     now = turns = 0
     began = time.process_time()

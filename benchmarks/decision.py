@@ -47,7 +47,7 @@ def main(
     rounds: Annotated[int, typer.Option(help="Decisions of each kind.", min=10)] = 300,
     json: Annotated[Path | None, typer.Option(help="File for the figures.")] = None,
 ) -> None:
-    """Microseconds per event at 10, 100 and 1,000 queued tasks; the aim is under 50 at 100.
+    """Microseconds per event at 10, 100 and 1,000 queued tasks.
 
     Each round, one task arrives, one execution ends on the edge, the idle edge is offered, and a
     timer comes; the queue is refilled, so that its length stays. The mean is over all four.

@@ -247,7 +247,7 @@ def main(
         found = medians(flown)
         report.row(f"{prefix}{name}, all processes", found.pop(""))
         for process, figures in found.items():
-            report.row(f"  {process}", figures)
+            report.row(f"  {prefix}{name}, {process}", figures)
         waits = statistics.median(one.taken_off for one in flown)
         report.note(f"{prefix}{name}: {waits:.1f} s from command to take-off")
     for prefix in checkouts:

@@ -21,8 +21,7 @@ from typing import Annotated
 import numpy as np
 import psutil
 import typer
-from rich.console import Console
-from rich.table import Table
+from _report import Report
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.actors.cluster import ray_cluster as cluster
@@ -35,6 +34,14 @@ _PERIOD = 50.0
 _LATE = 250.0
 _CLOSE = 20.0
 """Milliseconds off the period within which a setpoint counts as punctual."""
+UNITS = {
+    "setpoints": "",
+    "p50": "ms",
+    "p99": "ms",
+    "max": "ms",
+    "within 20 ms": "%",
+    "later than 250 ms": "",
+}
 _NICENESS = "RAY_worker_niceness"
 _PLAIN = {SWITCH: "off", _NICENESS: "15"}
 _MEASURED = {SWITCH: "", _NICENESS: VARIABLES[_NICENESS]}
@@ -92,16 +99,18 @@ def measure(seconds: float, busy: int, folder: Path, settings: dict[str, str]) -
     return list(np.diff(stamps))
 
 
-def _row(gaps: list[float]) -> list[str]:
+def figures(gaps: list[float]) -> dict[str, float]:
+    """The figures of the milliseconds between setpoints."""
     values = np.array(gaps)
-    close = float(np.mean(np.abs(values - _PERIOD) <= _CLOSE))
     p50, p99 = np.percentile(values, [50, 99])
-    return [
-        str(values.size),
-        *(f"{figure:.1f}" for figure in (p50, p99, values.max())),
-        f"{100 * close:.2f} %",
-        str(int(np.sum(values > _LATE))),
-    ]
+    return {
+        "setpoints": values.size,
+        "p50": float(p50),
+        "p99": float(p99),
+        "max": float(values.max()),
+        "within 20 ms": 100 * float(np.mean(np.abs(values - _PERIOD) <= _CLOSE)),
+        "later than 250 ms": int(np.sum(values > _LATE)),
+    }
 
 
 def main(
@@ -110,9 +119,10 @@ def main(
     *,
     plain: Annotated[bool, typer.Option(help="only without the measures")] = False,
     measures: Annotated[bool, typer.Option(help="only with them")] = False,
+    json_path: Annotated[Path | None, typer.Option("--json", help="Write the figures.")] = None,
 ) -> None:
-    """Print the gaps between setpoints, in milliseconds."""
-    table = Table("", "setpoints", "p50", "p99", "max", "within 20 ms", "later than 250 ms")
+    """Measure the gaps between setpoints, in milliseconds."""
+    report = Report(f"setpoints beside {busy} busy processes", UNITS, packages=("ray",))
     rounds = {"plain": _PLAIN, "with the measures": _MEASURED}
     for name, settings in rounds.items():
         if (plain and name != "plain") or (measures and name == "plain"):
@@ -120,10 +130,12 @@ def main(
         load = psutil.getloadavg()[0]
         with tempfile.TemporaryDirectory() as folder:
             gaps = measure(seconds, busy, Path(folder), settings)
-        table.add_row(f"{name} (load before: {load:.1f})", *_row(gaps))
-    console = Console()
-    console.print(f"{busy} busy processes, {os.cpu_count()} cores, {seconds:g} s each")
-    console.print(table)
+        report.row(name, figures(gaps))
+        report.note(f"{name}: {load:.1f} processes wanted to run when it began")
+    report.note(f"flights of {seconds:g} s, a setpoint every {_PERIOD:g} ms")
+    report.show()
+    if json_path is not None:
+        report.write(json_path)
 
 
 if __name__ == "__main__":

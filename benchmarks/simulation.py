@@ -36,6 +36,8 @@ _ACTORS = {"drone": "drone", "sensor": "camera", "analytics": "analyses", "recor
 """Name of an actor's figure, by the first part of its own."""
 UNITS = {"simulated": "s", "wall": "s", "factor": "s/s", "ready after": "s"}
 UNITS |= dict.fromkeys((*_ACTORS.values(), "actors"), "ms of processor/s")
+UNITS |= {"turn": "us of processor"}
+_NONE = dict.fromkeys(UNITS, float("nan"))
 _LINE = re.compile(r"flew ([\d.]+) s in ([\d.]+) s, .*ready after ([\d.]+) s")
 _SIDE_BY_SIDE = "side by side"
 
@@ -64,7 +66,8 @@ def fly(checkout: Path | None, folder: Path, words: Sequence[str]) -> dict[str, 
     mission, wall, ready = (float(text) for text in found.groups())
     used = processor(folder / "flight.mcap")
     figures = {"simulated": mission, "wall": wall, "factor": mission / wall, "ready after": ready}
-    return {**dict.fromkeys(UNITS, 0.0), **figures, **used, "actors": sum(used.values())}
+    actors = {**dict.fromkeys(_ACTORS.values(), 0.0), **used, "actors": sum(used.values())}
+    return {**_NONE, **figures, **actors}
 
 
 def processor(recording: Path) -> dict[str, float]:
@@ -104,7 +107,7 @@ def fly_seeds(folder: Path, seeds: int) -> dict[str, float]:
     wall = time.monotonic() - began
     mission = sum(row["flight s"] for row in jsons.loads(table.read_text()))
     figures = {"simulated": mission, "wall": wall, "factor": mission / wall}
-    return {**dict.fromkeys(UNITS, float("nan")), **figures}
+    return {**_NONE, **figures}
 
 
 def main(
@@ -140,7 +143,7 @@ def main(
         report.row(case, {unit: statistics.median(one[unit] for one in flown) for unit in UNITS})
     report.note(f"medians of {rounds} flights; {seeds} seeds side by side, once")
     for prefix, checkout in checkouts.items():
-        report.note(f"{prefix}{turn(checkout):.0f} us of the processor for a drone's turn, alone")
+        report.row(f"{prefix}a drone's turn, alone", {**_NONE, "turn": turn(checkout)})
     report.show()
     if json is not None:
         report.write(json)
