@@ -118,8 +118,9 @@ def _array(plain: tuple[Any, ...], buffers: Sequence[memoryview]) -> NDArray[Any
 
 def _learn(cls: type[Any]) -> _Kind:
     """Return how to treat a class that is met for the first time. Raises NotPlainError."""
-    kind = _kind(cls)
+    kind = None if cls in _pickled else _kind(cls)
     if kind is None or not importable(cls):
+        _pickled.add(cls)
         raise NotPlainError
     _kinds[cls] = _named[kind.name] = kind
     return kind
@@ -215,4 +216,6 @@ _kinds: dict[type[Any], _Kind] = {
     list: _Kind("list", _same, _same),
     dict: _Kind("dict", _pairs, _mapping),
 }
+_pickled: set[type[Any]] = set()
+"""Classes whose objects go by pickle, as far as they have been met."""
 _named = {kind.name: kind for kind in _kinds.values()}
