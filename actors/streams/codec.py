@@ -96,13 +96,11 @@ class Encoded:
     def size_around(self, array: NDArray[np.uint8], room: int) -> int | None:
         """Return the size that it has in a buffer that holds `array` from byte `room` on.
 
-        None if its first buffer is not all of `array`, or the rest does not fit into `room`.
+        None if its first buffer does not begin with `array`, or the rest has not enough room.
         """
         if not self._arrays or _LENGTHS.size + len(self._head) > room:
             return None
-        first = self._arrays[0]
-        same = first.nbytes == array.nbytes and _address(first) == _address(array)
-        return room + self._length if same else None
+        return room + self._length if _address(self._arrays[0]) == _address(array) else None
 
     def write_into(self, target: memoryview, room: int = 0) -> None:
         """Write all into `target`; not its first buffer, if that is there, from byte `room` on."""

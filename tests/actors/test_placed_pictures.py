@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -63,10 +63,11 @@ def _is(frame: Frame | None, value: int, shape: tuple[int, int] = (_HEIGHT, _WID
     return frame.image.shape == (*shape, 3) and bool((frame.image == value).all())
 
 
-def test_a_picture_drawn_in_place_is_not_copied(link: _Link) -> None:
-    """The reader sees the memory in which it was drawn."""
+@pytest.mark.parametrize("depth", [False, True])
+def test_a_picture_drawn_in_place_is_not_copied(link: _Link, depth: bool) -> None:  # noqa: FBT001
+    """The reader sees the memory in which it was drawn; there is room for its depth."""
     image = link.draw(5)
-    link.publish(image)
+    link.publish(image, depth=depth)
     frame = link.read()
     assert _is(frame, 5)
     image[0, 0, 0] = 99  # what a camera must not do shows that it is one memory
@@ -89,11 +90,14 @@ def test_pictures_that_a_reader_keeps_stay_as_they_were(link: _Link, depth: bool
 
 
 def test_a_picture_that_was_not_published_leaves_no_trace(link: _Link) -> None:
-    """A camera may find that it has none after all."""
-    for value in range(3):
-        link.draw(value)
+    """A camera may find that it has none after all; the memory is used for the next."""
+    assert _places(link.draw(value) for value in range(20)) == 1
     link.publish(link.draw(9))
     assert _is(link.read(), 9)
+
+
+def _places(pictures: Iterable[NDArray[np.uint8]]) -> int:
+    return len({picture.__array_interface__["data"][0] for picture in pictures})
 
 
 def _lower_half(link: _Link) -> NDArray[np.uint8]:
@@ -107,20 +111,38 @@ def _own(link: _Link) -> NDArray[np.uint8]:
     return np.full((_HEIGHT // 2, _WIDTH, 3), 2, np.uint8)
 
 
+def _upper_half(link: _Link) -> NDArray[np.uint8]:
+    image = link.draw(1)
+    image[: _HEIGHT // 2] = 2
+    return image[: _HEIGHT // 2]
+
+
 def _turned(link: _Link) -> NDArray[np.uint8]:
     image = link.draw(1, _HEIGHT // 2)
     image[...] = 2
     return image[::-1]
 
 
-@pytest.mark.parametrize("drawn", [_lower_half, _own, _turned])
-def test_what_is_not_the_whole_memory_is_copied(
+@pytest.mark.parametrize("drawn", [_lower_half, _upper_half, _own, _turned])
+def test_what_is_not_the_whole_memory_arrives(
     link: _Link, drawn: Callable[[_Link], NDArray[np.uint8]]
 ) -> None:
-    """A part of it, a picture of one's own, and one that is not contiguous arrive as they are."""
-    for _ in range(3):
+    """A part of it, a picture of one's own, and one that is not contiguous, as they are."""
+    places: list[NDArray[np.uint8]] = []
+    for _ in range(20):
         link.publish(drawn(link))
         assert _is(link.read(), 2, (_HEIGHT // 2, _WIDTH))
+        places.append(link.draw(0))
+    assert _places(places) <= 3  # what was lent is lent again
+
+
+def test_what_has_no_room_beside_the_picture_is_written_elsewhere(link: _Link) -> None:
+    """An item may hold far more than the picture that was asked for."""
+    image = link.draw(4)
+    link.publisher.measure([image, np.ones(5_000_000, np.uint8)], Header(9, 9, "c"), 0)
+    picture, more = link.reader.receive(0)[-1].item or (None, None)
+    assert (np.asarray(picture) == 4).all()
+    assert np.asarray(more).sum() == 5_000_000
 
 
 def test_without_readers_memory_is_the_cameras_own() -> None:

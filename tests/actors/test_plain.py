@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import dataclasses
 import enum
 import marshal
@@ -73,6 +74,25 @@ class Told:
 
     def __reduce__(self) -> tuple[type[Told], tuple[int]]:
         return Told, (self.value,)
+
+
+class Mixed(Slotted):
+    """A class with both, a slot and a `__dict__`."""
+
+
+class Registered:
+    """A class for which pickle's registry knows what to do."""
+
+    def __init__(self, value: int) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Registered) and other.value == self.value
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+copyreg.pickle(Registered, lambda one: (Registered, (one.value + 1,)))
 
 
 class Numbers(list[int]):
@@ -154,6 +174,7 @@ def _grown() -> Grown:
     "item",
     [
         Slotted(3),
+        Mixed(3),
         Numbers([1, 2]),
         OrderedDict(b=1, a=2),
         Fraction(1, 3),
@@ -182,6 +203,11 @@ def test_a_class_that_says_how_it_is_pickled_is_asked() -> None:
     assert _there_and_back(Told(4)).value == 4
     with pytest.raises(NotPlainError):
         flatten(Told(4), [])
+
+
+def test_a_class_in_pickles_registry_is_made_as_that_says() -> None:
+    """Here with a number more."""
+    assert _there_and_back(Registered(4)) == Registered(5)
 
 
 def test_attributes_beyond_those_of_the_class_arrive() -> None:
