@@ -43,11 +43,16 @@ class _Sender:
 
 def frames_by_ray(count: int, resources: tuple[str, str]) -> list[float]:
     """Milliseconds of each of `count` calls between the nodes that have these resources."""
-    here, there = ({"num_cpus": 0, "resources": {name: 0.1}} for name in resources)
-    reader = ray.remote(**there)(_Reader).remote()  # type: ignore[call-overload]
-    sender = ray.remote(**here)(_Sender).remote(reader)  # type: ignore[call-overload]
+    here, there = resources
+    reader = _placed(_Reader, there).remote()
+    sender = _placed(_Sender, here).remote(reader)
     ray.get(sender.send.remote(count))
     ages: list[float] = ray.get(reader.noted.remote())
     for actor in (sender, reader):
         ray.kill(actor)
     return ages
+
+
+def _placed(actor: type, resource: str) -> Any:  # noqa: ANN401 - a Ray actor class
+    make: Any = ray.remote(num_cpus=0, resources={resource: 0.1})
+    return make(actor)
