@@ -66,6 +66,7 @@ AIMS = (
     Aim("simulation", "no camera", "factor", 300.0, least=True),
     Aim("lab", "* 80D-A/7 300 s", "time", 1.0),
     Aim("decision", "margin 100", "mean", 20.0),
+    Aim("vision", "detector.onnx", "total", 15.0),
 )
 
 
