@@ -1,4 +1,4 @@
-"""Items as plain values, which `marshal` writes and reads several times faster than pickle does.
+"""Items as plain values, which `marshal` writes and reads faster than pickle does objects.
 
 Between two frames the processor's caches hold other things, so what counts is how much code and
 data a message touches, and pickle looks every class up by an import. A plain value is None, a
