@@ -1,10 +1,10 @@
 """Codec of messages: plain values by `marshal`, large arrays out of band, so that none is copied.
 
-Layout: u32 number of buffers, u32 length of the head, then the head, and each buffer, aligned to 64
-bytes. Little-endian. The head is of plain values only: the envelope, the name of the item's class,
-the offset and length of each buffer, and the item: as a plain value, or, where it has none, its
-pickle in a tuple of its own. So the envelope can be read even if the item cannot. Both ends run one
-version of Python, as `marshal` needs and Ray requires of a cluster.
+Layout: u32 length of the head, u32 place of the first buffer, then the head, and each buffer,
+aligned to 64 bytes. Little-endian. The head is of plain values only: the envelope, the name of the
+item's class, the place and length of each buffer from the first on, the item's pickle, empty where
+it is a plain value, and that value. So the envelope can be read even if the item cannot. Both ends
+run one version of Python, as `marshal` needs and Ray requires of a cluster.
 """
 
 from __future__ import annotations

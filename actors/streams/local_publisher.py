@@ -207,10 +207,9 @@ class LocalPublisher:
         None if nobody reads the stream, or no memory is left.
         """
         with self._lock:
-            if not self._news.closed:
-                self._hear()  # now rather than when the message is in a hurry
             if not self._readers:
                 return None
+            self._hear()  # now rather than when the message is in a hurry
             if self._lent is not None:
                 self._put_back([self._lent.slot])
                 self._lent = None

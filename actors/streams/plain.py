@@ -142,7 +142,7 @@ def _kind(cls: type[Any]) -> _Kind | None:
     name = f"{cls.__module__}:{cls.__qualname__}"
     record = record_of(cls)
     if record is not None:
-        return _Kind(name, record.values, record.make or _setter(cls, record.fields))
+        return _Kind(name, record.values, record.make)
     if issubclass(cls, enum.Enum):
         return _Kind(name, lambda member: (member.value,), lambda parts: cls(*parts))
     if issubclass(cls, np.generic):
@@ -169,19 +169,6 @@ def _is_pickled_plainly(cls: type[Any]) -> bool:
 
 def _slots(cls: type[Any]) -> bool:
     return any(getattr(one, "__slots__", ()) for one in cls.__mro__)
-
-
-def _setter(cls: type[Any], fields: tuple[str, ...]) -> Callable[[list[Any]], Any]:
-    """What makes a record of its fields, without the checks that these have passed before."""
-    new, put = object.__new__, object.__setattr__
-
-    def make(parts: list[Any]) -> Any:  # noqa: ANN401 - an instance of `cls`
-        made = new(cls)
-        for field, part in zip(fields, parts, strict=True):
-            put(made, field, part)  # a frozen one refuses its own
-        return made
-
-    return make
 
 
 def _filler(cls: type[Any]) -> Callable[[list[Any]], Any]:

@@ -24,11 +24,10 @@ _HASHED = 16
 class Record(NamedTuple):
     """How a record is taken apart and made anew."""
 
-    fields: tuple[str, ...]
     values: Callable[[Any], tuple[Any, ...]]
     """Its fields' values."""
-    make: Callable[[list[Any]], Any] | None
-    """Finds or makes a shared one; None where its fields may be set, which passed all checks."""
+    make: Callable[[list[Any]], Any]
+    """Makes one of these, without the checks that they have passed; a shared one it may find."""
 
 
 _records: dict[type[Any], Record] = {}
@@ -77,7 +76,8 @@ def fast_pickle(cls: C) -> C:
         return cls, values(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
-    _records[cls] = Record(tuple(field.name for field in dataclasses.fields(cls)), values, None)
+    names = tuple(field.name for field in dataclasses.fields(cls))
+    _records[cls] = Record(values, partial(_set, cls, names))
     return valued(cls)
 
 
@@ -97,6 +97,10 @@ def shared_pickle(cls: C) -> C:
     cls.__reduce__ = reduce  # type: ignore[assignment]
     _records[cls] = _records[cls]._replace(make=partial(_make_shared, cls))
     return cls
+
+
+def _set(cls: type[Any], names: tuple[str, ...], parts: list[Any]) -> object:
+    return _rebuilt(cls, dict(zip(names, parts, strict=True)))
 
 
 def _make_shared(cls: Any, parts: list[Any]) -> object:  # noqa: ANN401 - a class

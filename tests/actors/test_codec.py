@@ -72,7 +72,7 @@ def test_a_frame_is_a_view_of_the_buffer_and_read_only() -> None:
 def test_a_message_is_written_around_an_array_that_is_there(
     part: slice, room: int, *, fits: bool
 ) -> None:
-    """If that is all of its first array, and the rest has room before it."""
+    """If its first array begins there, and the rest has room before it."""
     whole = np.zeros(room + 200_000, np.uint8)
     array = np.frombuffer(whole, np.uint8, 48 * 64 * 3, room)
     image = array.reshape(48, 64, 3)
