@@ -70,9 +70,9 @@ class LocalRay:
         """Host and port of its head; waits for it. Raises AeroDaaSError if it does not start."""
         if not self._address:
             told = self._next(_START_SECONDS)
-            if "address" not in told:
+            if told is None or "address" not in told:
                 self.end()
-                raise AeroDaaSError(_failure(str(told.get("error", ""))))
+                raise AeroDaaSError(_failure(told))
             host, _, port = str(told["address"]).rpartition(":")
             if host != _ADDRESS:
                 warnings.warn(
@@ -87,7 +87,8 @@ class LocalRay:
         """Release Ray; returns when it has ended, or early while a drone has yet to land."""
         assert self._process.stdin is not None  # noqa: S101 - asked for
         self._process.stdin.close()
-        if "flying" not in self._next(_END_SECONDS):
+        told = self._next(_END_SECONDS)
+        if told is not None and "flying" not in told:
             self._process.wait()
 
     def _listen(self) -> None:
@@ -96,12 +97,12 @@ class LocalRay:
             self._lines.put(line)
         self._lines.put("{}")
 
-    def _next(self, timeout: float) -> dict[str, object]:
-        """The supervisor's next message; empty if it has ended, `flying` after the timeout."""
+    def _next(self, timeout: float) -> dict[str, object] | None:
+        """The supervisor's next message; empty if it has ended, None after the timeout."""
         try:
             return dict(json.loads(self._lines.get(timeout=timeout)))
         except Empty:
-            return {"flying": True}
+            return None
 
 
 def _streams() -> str:
@@ -117,9 +118,10 @@ def _inherited() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name != MAVLINK_KEY}
 
 
-def _failure(reason: str) -> str:
+def _failure(told: dict[str, object] | None) -> str:
+    reason = "timed out" if told is None else str(told.get("error", "its supervisor was killed"))
     if "timed out" not in reason:
-        return f"Ray does not start on this machine: {reason or 'its supervisor ended'}"
+        return f"Ray does not start on this machine: {reason}"
     load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     return (
         "Ray did not start within half a minute, twice: this machine is too busy "

@@ -42,6 +42,8 @@ _TRIES = 2
 _TOO_SLOW = "timed out during startup"
 """Text of Ray's error when its node does not start within half a minute, on a busy machine."""
 _START_SECONDS = 180.0
+_LAST_LINES = 5
+"""Of what Ray said before it ended. A Python that breaks has its reason some lines above."""
 _GRACE_SECONDS = 3.0
 """Wait for actors that were told to end and still hold their locks."""
 _DYING_SECONDS = 10.0
@@ -74,6 +76,15 @@ def main(application: int, streams: str, words: list[str]) -> None:
     # Orphans of this Ray's processes become children of this process.
     ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0)
     client = _Client(application)
+    try:
+        _supervise(client, streams, words)
+    except Exception as error:
+        client.tell(error=f"{type(error).__name__}: {error}")
+        raise
+
+
+def _supervise(client: _Client, streams: str, words: list[str]) -> None:
+    """Keep Ray in a folder of its own, and leave nothing of it."""
     base = Path(tempfile.gettempdir())
     base = base if len(str(base)) <= _LONGEST else Path("/tmp")  # noqa: S108 - mkdtemp follows
     _prune(base)
@@ -158,7 +169,8 @@ def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
             return (own / "ray_current_cluster").read_text().strip(), ""
         _end_all(lambda line: str(_SERVER) not in line)
         slow = code is None or _TOO_SLOW in said
-        reason = _TOO_SLOW if slow else said.rpartition("\n")[2]
+        silent = f"`ray start` ended with code {code} and said nothing"
+        reason = _TOO_SLOW if slow else "\n".join(said.splitlines()[-_LAST_LINES:]) or silent
         if not slow:
             break
     return "", reason
@@ -236,14 +248,15 @@ def _processes() -> Iterator[tuple[int, int]]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with contextlib.suppress(OSError):
-                state, parent = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
-                if state != "Z":
+                # Of bytes, for a process's name may end within a letter.
+                state, parent = (entry / "stat").read_bytes().rpartition(b")")[2].split()[:2]
+                if state != b"Z":
                     yield int(entry.name), int(parent)
 
 
 def _command(pid: int) -> str:
     with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+        return os.fsdecode(Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" "))
     return ""
 
 

@@ -89,3 +89,15 @@ def test_another_users_stays(tmp_path: Path) -> None:
     os.chown(theirs, 65534, 65534)
     ray_process._prune(tmp_path)
     assert theirs.exists()
+
+
+def test_a_name_that_ends_within_a_letter_stops_nobody() -> None:
+    """The kernel keeps 15 bytes of a process' name, whoever's process it is."""
+    code = "import ctypes; ctypes.CDLL(None).prctl(15, 'Landvermessungü'.encode(), 0, 0, 0)"
+    words = [sys.executable, "-c", f"{code}; print('named', flush=True); input()"]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert b"\xc3)" in Path(f"/proc/{process.pid}/stat").read_bytes()
+        assert (process.pid, os.getpid()) in list(ray_process._processes())
+        assert process.pid in ray_process._descendants()

@@ -1,0 +1,44 @@
+"""A local Ray that does not start says why."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from aerodaas.actors.cluster import local_ray
+from aerodaas.actors.cluster.local_ray import LocalRay
+from aerodaas.types.errors import AeroDaaSError
+
+
+@pytest.mark.slow
+def test_what_ray_said_last_is_told() -> None:
+    """Here its Python finds no library of its own."""
+    ray = LocalRay({"PYTHONHOME": "/nowhere"})
+    with pytest.raises(AeroDaaSError, match=r"does not start on this machine:(?s:.*)encodings"):
+        _ = ray.address
+
+
+def test_what_stopped_the_supervisor_is_told() -> None:
+    """Its output is nobody's; the application tells it."""
+    code = "from aerodaas.actors.cluster import ray_process as one\none.main(%d, '', ['\\0'])"
+    ended = subprocess.run(
+        [sys.executable, "-c", code % os.getpid()],
+        stdin=subprocess.PIPE,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert ended.returncode == 1
+    assert json.loads(ended.stdout) == {"error": "ValueError: embedded null byte"}
+
+
+def test_a_start_that_takes_too_long_is_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remedy is another one."""
+    monkeypatch.setattr(local_ray, "_START_SECONDS", 0.01)
+    ray = LocalRay({})
+    with pytest.raises(AeroDaaSError, match="this machine is too busy"):
+        _ = ray.address
