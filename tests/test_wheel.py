@@ -76,6 +76,7 @@ def test_the_same_sources_make_the_same_wheel(built: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
+@pytest.mark.wall_clock
 @pytest.mark.timeout(900)
 def test_a_strangers_first_hour(built: Path, tmp_path: Path) -> None:
     """From the wheel alone, in an empty folder, by the words of the documentation."""

@@ -20,6 +20,8 @@ from aerodaas.mission.commands import AddNavigation, End
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.status import MissionState
 
+pytestmark = pytest.mark.wall_clock
+
 _ROBOTS = {
     "west": ((0.0, 0.0, 0.0), (20.0, 0.0)),
     "east": ((20.0, 0.0, 0.0), (-20.0, 0.0)),
