@@ -116,7 +116,7 @@ def test_a_fall_is_told_wherever_it_goes(
 @LENSES
 @given(
     turn=st.floats(-math.pi, math.pi),
-    away=st.floats(3.1, 8.0),
+    away=st.floats(3.3, 8.0),
     height=st.floats(0.8, 2.0),
     tall=st.floats(1.5, 1.95),
     rate=st.sampled_from([5.0, 10.0]),
@@ -137,7 +137,7 @@ def test_boxes_alone_tell_a_fall_in_the_picture(
 ) -> None:
     """Rough boxes, and no joint of who lies; in more than half of the frames from then on.
 
-    Nearer than 3.1 m to a low drone the head of who stands may be above the picture, and nobody is
+    Nearer than 3.3 m to a low drone the head of who stands may be above the picture, and nobody is
     known to have stood.
     """
     scene = Scene(camera, rate)
@@ -408,6 +408,46 @@ def test_who_sits_down_on_the_ground_as_quickly_as_people_do_has_not_fallen() ->
 
         scene.sink = sink
         assert scene.play() == [], rate
+
+
+@LENSES
+@pytest.mark.parametrize("rate", [2.0, 5.0, 10.0])
+@pytest.mark.parametrize("raised", [0.5, 0.9])
+@pytest.mark.parametrize("tall", [1.55, 1.75])
+def test_who_waved_and_sits_down_on_the_ground_has_not_fallen(
+    camera: CameraModel, rate: float, raised: float, tall: float
+) -> None:
+    """A raised hand makes nobody taller, of whom sitting were less than half."""
+    scene = Scene(camera, rate)
+    scene.place, scene.tall = lambda _: (4.0, 0.0), tall
+    scene.posture = lambda time: Posture(raised=float(TURN_OFF - raised < time <= TURN_OFF))
+    scene.sink = lambda time: 0.46 * tall * min(max((time - TURN_OFF) / 1.5, 0.0), 1.0)
+    assert scene.play() == []
+
+
+def test_who_waved_for_long_is_known_again_soon_after() -> None:
+    """What a body's height is told by is five seconds long."""
+    scene = Scene(WIDE, 5.0)
+    scene.place = lambda _: (4.0, 0.0)
+    scene.posture = lambda time: Posture(raised=float(time <= 8.0))
+    scene.sink = lambda time: 0.46 * scene.tall * min(max((time - 13.0) / 1.5, 0.0), 1.0)
+    assert scene.play(17.0) == []
+
+
+def test_who_comes_where_a_taller_one_stood_is_not_lower_for_it() -> None:
+    """Nobody is in the picture for longer than somebody who falls."""
+    scene = Scene(WIDE, 5.0)
+    scene.tall, child = 1.95, 1.45
+    scene.place = lambda _: (4.0, 0.0)
+    scene.hidden = lambda time: 1.0 < time < 2.7
+    sits = 3.2
+
+    def sink(time: float) -> float:
+        sitting = 0.46 * child * min(max((time - sits) / 1.5, 0.0), 1.0)
+        return 0.0 if time < TURN_OFF else scene.tall - child + sitting
+
+    scene.sink = sink
+    assert scene.play(7.0) == []
 
 
 _SEEN_BY_A_BRAKING_DRONE = (

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,9 @@ _TALLER = 0.1
 _KEPT = 12
 """Number of observations kept."""
 
+_GROWN = 5.0
+"""Seconds of standing of which the median top is a body's height: who waves is no taller."""
+
 Array = NDArray[np.float64]
 
 
@@ -103,8 +107,10 @@ class FallDetector:
         self._places: deque[Array] = deque(maxlen=_KEPT // 2)
         """Recent standing positions, metres east, north and up of home."""
         self._looks: deque[_Look] = deque(maxlen=_KEPT)
+        self._stood_up: deque[_Look] = deque()
+        """The standing body's recent tops, raised hands included."""
         self._stature = 0.0
-        """Height of the body's top when it last stood, metres; not while it already sank."""
+        """Height of the body that stands, metres."""
         self._stood = 0
         self._fell = False
 
@@ -153,9 +159,17 @@ class FallDetector:
             top = max(top, self._looks[-1].top)
         self._stood = seen.header.stamp
         self._places.append(place)
-        self._look(body, self._stood, top)
-        self._stature = max(look.top for look in self._recent())
+        self._measure(self._stood, top)
+        self._look(body, self._stood, min(top, self._stature + _TALLER))
         return True
+
+    def _measure(self, stamp: int, top: float) -> None:
+        """Tell the body's height by one more top of it."""
+        tops = self._stood_up
+        tops.append(_Look(stamp, top))
+        while seconds(stamp - tops[0].stamp) > _GROWN:
+            tops.popleft()
+        self._stature = median(look.top for look in tops)
 
     def _standing_at(self, body: Detection, seen: Detections, view: GroundView) -> Array | None:
         """Where a body stands, metres forward and left, if it does; None if that is unknown."""
@@ -215,6 +229,7 @@ class FallDetector:
         if not 0 <= seconds(stamp - known) <= (_FORGOTTEN if self._fell else _MOMENT):
             self._places.clear()
             self._looks.clear()
+            self._stood_up.clear()
             self._fell = False
 
 
