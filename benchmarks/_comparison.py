@@ -167,7 +167,7 @@ def _held(key: Key, values: Mapping[Key, float]) -> bool | None:
 
 def _aims(keys: Iterable[Key], values: Mapping[Key, float]) -> Text:
     """The aims of a row, and whether they are met."""
-    return Text("; ").join(_aim(key, values) for key in keys if aim_of(key) is not None)
+    return Text("\n").join(_aim(key, values) for key in keys if aim_of(key) is not None)
 
 
 def _aim(key: Key, values: Mapping[Key, float]) -> Text:
