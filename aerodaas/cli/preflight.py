@@ -93,6 +93,6 @@ def _show(name: str, items: Sequence[HealthItem]) -> None:
         table.add_column(column, overflow="fold")
     for one in items:
         # Texts, for some are the vehicle's own words, which may have brackets.
-        name, value, bound, remedy = map(Text, (one.name, one.value, one.bound, one.remedy))
-        table.add_row(name, value, bound, _MARKS[one.verdict.value], remedy)
+        told = [Text(cell) for cell in (one.name, one.value, one.bound)]
+        table.add_row(*told, _MARKS[one.verdict.value], Text(one.remedy))
     Console().print(table)
