@@ -9,10 +9,11 @@ apart. The contracts on imports are checked by `lint-imports`.
 from __future__ import annotations
 
 import statistics
-import sys
 from collections import Counter
 from pathlib import Path
+from typing import Annotated
 
+import typer
 from _report import Report
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,9 +40,11 @@ def shape(files: dict[Path, int]) -> dict[str, float]:
     }
 
 
-def main() -> None:
+def main(
+    checkout: Annotated[Path, typer.Argument(help="Another checkout.", show_default="this")] = ROOT,
+) -> None:
     """Print the figures of this checkout, or of the one named."""
-    root = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT
+    root = checkout.resolve()
     units = {
         "size": "1000 lines",
         "modules": "files",
@@ -68,4 +71,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -18,6 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import typer
+
 import aerodaas
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
@@ -140,4 +142,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

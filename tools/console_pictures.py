@@ -18,6 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+import typer
+
 from tools.browser import Browser, Page
 
 _ROOT = Path(__file__).resolve().parents[1]
@@ -90,4 +92,4 @@ def _take(page: Page, name: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

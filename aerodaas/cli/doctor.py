@@ -16,6 +16,7 @@ from pathlib import Path
 import psutil
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from aerodaas.actors import priority
 from aerodaas.types.errors import AeroDaaSError
@@ -35,7 +36,8 @@ _PACKAGES = {
     "pyvrp": "pyvrp",
 }
 _REMEDIES = {
-    "pyvrp": "for the optimal scheduler and fleets, use Python 3.11 or newer",
+    "pyvrp": "pip install 'aerodaas[routing]' in Python 3.11 or newer, for the optimal scheduler "
+    "and fleets",
 }
 _MEMORY_NEEDED = 1.0
 _SHARED_MEMORY_NEEDED = 256
@@ -65,15 +67,16 @@ def examine(address: str | None = None) -> bool:
 
 def show_findings(title: str, findings: Iterable[Finding]) -> bool:
     """Print findings in one table; True if nothing needs mending."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table = Table(title=Text(title), title_justify="left", box=None, pad_edge=False)
     for column in ("", "subject", "finding"):
         table.add_column(column, overflow="fold")
     good = True
     for finding in findings:
         good &= finding.ok
-        remedy = f" [yellow]→ {finding.remedy}[/]" if finding.remedy else ""
-        mark = "[green]ok[/]" if finding.ok else "[red]no[/]"
-        table.add_row(mark, finding.subject, finding.text + remedy)
+        remedy = Text(f" → {finding.remedy}" if finding.remedy else "", "yellow")
+        mark = Text("ok", "green") if finding.ok else Text("no", "red")
+        # Texts, for what is told may have brackets, as the names of extras have.
+        table.add_row(mark, Text(finding.subject), Text.assemble(finding.text, remedy))
     Console().print(table)
     return good
 

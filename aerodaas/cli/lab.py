@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from aerodaas.cli.failure import failure_of, show_failure
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.types.errors import AeroDaaSError
 
@@ -63,7 +63,7 @@ def _errors_told() -> Iterator[None]:
     try:
         yield
     except AeroDaaSError as error:
-        Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)
+        show_failure(failure_of(error))
         raise typer.Exit(error.exit_code) from None
 
 

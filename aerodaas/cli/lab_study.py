@@ -217,7 +217,7 @@ def _plot(result: LabResult, names: list[str], resources: Resources, folder: Pat
         file = folder / f"{stem}_timeline_{_file_name(name)}.png"
         plot_timeline(traces[name], file, title, middle, middle + 6)
     plot_observations(traces, path, folder / f"{stem}_over_time.png")
-    Console().print(f"plots in {folder}", highlight=False)
+    Console().print(f"plots in {folder}", highlight=False, markup=False)
 
 
 def _file_name(text: str) -> str:

@@ -72,7 +72,7 @@ def sweep(
         files += _plot(result, figures, out)
     else:
         Console().print("plots: pip install 'aerodaas[plots]'", highlight=False, markup=False)
-    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True)
+    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
 
 
 def parse_sweeps(texts: Sequence[str]) -> dict[str, list[Any]]:

@@ -84,6 +84,7 @@ def _rows(items: Sequence[HealthItem]) -> list[dict[str, str]]:
 def _show(name: str, items: Sequence[HealthItem]) -> None:
     from rich.console import Console  # noqa: PLC0415 - slow to load
     from rich.table import Table  # noqa: PLC0415 - as above
+    from rich.text import Text  # noqa: PLC0415 - as above
 
     table = Table(
         title=f"aerodaas preflight {name}", title_justify="left", box=None, pad_edge=False
@@ -91,5 +92,7 @@ def _show(name: str, items: Sequence[HealthItem]) -> None:
     for column in ("item", "value", "should be", "", "remedy"):
         table.add_column(column, overflow="fold")
     for one in items:
-        table.add_row(one.name, one.value, one.bound, _MARKS[one.verdict.value], one.remedy)
+        # Texts, for some are the vehicle's own words, which may have brackets.
+        told = [Text(cell) for cell in (one.name, one.value, one.bound)]
+        table.add_row(*told, _MARKS[one.verdict.value], Text(one.remedy))
     Console().print(table)

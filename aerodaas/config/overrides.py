@@ -15,6 +15,9 @@ from aerodaas.types.errors import AmbiguousIdError, ConfigError, UnknownIdError
 
 __all__ = ["located", "overridden", "parse_setting"]
 
+_FILES = ("path", "signing_key")
+"""Settings of cameras and drivers that name a file."""
+
 
 def parse_setting(text: str) -> tuple[str, Any]:
     """Split `id.setting=value`; the value is JSON, or else a string. Raises ConfigError."""
@@ -56,8 +59,9 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
     places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]
     places += [sensor for robot in content["robots"] for sensor in robot["sensors"]]
     for settings in (place["settings"] for place in places):
-        if isinstance(settings.get("path"), str):
-            settings["path"] = _absolute(settings["path"], folder)
+        for name in _FILES:
+            if isinstance(settings.get(name), str):
+                settings[name] = _absolute(settings[name], folder)
     for env in content["runtime_env"].values():
         env["packages"] = [
             _absolute(package, folder) if package.endswith(".whl") else package

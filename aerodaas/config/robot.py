@@ -191,7 +191,7 @@ class CameraConfig(Strict):
     width: Annotated[int, Field(ge=16, le=8192)] = 640
     height: Annotated[int, Field(ge=16, le=8192)] = 360
     horizontal_fov: Annotated[float, Field(gt=1, lt=179)] = 82.6
-    """Degrees; the Tello's by default."""
+    """Degrees across the picture."""
     mount: tuple[Finite, Finite, Finite] = (0.1, 0.0, 0.08)
     """Metres forward, left and up of the body's centre."""
     pitch: Annotated[float, Field(ge=-90, le=90)] = 0.0

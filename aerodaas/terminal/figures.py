@@ -9,6 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
+from rich.text import Text
 
 __all__ = ["Row", "show_figures"]
 
@@ -46,7 +47,7 @@ def show_figures(
     """
     console = console or Console(highlight=False)
     width = console.width if console.is_terminal else _WIDEST
-    console.print(title, style="italic", soft_wrap=True)
+    console.print(title, style="italic", soft_wrap=True, markup=False)
     part: list[int] = []
     for number in range(len(columns)):
         if part and _width(_table(heading, columns, rows, [*part, number])) > width:
@@ -58,12 +59,13 @@ def show_figures(
 
 def _table(heading: str, columns: Sequence[str], rows: Sequence[Row], part: Sequence[int]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    table.add_column(heading, no_wrap=True)
+    # Texts, for labels and reasons are others' words, which may have brackets.
+    table.add_column(Text(heading), no_wrap=True)
     for number in part:
-        table.add_column(columns[number], justify="right", no_wrap=True)
+        table.add_column(Text(columns[number]), justify="right", no_wrap=True)
     for row in rows:
         cells = (row.cells[number] for number in part)
-        table.add_row(row.name, *cells, style="bold" if row.bold else "")
+        table.add_row(*map(Text, (row.name, *cells)), style="bold" if row.bold else "")
     return table
 
 

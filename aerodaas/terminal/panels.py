@@ -118,15 +118,15 @@ def _state(mission: MissionStatus | None) -> Text:
     return Text.assemble((f" {mission.state.value.replace('_', ' ').upper()} ", style))
 
 
-def _waypoint(mission: MissionStatus | None, vehicle: VehicleState | None) -> str:
+def _waypoint(mission: MissionStatus | None, vehicle: VehicleState | None) -> Text:
     if mission is None or mission.target is None:
-        return "-"
+        return Text("-")
     target = mission.target
     text = f"{target.id} ({target.x:.1f}, {target.y:.1f}, {target.z:.1f})"
     if vehicle is not None:
         away = float(np.linalg.norm(target.position - vehicle.odometry.position))
         text += f", {away:.1f} m away"
-    return text
+    return Text(text)
 
 
 def _position(vehicle: VehicleState | None) -> str:

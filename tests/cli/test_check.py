@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from flying import FLAT, robot
 
-from aerodaas.cli import check, preflight
+from aerodaas.cli import check, doctor, preflight
 from aerodaas.cli.app import main
 
 PARTS = """
@@ -28,7 +28,7 @@ class Mine(Analytics[int]):
 
     def open(self):
         if self.broken:
-            raise FileNotFoundError("no weights here")
+            raise FileNotFoundError("no weights in [/here]")
 
     def process(self, item, context):
         return 1
@@ -147,9 +147,18 @@ def test_what_fails_is_named_and_the_rest_is_tried(checked: Checked) -> None:
     """A model that is not there, a camera without pictures; the drone is asked all the same."""
     code, told = checked(broken=True, camera="check_parts:Blind")
     assert code == 1
-    assert "no drone/mine FileNotFoundError: no weights here" in told
+    assert "no drone/mine FileNotFoundError: no weights in [/here]" in told
     assert "ok drone simulated answers" in told
     assert "no drone/cam check_parts:Blind gives no picture within 0 s" in told
+
+
+def test_the_doctor_names_the_extra_that_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With its brackets."""
+    monkeypatch.setattr(doctor, "_PACKAGES", {"pyvrp": "no_such_module"})
+    assert not doctor.show_findings("packages", doctor._packages())
+    assert "pip install 'aerodaas[routing]'" in " ".join(capsys.readouterr().out.split())
 
 
 def test_a_vehicle_that_would_not_take_off_is_told_and_let_go(checked: Checked) -> None:

@@ -68,6 +68,21 @@ def test_a_table_for_people(look: Looked) -> None:
     assert lines["compass"] == "compass not known at most 0.8 unknown"
 
 
+def test_a_vehicle_may_speak_in_brackets(
+    look: Looked, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its words are shown as they are."""
+    (tmp_path / "blunt_vehicle.py").write_text(
+        "from aerodaas.drivers.simulated import SimulatedVehicle\n"
+        "class Blunt(SimulatedVehicle):\n"
+        "    def preflight(self): return ['[/arm] refused [by me]']\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    code, told = look("drone", robot={**DRONE, "driver": "blunt_vehicle:Blunt"})
+    assert code == 1
+    assert "[/arm] refused [by me]" in told
+
+
 def test_json_for_programs(look: Looked) -> None:
     """The same, with an answer whether it is ready; policy may come by `--set`."""
     strong = {"simulation": {"wind": [12.0, 0.0, 0.0]}}

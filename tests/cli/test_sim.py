@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -209,6 +210,8 @@ def test_px4_is_its_build_with_sih(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert made.environment["PX4_SIM_SPEED_FACTOR"] == "4"
     assert made.environment["PX4_HOME_LAT"] == "1.5000000"
     assert options.heard_at == ("127.0.0.1", 14542)
+    with pytest.raises(SourceError, match="without heading"):
+        PROGRAMS["px4"](replace(options, home=SimulatedHome(1.5, 2.5, 3.0, 90.0)))
 
 
 @pytest.mark.parametrize("text", ["", "47", "47,8,1,2,3", "north,east", "91,0", "0,181", "nan,0"])

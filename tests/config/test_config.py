@@ -141,6 +141,9 @@ def test_relative_paths_lead_where_the_file_lies(
         content = {"robots": [{"id": "d", "sensors": [{"id": "c", "settings": {"path": path}}]}]}
         settings = located(validated(content, "here"), beside).robots[0].sensors[0].settings
         assert settings["path"] == wanted.get(path, path)
+        signed = {"robots": [{"id": "d", "settings": {"signing_key": path}}]}
+        settings = located(validated(signed, "here"), beside).robots[0].settings
+        assert settings["signing_key"] == wanted.get(path, path)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from aerodaas.terminal.figures import Row, show_figures
 
-WORDS = st.from_regex(re.compile(r"[a-z0-9.±%]{1,12}", re.ASCII), fullmatch=True)
+WORDS = st.from_regex(re.compile(r"[a-z0-9.±%/\[\]]{1,12}", re.ASCII), fullmatch=True)
 
 
 @st.composite

@@ -27,7 +27,7 @@ def snapshot(
     time: float, state: MissionState = MissionState.ENROUTE, alerts: tuple[str, ...] = ()
 ) -> Snapshot:
     """A drone on its way north."""
-    target = Waypoint("north", 0.0, 10.0, 1.5)
+    target = Waypoint("[/north]", 0.0, 10.0, 1.5)
     mission = MissionStatus(
         0,
         state,
@@ -78,7 +78,7 @@ def test_panel_shows_what_matters(width: int) -> None:
         "Farm [Survey]",
         "ENROUTE",
         "to [north]",
-        "north (0.0, 10.0, 1.5), 5.0 m away",
+        "[/north] (0.0, 10.0, 1.5), 5.0 m away",
         "E 0.0  N 5.0  up 1.5 m, 1.0 m/s",
         "50 %",
         "returns at 27%, in 1:05; plan needs 61%",

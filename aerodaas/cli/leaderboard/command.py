@@ -85,7 +85,7 @@ def leaderboard(
     }
     for name, write in files.items():
         _writing(out, partial(write, out / name))
-    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True)
+    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
 
 
 def _idea(name: str) -> str:

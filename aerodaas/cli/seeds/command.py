@@ -49,7 +49,9 @@ def run_seeds(
         if done:
             done.sort(key=lambda run: run.seed)
             _tell(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
-            Console().print(f"in {job.options.record}", highlight=False, soft_wrap=True)
+            Console().print(
+                f"in {job.options.record}", highlight=False, soft_wrap=True, markup=False
+            )
     failed = [str(run.seed) for run in done if run.failure]
     if failed:
         raise MissionError(f"{len(failed)} of {seeds} runs failed: seeds {', '.join(failed)}")

@@ -89,7 +89,7 @@ def test_mistakes_are_explained() -> None:
     """Exit status 2 and a sentence."""
     for arguments, words in (
         (("-s", "nope"), "no analytics scheduler is called 'nope'"),
-        (("-w", "9Z"), "no workload is called '9Z'"),
+        (("-w", "[/9Z]"), "no workload is called '[/9Z]'"),
         (("--network", "fog"), "no network is called 'fog'"),
         (("--times", "normal"), "nominal, lognormal or gamma"),
     ):

@@ -84,6 +84,8 @@ def _px4(options: SitlOptions) -> SitlProgram:
         raise SourceError("px4 has its instance and one as its system id: give --instance")
     if options.defaults:
         raise SourceError("px4 takes no file of parameters here: set them by PX4_PARAM_NAME=value")
+    if options.home.heading:
+        raise SourceError("px4 begins looking north in its simulation: give a home without heading")
     home = options.home
     etc = program.parent.parent / "etc"
     command = [str(program), "-d", "-i", str(options.instance), "-w", str(options.state), str(etc)]
