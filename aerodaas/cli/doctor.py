@@ -35,10 +35,11 @@ _PACKAGES = {
     "mcap": "mcap",
     "pyvrp": "pyvrp",
 }
-_REMEDIES = {
+_OPTIONAL = {
     "pyvrp": "pip install 'aerodaas[routing]' in Python 3.11 or newer, for the optimal scheduler "
     "and fleets",
 }
+"""What one does well without, and how to have it."""
 _MEMORY_NEEDED = 1.0
 _SHARED_MEMORY_NEEDED = 256
 _PORTS = {
@@ -136,8 +137,9 @@ def _package(package: str, module: str) -> Finding:
         importlib.import_module(module)
         return Finding(package, version(package))
     except (ImportError, PackageNotFoundError) as error:
-        remedy = _REMEDIES.get(package, f"pip install {package}")
-        return Finding(package, str(error), ok=False, remedy=remedy)
+        if package in _OPTIONAL:
+            return Finding(package, "not installed", remedy=_OPTIONAL[package])
+        return Finding(package, str(error), ok=False, remedy=f"pip install {package}")
 
 
 def _providers() -> Iterator[Finding]:

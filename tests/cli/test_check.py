@@ -155,10 +155,12 @@ def test_what_fails_is_named_and_the_rest_is_tried(checked: Checked) -> None:
 def test_the_doctor_names_the_extra_that_is_missing(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With its brackets."""
+    """With its brackets; one does well without."""
     monkeypatch.setattr(doctor, "_PACKAGES", {"pyvrp": "no_such_module"})
-    assert not doctor.show_findings("packages", doctor._packages())
+    assert doctor.show_findings("packages", doctor._packages())
     assert "pip install 'aerodaas[routing]'" in " ".join(capsys.readouterr().out.split())
+    monkeypatch.setattr(doctor, "_PACKAGES", {"ray": "no_such_module"})
+    assert not doctor.show_findings("packages", doctor._packages())
 
 
 def test_a_vehicle_that_would_not_take_off_is_told_and_let_go(checked: Checked) -> None:
