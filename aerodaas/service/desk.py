@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import logging
 import secrets
@@ -89,8 +88,8 @@ class MissionDesk:
         self._missions: dict[str, ActiveMission] = {}
         self._attachments = Attachments(settings, bookings, self._missions)
         bookings.flying = self._busy
-        bookings.on_end.append(self._recall)
-        bookings.on_extension.append(self._prolong)
+        bookings.on_end.append(self._tell_flights)
+        bookings.on_extension.append(self._tell_flights)
         for row in store.missions.all(phases=_OPEN):
             self._missions[row.id] = self._active(row)
 
@@ -332,19 +331,11 @@ class MissionDesk:
             raise RefusedError(404, f"{mission} has no {name} yet")
         return files[name]
 
-    def _recall(self, lease: Lease) -> None:
-        """Bring home what flies under a lease that has ended."""
-        self._ask_flying(lease, do="end", reason=f"the lease has ended: {lease.reason}")
-
-    def _prolong(self, lease: Lease) -> None:
-        self._ask_flying(lease, do="extend", ends=lease.ends)
-
-    def _ask_flying(self, lease: Lease, **request: Any) -> None:  # noqa: ANN401 - JSON
+    def _tell_flights(self, lease: Lease) -> None:
+        """Bring home what flies under a lease that has ended; prolong what flies under a longer."""
         for one in self._flying():
             if one.row.lease == lease.id:
-                # A flight knows the end of its lease, whether or not it can be reached.
-                with contextlib.suppress(MissionError):
-                    one.follow().ask(**request)
+                one.tell_lease(lease)
 
     def _run(self) -> None:
         while not self._closed.wait(_TURN_SECONDS):
@@ -496,6 +487,9 @@ class MissionDesk:
         self._garage.note(link.news.status, link.news.preflight)
         if one.attached_to is not None:
             self._attachments.watch(one)
+        elif one.row.lease is not None and not one.recalled:
+            # It may have ended, or been extended, while nobody could tell the flight.
+            one.tell_lease(self._bookings.lease(one.row.lease))
         try:
             outcome = one.flown()
         except LostFlightError as error:

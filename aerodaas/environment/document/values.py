@@ -89,9 +89,8 @@ class ValueWriter:
         """Any value; raises GraphError, with its `place`, for one that is no data."""
         if value is self._environment.env_data:
             raise GraphError(
-                f"{place}: no document holds the environment's data, which may be another's secret; "
-                "an analysis of a package says in its `resources` that an argument is of the "
-                "environment"
+                f"{place}: no document holds the environment's data, which may be secret; an "
+                "analysis says in its `resources` which of its arguments is the environment's"
             )
         plain = value.item() if isinstance(value, np.generic) else value
         if plain is None or isinstance(plain, bool | int | float | str):
