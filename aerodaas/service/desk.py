@@ -25,8 +25,9 @@ from aerodaas.protocol.schemas import (
     NavigationIn,
     PictureForm,
     Role,
+    Scope,
 )
-from aerodaas.service.access import Principal, sees
+from aerodaas.service.access import Principal, require, sees
 from aerodaas.service.attachments import Attachments
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
@@ -293,6 +294,18 @@ class MissionDesk:
         """Whether a mission is this account's own, so that its presence counts."""
         found = self.shown(mission)
         return found.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
+
+    def require_users_side(self, principal: Principal, mission: str) -> None:
+        """Raise RefusedError unless this account may answer for a mission's user.
+
+        It sees what the mission sees and steers it: its token must be as good as for submitting.
+        """
+        one = self._seen(principal, mission)
+        if one.row.tenant != principal.tenant:
+            raise RefusedError(403, f"{mission} is {one.row.tenant}'s")
+        if one.attached_to is None:
+            require(principal, Role.PILOT, Scope.FLY)
+        self._briefing.require_scopes(principal, one.document())
 
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
