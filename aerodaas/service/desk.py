@@ -124,9 +124,11 @@ class MissionDesk:
             with self._lock:
                 self._attachments.check(principal, wanted)
         self._garage.require_fit(robots)
-        self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
+            # It has used up its minutes of the quota already.
             self._bookings.require(principal, wanted.lease, robots)
+        own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
+        self._bookings.require_quota(principal.tenant, own)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
