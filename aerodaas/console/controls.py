@@ -28,6 +28,8 @@ __all__ = ["ControlCommand", "ControlSession", "Freshness", "told_of_controls"]
 ControlCommand: TypeAlias = TakeControls | Steer | ReleaseControls
 _SILENT_SECONDS = 1.0
 """Wall seconds without a velocity after which the controls are let go."""
+_LONGEST = 1000
+"""Characters of a velocity."""
 _LEAST_PERIOD = 0.03
 """Wall seconds between two commands to the drone; of what comes meanwhile the newest counts."""
 _RENEWAL_SECONDS = 1.0
@@ -128,7 +130,8 @@ class ControlSession:
             while True:
                 text = await self._socket.receive_text()
                 try:
-                    wanted = SteerIn.model_validate_json(text)
+                    # Whatever the connection takes, more than this is read for nobody.
+                    wanted = SteerIn.model_validate_json(text[:_LONGEST])
                 except ValidationError as error:
                     first = error.errors(include_input=False)[0]
                     place = ".".join(map(str, first["loc"]))

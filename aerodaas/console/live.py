@@ -14,7 +14,16 @@ from aerodaas.console.hub import StreamHub, Watcher
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.clock import host_time_ns
 
-__all__ = ["Form", "LiveSession", "Rate", "Shown", "StreamNames", "Wanted", "wanted_streams"]
+__all__ = [
+    "Form",
+    "LiveSession",
+    "Rate",
+    "Shown",
+    "StreamNames",
+    "Wanted",
+    "until_refused",
+    "wanted_streams",
+]
 
 Wanted: TypeAlias = tuple[str, PictureForm]
 """A stream, and how its pictures are sent."""
@@ -28,7 +37,7 @@ Form: TypeAlias = Annotated[PictureForm, Query()]
 
 _MOST_STREAMS = 16
 _RENEWAL_SECONDS = 5.0
-"""Wall seconds between two looks at whether a watcher still may watch."""
+"""Wall seconds between two looks at whether a connection still may be had."""
 _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
 
@@ -60,6 +69,12 @@ def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[Wanted]:
     wanted = [(name, form) for name in streams.split(",") if name]
     wanted += [(name, PictureForm.DEPTH) for name in depth.split(",") if name]
     return wanted[:_MOST_STREAMS]
+
+
+async def until_refused(allowed: Callable[[], bool]) -> None:
+    """Return when the one behind a connection may not have it any more; asked in another thread."""
+    while await asyncio.to_thread(allowed):  # noqa: ASYNC110 - a token's end has no event
+        await asyncio.sleep(_RENEWAL_SECONDS)
 
 
 class LiveSession:
@@ -94,7 +109,7 @@ class LiveSession:
         await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
         state = asyncio.create_task(self._state(rate, own=own))
         gone = asyncio.create_task(self._read())
-        ends = [state, gone, asyncio.create_task(self._until_refused(allowed))]
+        ends = [state, gone, asyncio.create_task(until_refused(allowed))]
         jobs = [*ends, *(asyncio.create_task(self._items(*one)) for one in streams)]
         try:
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
@@ -141,11 +156,6 @@ class LiveSession:
                 await self._socket.send_text(item.text)
                 if item.blob:
                     await self._socket.send_bytes(item.blob)
-
-    async def _until_refused(self, allowed: Callable[[], bool]) -> None:
-        """Return when the watcher may not watch any more."""
-        while await asyncio.to_thread(allowed):  # noqa: ASYNC110 - a token's end has no event
-            await asyncio.sleep(_RENEWAL_SECONDS)
 
     async def _read(self) -> None:
         """Return when the watcher has gone; it has nothing to say."""

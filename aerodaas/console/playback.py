@@ -114,6 +114,9 @@ class Player:
 
     def _tell(self, read: float) -> None:
         self._read = read
+        if self._closed:
+            # Nobody looks, and who goes from one to the next would have all of them read at once.
+            raise RecordingError(f"{self._path.name} was closed while it was read")
 
 
 class Players:

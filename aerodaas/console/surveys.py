@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +22,10 @@ __all__ = ["SurveyPlanner"]
 
 _PATIENCE = 10.0
 """Wall seconds for which a request waits for the one before it."""
+_MOST_ASKED = 3
+"""Requests at once, of which one is planned: each has a thread that a command to a drone may need.
+"""
+_BUSY = "other surveys are being planned: ask again in a moment"
 
 
 class SurveyPlanner:
@@ -27,6 +33,7 @@ class SurveyPlanner:
 
     def __init__(self) -> None:
         self._busy = threading.Lock()
+        self._places = threading.BoundedSemaphore(_MOST_ASKED)
 
     def plan(
         self, wanted: SurveyIn, config: EnvironmentConfig, status: StatusOut | None
@@ -41,14 +48,10 @@ class SurveyPlanner:
             raise MissionError(f"{wanted.robot} does not fly in this mission")
         settings = _settings(robot, wanted)
         start, wind = _start(status, robot.start), np.array(config.simulation.wind)
-        if not self._busy.acquire(timeout=_PATIENCE):
-            raise MissionError("other surveys are being planned: ask again in a moment")
-        try:
+        with self._turn():
             survey = plan_survey(
                 robot, wanted.area, settings, start=np.array(start, dtype=np.float64), wind=wind
             )
-        finally:
-            self._busy.release()
         named = (replace(one, id=f"{wanted.name}-{n}") for n, one in enumerate(survey.waypoints, 1))
         reserve = robot.limits.battery_land
         return SurveyOut(
@@ -64,6 +67,21 @@ class SurveyPlanner:
             start=start,
             photos=_photos(survey.photos),
         )
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        """Wait for the requests before, if they are few; raises MissionError otherwise."""
+        if not self._places.acquire(blocking=False):
+            raise MissionError(_BUSY)
+        try:
+            if not self._busy.acquire(timeout=_PATIENCE):
+                raise MissionError(_BUSY)
+            try:
+                yield
+            finally:
+                self._busy.release()
+        finally:
+            self._places.release()
 
 
 def _settings(robot: RobotConfig, wanted: SurveyIn) -> SurveySettings:

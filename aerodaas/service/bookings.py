@@ -52,6 +52,8 @@ class Bookings:
     def for_mission(self, mission: Mission) -> Lease:
         """Ask for the drones of a mission that brought no lease; raises RefusedError."""
         minutes = float(mission.request["minutes"])
+        # Others were submitted as well before any of them had a lease, which alone counts.
+        self.require_quota(mission.tenant, minutes * len(mission.robots))
         wish = LeaseIn(robots=list(mission.robots), minutes=minutes)
         lease, changed = self._book.request(
             wish, mission.tenant, mission.account, time.time(), self._fleet()

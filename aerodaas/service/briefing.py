@@ -50,7 +50,6 @@ class Briefing:
         config = self._settings.config
         robots = robots_of(document)
         _require_known("robot", robots, {robot.id for robot in config.robots})
-        cameras = {one.full_id for one in config.all_sensors() if one.type == "camera"}
         _require_known("sensor", document.sensors, {one.full_id for one in config.all_sensors()})
         if config.compute != "auto":
             wanted = [one.compute for one in document.analyses if one.compute is not None]
@@ -62,11 +61,18 @@ class Briefing:
             text = "its navigation is empty: it flies no drone, and is attached to no mission"
             raise RefusedError(_UNPROCESSABLE, text)
         self._require_actuators(principal.tenant, document)
+        self.require_scopes(principal, document)
+        return robots
+
+    def require_scopes(self, principal: Principal, document: MissionDocument) -> None:
+        """Raise RefusedError for a token not good for what a document senses and computes."""
+        cameras = {
+            one.full_id for one in self._settings.config.all_sensors() if one.type == "camera"
+        }
         if cameras & set(document.sensors):
             require(principal, Role.PILOT, Scope.SENSE)
         if document.analyses:
             require(principal, Role.PILOT, Scope.COMPUTE)
-        return robots
 
     def _require_actuators(self, tenant: str, document: MissionDocument) -> None:
         """Raise RefusedError for a document that moves what the tenant may not."""

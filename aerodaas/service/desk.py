@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import logging
 import secrets
@@ -26,8 +25,9 @@ from aerodaas.protocol.schemas import (
     NavigationIn,
     PictureForm,
     Role,
+    Scope,
 )
-from aerodaas.service.access import Principal, sees
+from aerodaas.service.access import Principal, require, sees
 from aerodaas.service.attachments import Attachments
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
@@ -89,8 +89,8 @@ class MissionDesk:
         self._missions: dict[str, ActiveMission] = {}
         self._attachments = Attachments(settings, bookings, self._missions)
         bookings.flying = self._busy
-        bookings.on_end.append(self._recall)
-        bookings.on_extension.append(self._prolong)
+        bookings.on_end.append(self._tell_flights)
+        bookings.on_extension.append(self._tell_flights)
         for row in store.missions.all(phases=_OPEN):
             self._missions[row.id] = self._active(row)
 
@@ -124,9 +124,11 @@ class MissionDesk:
             with self._lock:
                 self._attachments.check(principal, wanted)
         self._garage.require_fit(robots)
-        self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
+            # It has used up its minutes of the quota already.
             self._bookings.require(principal, wanted.lease, robots)
+        own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
+        self._bookings.require_quota(principal.tenant, own)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
@@ -295,6 +297,18 @@ class MissionDesk:
         found = self.shown(mission)
         return found.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
 
+    def require_users_side(self, principal: Principal, mission: str) -> None:
+        """Raise RefusedError unless this account may answer for a mission's user.
+
+        It sees what the mission sees and steers it: its token must be as good as for submitting.
+        """
+        one = self._seen(principal, mission)
+        if one.row.tenant != principal.tenant:
+            raise RefusedError(403, f"{mission} is {one.row.tenant}'s")
+        if one.attached_to is None:
+            require(principal, Role.PILOT, Scope.FLY)
+        self._briefing.require_scopes(principal, one.document())
+
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
         now = time.monotonic()
@@ -332,19 +346,11 @@ class MissionDesk:
             raise RefusedError(404, f"{mission} has no {name} yet")
         return files[name]
 
-    def _recall(self, lease: Lease) -> None:
-        """Bring home what flies under a lease that has ended."""
-        self._ask_flying(lease, do="end", reason=f"the lease has ended: {lease.reason}")
-
-    def _prolong(self, lease: Lease) -> None:
-        self._ask_flying(lease, do="extend", ends=lease.ends)
-
-    def _ask_flying(self, lease: Lease, **request: Any) -> None:  # noqa: ANN401 - JSON
+    def _tell_flights(self, lease: Lease) -> None:
+        """Bring home what flies under a lease that has ended; prolong what flies under a longer."""
         for one in self._flying():
             if one.row.lease == lease.id:
-                # A flight knows the end of its lease, whether or not it can be reached.
-                with contextlib.suppress(MissionError):
-                    one.follow().ask(**request)
+                one.tell_lease(lease)
 
     def _run(self) -> None:
         while not self._closed.wait(_TURN_SECONDS):
@@ -496,6 +502,9 @@ class MissionDesk:
         self._garage.note(link.news.status, link.news.preflight)
         if one.attached_to is not None:
             self._attachments.watch(one)
+        elif one.row.lease is not None and not one.recalled:
+            # It may have ended, or been extended, while nobody could tell the flight.
+            one.tell_lease(self._bookings.lease(one.row.lease))
         try:
             outcome = one.flown()
         except LostFlightError as error:

@@ -11,17 +11,19 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
-from aerodaas.protocol.schemas import MissionPhase, VerdictOut
+from aerodaas.protocol.schemas import LeaseState, MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.starter import start_process
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import FOLLOWING
-from aerodaas.service.store import Mission
+from aerodaas.service.store import Lease, Mission
+from aerodaas.types.errors import MissionError
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
 
@@ -60,6 +62,10 @@ class ActiveMission:
         self._flying: subprocess.Popen[bytes] | None = None
         """Processes that this service has started; the flight's is never ended from here."""
         self._rehearsed_since = time.monotonic()
+        self._known_lease: dict[str, Any] | None = None
+        """The last word on its lease that its flight has heard."""
+        self._missed_lease: tuple[dict[str, Any], int] | None = None
+        """One that it has not, with the number of its news then."""
 
     def write(self, document: MissionDocument) -> None:
         """Keep the document."""
@@ -151,6 +157,7 @@ class ActiveMission:
     def brief(self, order: FlightOrder, models: ModelShelf) -> None:
         """Write down the flight's order, before anything of it begins."""
         self._prepare(self.flight, order, models)
+        self._known_lease = {"do": "extend", "ends": order.ends}
 
     def take_off(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
@@ -174,6 +181,29 @@ class ActiveMission:
         if self.link is None:
             self.link = FlightLink(self.flight, self._told)
         return self.link
+
+    @property
+    def recalled(self) -> bool:
+        """Whether the flight knows that its lease has ended."""
+        return self._known_lease is not None and self._known_lease["do"] == "end"
+
+    def tell_lease(self, lease: Lease) -> None:
+        """Tell the flight what has become of its lease, unless it knows.
+
+        A flight that is being launched, or hangs, is told again once it has news of its own.
+        """
+        word: dict[str, Any] = {"do": "extend", "ends": lease.ends}
+        if lease.state is LeaseState.ENDED:
+            word = {"do": "end", "reason": f"the lease has ended: {lease.reason}"}
+        link = self.follow()
+        heard = link.news.number
+        if word == self._known_lease or (word, heard) == self._missed_lease:
+            return
+        try:
+            link.ask(**word)
+            self._known_lease = word
+        except MissionError:
+            self._missed_lease = word, heard
 
     def flown(self) -> Outcome | None:
         """How the flight ended; None while it goes on.

@@ -21,6 +21,8 @@ from aerodaas.analytics.remote.serving import web_server
 PATIENCE = 0.5
 _MOST = 2
 _ENOUGH = 10.0
+_LARGE = 32 << 20
+"""Bytes of an answer, more than the system keeps for a client."""
 HEAD = b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\n"
 
 
@@ -42,6 +44,8 @@ async def application(scope: Scope, receive: Receive, send: Send) -> None:
             break
     if scope["path"] == "/slow":
         await asyncio.sleep(3 * PATIENCE)
+    if scope["path"] == "/large":
+        body = bytes(_LARGE)
     length = b"%d" % len(body)
     await send(
         {"type": "http.response.start", "status": 200, "headers": [(b"content-length", length)]}
@@ -54,6 +58,7 @@ def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Port of a server with short patience and two connections."""
     monkeypatch.setattr(serving, "_HEAD_SECONDS", PATIENCE)
     monkeypatch.setattr(serving, "_BODY_SECONDS", PATIENCE)
+    monkeypatch.setattr(serving, "_TAKEN_SECONDS", PATIENCE)
     app: App = application
     server = web_server(app, most_connections=_MOST + 1, lifespan="off", timeout_keep_alive=60)
     with listen("127.0.0.1", 0) as listener:
@@ -133,6 +138,46 @@ def test_an_answer_may_take_longer(port: int) -> None:
                 break
         assert answer.startswith(b"HTTP/1.1 200")
         assert answer.endswith(b"body")
+
+
+def test_clients_that_take_no_answer_make_room_for_others(port: int) -> None:
+    """Also at its end, when the server waits for nothing but its last bytes to leave."""
+    greedy = [client(port) for _ in range(_MOST)]
+    for one in greedy:
+        one.sendall(HEAD.replace(b"POST /", b"POST /large") + b"body")
+    end = time.monotonic() + _ENOUGH
+    while not _answers(port):
+        assert time.monotonic() < end
+    for one in greedy:
+        with suppress(ConnectionError):
+            assert len(_rest(one)) < _LARGE
+        one.close()
+
+
+def _answers(port: int) -> bool:
+    """Whether there is a place for one more."""
+    with client(port) as asking:
+        asking.sendall(HEAD + b"body")
+        return asking.recv(1000).startswith(b"HTTP/1.1 200")
+
+
+def _rest(connection: socket.socket) -> bytes:
+    """All that comes until the connection ends."""
+    found = bytearray()
+    while part := connection.recv(1 << 20):
+        found += part
+    return bytes(found)
+
+
+def test_an_answer_may_be_taken_slowly(port: int) -> None:
+    """It is, as long as some of it is."""
+    with client(port) as slow:
+        slow.sendall(HEAD.replace(b"POST /", b"POST /large") + b"body")
+        taken = 0
+        while taken < _LARGE and (part := slow.recv(1 << 18)):
+            taken += len(part)
+            time.sleep(PATIENCE / 25)
+    assert taken > _LARGE
 
 
 def test_a_body_within_its_time_is_taken(port: int) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, ClassVar, cast
 
@@ -18,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from aerodaas.analytics.remote.schemas import AnswerOut
-from aerodaas.console import controls
+from aerodaas.console import controls, surveys
 from aerodaas.console.controls import Freshness
 from aerodaas.console.server import ConsoleServer
 from aerodaas.mission.commands import (
@@ -29,7 +31,7 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.types.errors import ConfigError
+from aerodaas.types.errors import ConfigError, SchedulerError
 
 FIELD = [[0, 0], [20, 0], [20, 10], [0, 10]]
 SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"}
@@ -192,6 +194,37 @@ def test_surveys_are_refused_with_their_reason(
     """What is malformed, and what cannot be flown."""
     found = ask(flying[0].address(), "/v1/missions/own/survey", {**SURVEY, **changes})
     assert (found[0], text in found[2]["text"]) == (status, True), found[2]
+
+
+def test_surveys_wait_for_few_others(
+    flying: tuple[ConsoleServer, Run], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each that waits has a thread, without which no command would come through."""
+    free, begun = threading.Event(), threading.Event()
+
+    def plan(*_: object, **__: object) -> None:
+        begun.set()
+        assert free.wait(20)
+        raise SchedulerError("as good as planned")
+
+    monkeypatch.setattr(surveys, "plan_survey", plan)
+    server, run = flying
+    pause = {"robot": "drone", "command": "pause"}
+    with ThreadPoolExecutor(60) as pool:
+        asked = [
+            pool.submit(ask, server.address(), "/v1/missions/own/survey", SURVEY) for _ in range(50)
+        ]
+        assert begun.wait(20)
+        assert ask(server.address(), "/v1/missions/own/commands", pause)[0] == 200
+        end = time.monotonic() + 20
+        while sum(one.done() for one in asked) < 50 - surveys._MOST_ASKED:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        free.set()
+        told = [one.result()[2]["text"] for one in asked]
+    assert len(run.commands) == 1
+    assert told.count("as good as planned") == surveys._MOST_ASKED
+    assert sum("other surveys are being planned" in one for one in told) == 50 - surveys._MOST_ASKED
 
 
 def test_the_order_is_one_command(flying: tuple[ConsoleServer, Run]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -16,6 +17,7 @@ from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
+from aerodaas.console import playback
 from aerodaas.console.playback import Player, Players
 from aerodaas.console.viewer import RecordingServer
 from aerodaas.protocol.playback import PlaybackOut
@@ -193,6 +195,28 @@ def test_one_that_cannot_be_read_says_so(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="is not an MCAP"):
         player.picture("cam", 0)
     player.close()
+
+
+def test_one_that_is_closed_is_read_no_further(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who goes from one to the next has a few read at once, and not all."""
+    told = threading.Event()
+    ended = threading.Event()
+
+    def read(_: Recording, tell: Callable[[float], None]) -> None:
+        until = time.monotonic() + 30
+        try:
+            while time.monotonic() < until:
+                tell(0.5)
+                told.set()
+                time.sleep(0.01)
+        finally:
+            ended.set()
+
+    monkeypatch.setattr(playback, "read_flight", read)
+    player = Player(path)
+    assert told.wait(20)
+    player.close()
+    assert ended.wait(10)
 
 
 def test_as_many_are_open_as_a_provider_can_bear(path: Path) -> None:

@@ -8,6 +8,7 @@ import time
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
@@ -178,6 +179,57 @@ def test_a_length_in_the_file_is_not_believed(tmp_path: Path) -> None:
     path.write_bytes(MAGIC + b"".join(record(*body) for body in bodies))
     with little_memory(), Recording.open(path) as recording:
         assert list(recording.records()) == []
+
+
+def repeated(writer: Writer, kind: str, count: int) -> None:
+    """Have a file's index name its only record of a kind so often, by other names."""
+    indexes = getattr(writer, f"_Writer__{kind}_indexes")
+    (one,) = indexes
+    indexes += [replace(one, name=f"{one.name}{number}") for number in range(1, count)]
+    setattr(writer._Writer__statistics, f"{kind}_count", count)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_what_the_index_names_a_thousand_times_is_read_once(tmp_path: Path, *, lies: bool) -> None:
+    """One megabyte that would be a thousand; also where the index tells of a few bytes each."""
+    file = BytesIO()
+    writer = Writer(file, compression=CompressionType.NONE)
+    writer.start()
+    writer.add_metadata("much", {"text": "x" * (MAX_METADATA - 100)})
+    repeated(writer, "metadata", 1000)
+    if lies:
+        for one in writer._Writer__metadata_indexes:  # type: ignore[attr-defined]
+            one.length = 10
+    writer.finish()
+    path = tmp_path / "a.mcap"
+    path.write_bytes(file.getvalue())
+    with little_memory(), Recording.open(path) as recording:
+        assert list(recording.metadata) == ["much"]
+
+
+def test_an_attachment_is_listed_once(tmp_path: Path) -> None:
+    """Who reads all of a kind would read the same bytes for each of its names."""
+    file = BytesIO()
+    writer = Writer(file, compression=CompressionType.NONE)
+    writer.start()
+    writer.add_attachment(1, 1, "vehicle_logs/one/", "text/plain", bytes(1 << 20))
+    repeated(writer, "attachment", 1000)
+    writer.finish()
+    path = tmp_path / "a.mcap"
+    path.write_bytes(file.getvalue())
+    with Recording.open(path) as recording:
+        assert recording.attachments == ["vehicle_logs/one/"]
+        assert recording.attachment("vehicle_logs/one/") == bytes(1 << 20)
+
+
+def test_a_name_ends_with_its_record(tmp_path: Path) -> None:
+    """Each of a thousand attachments claims the rest of the file for its name."""
+    body = bytes(16) + struct.pack("<I", 2**32 - 1) + b"x"
+    path = tmp_path / "a.mcap"
+    padding = record(0x7F, b"y" * (1 << 20))
+    path.write_bytes(MAGIC + record(Opcode.ATTACHMENT, body) * 1000 + padding)
+    with little_memory(), Recording.open(path) as recording:
+        assert recording.attachments == ["x"]
 
 
 def test_channels_have_a_bound(tmp_path: Path) -> None:

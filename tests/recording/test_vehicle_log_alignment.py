@@ -155,3 +155,12 @@ def test_the_robot_is_the_only_one_with_a_clock(tmp_path: Path) -> None:
     assert robot_of(clocks, None) == "two"
     with pytest.raises(RecordingError, match="no clock of an autopilot"):
         robot_of(clocks, "one")
+
+
+def test_a_clock_that_begins_without_end_is_refused() -> None:
+    """A recording may be a stranger's: each start takes as long as the log is."""
+    times = np.arange(0.0, 303.0, 1.0)
+    recorded = RecordedClock([(now, 42.0 + 2.0 * (now % 3.0), np.nan) for now in times])
+    recorded.motion = [(now, 0.0, 0.0, 0.0) for now in times]
+    with pytest.raises(RecordingError, match="began 101 times, more than 100"):
+        align(log_of(FLOWN), recorded)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from random import Random
 
 import numpy as np
 import pytest
+import vehicle_logs
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink import DFReader
@@ -163,6 +165,39 @@ def test_whatever_a_file_holds_it_is_read_or_refused(
         assert all(np.nanmax(np.abs(one), initial=0.0) <= 1e8 for one in series.columns.values())
 
 
+def described(kind: int, name: str, letters: str, columns: str) -> bytes:
+    """A FMT, and a message of its kind."""
+    size = 3 + sum({"Q": 8, "f": 4, "Z": 64, "a": 64}[one] for one in letters)
+    words = [one.encode() for one in (name, letters, columns)]
+    told = struct.pack("<BB4s16s64s", kind, size, *words)
+    return b"\xa3\x95\x80" + told + bytes((0xA3, 0x95, kind)) + b"x" * (size - 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "letters", "columns"),
+    [
+        ("BAT", "ZffQ", "TimeUS,Volt,Curr,x"),
+        ("BAT", "fff", "TimeUS,Volt,Curr"),
+        ("BAT", "QZf", "TimeUS,Volt,Curr"),
+        ("GPS", "QZf", "TimeUS,I,NSats"),
+        ("GPS", "Qaf", "TimeUS,I,NSats"),
+        ("MSG", "Qf", "TimeUS,Message"),
+        ("PARM", "Qff", "TimeUS,Name,Value"),
+        ("MSG", "", ""),
+    ],
+)
+def test_fields_of_another_kind_cost_their_messages(
+    tmp_path: Path, name: str, letters: str, columns: str
+) -> None:
+    """Texts where numbers belong, numbers where texts do, or nothing at all; it is told."""
+    strange = described(0x50, name, letters, columns)
+    whole = dataflash(FLOWN)
+    log = read(tmp_path, whole[:89] + strange + whole[89:])
+    assert firsts(log)["attitude"]["roll"] == 1.0
+    size = len(strange) - 89
+    assert log.damage.startswith(f"{size} of its ")
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -208,4 +243,18 @@ def test_px4_needs_the_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(sys.modules, "pyulog", None)
     assert read(tmp_path, dataflash(FLOWN)).topics
     with pytest.raises(ConfigError, match=r"needs pyulog: pip install 'aerodaas\[logs\]'"):
+        read(tmp_path, ulog(FLOWN))
+
+
+def test_times_that_are_no_numbers_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ULog says itself of which type its timestamps are; nothing can be laid over a mission."""
+    formats = {
+        name: fields.replace("uint64_t timestamp", "double timestamp")
+        for name, fields in vehicle_logs._ULOG.items()
+    }
+    monkeypatch.setattr(vehicle_logs, "_ULOG", formats)
+    monkeypatch.setattr(vehicle_logs, "_us", lambda *_: 0x7FF8 << 48)  # NaN
+    with pytest.raises(RecordingError, match="holds times that are no numbers"):
         read(tmp_path, ulog(FLOWN))

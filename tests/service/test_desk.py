@@ -16,6 +16,7 @@ from served import document, fleet, robot
 from aerodaas.config.model import EnvironmentConfig, SimulationConfig
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
+    LeaseIn,
     MissionIn,
     MissionOut,
     MissionPhase,
@@ -170,6 +171,25 @@ def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: Desk) -> None
     assert one.submit("one", "k").id == first.id
     with pytest.raises(RefusedError, match="out of service"):
         one.submit("one", "other")
+
+
+def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: Desk) -> None:
+    """Each alone was within it when it was submitted, and no lease counted yet."""
+    one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
+    first, second = one.submit("one"), one.submit("two")
+    one.turns()
+    assert one.phase(first) is MissionPhase.FLYING
+    assert one.phase(second) is MissionPhase.REFUSED
+    assert "leaves 5.0 flight minutes" in one.desk.shown(second.id).reason
+
+
+def test_a_lease_counts_once_for_the_quota(one: Desk) -> None:
+    """Its mission needs no further minutes."""
+    one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
+    lease = one.bookings.request(PILOT, LeaseIn(robots=["one"], minutes=15.0))
+    mission = one.submit("one", lease=lease.id)
+    one.turns()
+    assert one.phase(mission) is MissionPhase.FLYING
 
 
 def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from desks import PILOT, Monitor, Provider
+from desks import PILOT, Link, Monitor, Provider
 
-from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
+from aerodaas.service.access import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.mission import ActiveMission
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.monitor.process import FleetMonitor
+from aerodaas.types.errors import MissionError
+
+OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(Scope), "t")
 
 
 @pytest.fixture
@@ -159,3 +166,65 @@ def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
     provider.garage.observe({})
     assert provider.garage.news("one").link is LinkState.MISSION
     assert provider.garage.news("two").reason == "the service looks for it again"
+
+
+class Launching(Link):
+    """A flight whose process does not listen yet."""
+
+    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
+        """Note what is asked; answer once there is news."""
+        super().ask(**request)
+        if not self.news.number:
+            raise MissionError("the flight's process does not answer")
+        return AnswerOut(accepted=True)
+
+
+@pytest.fixture
+def launching(provider: Provider) -> tuple[Launching, str]:
+    """A flight that is being launched, and its lease."""
+    mission = provider.flying()
+    link = Launching()
+    link.news = replace(link.news, number=0)
+    provider.desk._missions[mission.id].link = cast("Any", link)
+    lease = provider.desk.shown(mission.id).lease
+    assert lease is not None
+    return link, lease
+
+
+def test_a_lease_revoked_during_the_launch_brings_the_drone_home(
+    provider: Provider, launching: tuple[Launching, str]
+) -> None:
+    """The flight is told once it listens, and once only; while it hangs nobody waits for it."""
+    link, lease = launching
+    provider.bookings.end(OPERATOR, lease)
+    told = {"do": "end", "reason": "the lease has ended: revoked by olga"}
+    provider.turns()
+    assert link.asked == [told]
+    link.news = replace(link.news, number=1)
+    provider.turns()
+    assert link.asked == [told, told]
+
+
+def test_a_lease_extended_during_the_launch_ends_later(
+    provider: Provider, launching: tuple[Launching, str]
+) -> None:
+    """As its user was told."""
+    link, lease = launching
+    ends = provider.bookings.extend(PILOT, lease, 5.0).ends
+    link.news = replace(link.news, number=1)
+    provider.turns()
+    assert link.asked == [{"do": "extend", "ends": ends}] * 2
+
+
+def test_what_became_of_a_lease_is_told_by_the_next_service(
+    provider: Provider, launching: tuple[Launching, str]
+) -> None:
+    """Where the one before ended in between."""
+    _, lease = launching
+    provider.bookings.end(OPERATOR, lease)
+    (mission,) = provider.desk._missions.values()
+    again = ActiveMission(mission.row, Path(mission.row.folder), provider.store.missions.put)
+    link = again.link = cast("Any", Link())
+    provider.desk._missions[mission.row.id] = again
+    provider.turns()
+    assert link.asked == [{"do": "end", "reason": "the lease has ended: revoked by olga"}]

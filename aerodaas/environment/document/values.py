@@ -87,6 +87,11 @@ class ValueWriter:
 
     def value(self, value: object, place: str) -> Any:  # noqa: ANN401 - any JSON
         """Any value; raises GraphError, with its `place`, for one that is no data."""
+        if value is self._environment.env_data:
+            raise GraphError(
+                f"{place}: no document holds the environment's data, which may be secret; an "
+                "analysis says in its `resources` which of its arguments is the environment's"
+            )
         plain = value.item() if isinstance(value, np.generic) else value
         if plain is None or isinstance(plain, bool | int | float | str):
             return plain
@@ -104,8 +109,6 @@ class ValueWriter:
         """What stands for an object that is known at both ends; None for any other."""
         if value is self._environment:
             return {"$environment": "handle"}
-        if value is self._environment.env_data:
-            return {"$environment": "data"}
         if isinstance(value, Analytics):
             name, settings = self.analysis(value)
             return {"$analysis": name, "settings": settings}
@@ -126,6 +129,8 @@ class ValueWriter:
 
     def _resource(self, value: object, use: ResourceUse, place: str) -> dict[str, Any]:
         if use == "environment":
+            if value is self._environment.env_data:
+                return {"$environment": "data"}
             if found := self._reference(value, place):
                 return found
             raise GraphError(f"{place} comes from the environment file alone: leave it out")
@@ -201,8 +206,6 @@ class ValueReader:
         match content:
             case {"$environment": "handle", **rest} if not rest:
                 return self._environment
-            case {"$environment": "data", **rest} if not rest:
-                return self._environment.env_data
             case {"$condition": str(name), **rest} if not rest and name in _CONDITIONS:
                 return _imported(_CONDITIONS[name])
             case {"$analysis": str(name), "settings": dict(settings), **rest} if not rest:
@@ -214,6 +217,9 @@ class ValueReader:
     def _resource(self, content: Any, use: ResourceUse, place: str) -> Any:  # noqa: ANN401
         if isinstance(content, dict):
             match use, content:
+                case "environment", {"$environment": "data", **rest} if not rest:
+                    # Nowhere else: an analysis that takes it for a setting names it in its error.
+                    return self._environment.env_data
                 case "environment", {"$environment": str(), **rest} if not rest:
                     return self._special("$environment", content, place)
                 case "model", {"$model": str(name), "sha256": str(wanted), **rest} if not rest:

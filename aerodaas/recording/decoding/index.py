@@ -50,6 +50,10 @@ _CHUNK_SIZE = struct.Struct("<QQQ")
 """How a chunk begins: first time, last time, bytes once unpacked."""
 _NEVER = 1 << 64
 """Later than any log time."""
+_TIMES = 16
+"""Bytes of an attachment's two times, before its name."""
+_LONGEST_NAME = 4096
+"""Bytes of an attachment's name that are read."""
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
 
@@ -201,9 +205,15 @@ def _from_summary(file: BinaryIO, summary: Summary, size: int) -> FileIndex:
     ]
     if summary.statistics is not None:
         index.counts.update(summary.statistics.channel_message_counts)
+    named = (*summary.metadata_indexes, *summary.attachment_indexes)
+    if sum(place.length for place in named) > size:
+        # Each would be read, and kept, as often as it is named.
+        raise ValueError("the file's index names records that lie over one another")
     for place in summary.metadata_indexes:
         file.seek(place.offset)
         _, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
+        if _RECORD_HEAD + length != place.length:
+            raise ValueError("a metadata record and the file's index differ in its size")
         _enter_metadata(index, file, length)
     index.attachments = {
         place.name: (place.offset, min(place.length, size)) for place in summary.attachment_indexes
@@ -248,8 +258,9 @@ def _enter(index: FileIndex, file: BinaryIO, opcode: int, offset: int, end: int)
     elif opcode == Opcode.METADATA:
         _enter_metadata(index, file, end - offset - _RECORD_HEAD)
     elif opcode == Opcode.ATTACHMENT:
-        file.read(16)
-        name = ReadDataStream(file).read_prefixed_string()
+        head = BytesIO(file.read(min(end - offset - _RECORD_HEAD, _TIMES + 4 + _LONGEST_NAME)))
+        head.seek(_TIMES)
+        name = ReadDataStream(head).read_prefixed_string()
         index.attachments[name] = (offset, end - offset)
     elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE}:
         block = Block(offset, end - offset, chunked=False)

@@ -19,6 +19,8 @@ __all__ = ["Alignment", "RecordedClock", "align", "recorded_clocks", "robot_of"]
 
 _OVERLAP = 1.0
 """Seconds that a log and a recording have in common at least."""
+_MOST_STARTS = 100
+"""Starts of an autopilot in a recording: each is compared with all of the log."""
 _MOVING = 0.5
 """Metres a second from which a state tells by its motion whose it is."""
 _ROUND = 2**32 / 1e3
@@ -134,11 +136,18 @@ def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
         recorded: The robot's clock and motion, with a pair at least.
 
     Raises:
-        RecordingError: If they have no time in common, or the motion is another's.
+        RecordingError: If they have no time in common, or the motion is another's; or if the
+            autopilot was started more often than any is.
     """
     pairs, motion = np.array(recorded.pairs), np.array(recorded.motion)
     found: list[tuple[float, Alignment]] = []
-    for start in starts_of(pairs):
+    starts = starts_of(pairs)
+    if len(starts) > _MOST_STARTS:
+        raise RecordingError(
+            f"cannot be laid over the recording, in which the autopilot's clock began {len(starts)} "
+            f"times, more than {_MOST_STARTS}: no flight does"
+        )
+    for start in starts:
         clock = _within_days(fit_clock_line(start), log)
         begin, end = clock.mission_time(np.array(log.span))
         if min(end, start[-1, 0]) - max(begin, start[0, 0]) < _OVERLAP:
@@ -150,7 +159,7 @@ def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
     if not found:
         raise RecordingError(
             f"is of another flight: it runs from second {log.span[0]:.0f} to {log.span[1]:.0f} of "
-            f"the autopilot's clock, the recording {_spans(starts_of(pairs))}; {_REMEDY}"
+            f"the autopilot's clock, the recording {_spans(starts)}; {_REMEDY}"
         )
     strange, best = min(found, key=lambda one: one[0])
     if strange > _STRANGE:

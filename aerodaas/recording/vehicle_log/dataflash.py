@@ -40,6 +40,8 @@ _FIELDS = {
 }
 """Fields by their letter."""
 _SCALES = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
+_KINDS = {"TimeUS": "iu", "Message": "S", "Name": "S"}
+"""NumPy's kinds of the fields that are no plain number, in the messages that are read here."""
 _INSTANCES = ("I", "C", "IMU", "Inst", "Instance")
 """Columns that number the sensor or the estimator's core; the first one is shown."""
 _MICROSECONDS = 1e6
@@ -99,6 +101,16 @@ class _Format:
         )
         fits = len(named.letters) == len(named.columns) == len(set(named.columns))
         return kind, named if fits and wanted + 3 == size else None
+
+    @property
+    def sound(self) -> bool:
+        """Whether its fields are of the kinds that they have in the messages read here."""
+        kinds = [np.dtype(_FIELDS[letter]).kind for letter in self.letters if letter in _FIELDS]
+        known = len(kinds) == len(self.columns) > 0
+        return known and all(
+            kind in _KINDS.get(column, "iuf")
+            for kind, column in zip(kinds, self.columns, strict=True)
+        )
 
     @property
     def dtype(self) -> np.dtype[np.void]:
@@ -162,8 +174,10 @@ def _tables(
             kind, told = _Format.unpack(data[at + 3 : at + known.size])
             if told is not None:
                 formats.setdefault(kind, told)
-        elif known.name in _WANTED:
+        elif known.name in _WANTED and known.sound:
             places[data[at + 2]].append(at)
+        elif known.name in _WANTED:
+            lost += known.size
         at += known.size
     # Most end within a message, for the autopilot writes whole blocks: that is no damage.
     raw = np.frombuffer(data, np.uint8)

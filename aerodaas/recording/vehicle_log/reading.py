@@ -61,7 +61,12 @@ def read_vehicle_log(file: Path, name: str = "") -> VehicleLog:
 
 
 def _sane(log: VehicleLog) -> VehicleLog:
-    """`log`, without figures that no vehicle has: a plot would show nothing beside them."""
+    """`log`, without figures that no vehicle has: a plot would show nothing beside them.
+
+    Raises RecordingError if its times are no numbers.
+    """
+    if not np.isfinite(log.span).all():
+        raise RecordingError("holds times that are no numbers: it is damaged; fetch it again")
     topics: dict[Topic, Series] = {}
     for topic, series in log.topics.items():
         columns = {

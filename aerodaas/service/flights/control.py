@@ -12,7 +12,7 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from pydantic import ValidationError
@@ -34,6 +34,10 @@ from aerodaas.types.errors import AeroDaaSError, MissionError
 __all__ = ["ControlServer", "Flown", "Reader"]
 
 _MOST_CONNECTIONS = 64
+_MOST_WATCHING = 48
+"""Connections of these that watch or answer, which a mission's users open: the service has the
+rest to command and follow, or whoever watches much could keep an operator from recalling a drone.
+"""
 _SEND_SECONDS = 5.0
 _QUESTIONS = 64
 """Questions to the user's side that wait to be sent; a fuller queue refuses them."""
@@ -112,6 +116,7 @@ class ControlServer:
             folder.socket, self._serve, name="control", most=_MOST_CONNECTIONS
         )
         self._closed = self._server.closed
+        self._watching = threading.BoundedSemaphore(_MOST_WATCHING)
 
     def start(self) -> None:
         """Accept connections, in a thread of its own."""
@@ -123,20 +128,22 @@ class ControlServer:
 
     def _serve(self, connection: socket.socket) -> None:
         channel = Channel(connection)
+        own = {"command": self._commands, "follow": self._follow}
+        watching = {"items": self._items, "share": self._share, "here": self._here}
         try:
             first, _ = channel.receive(_SEND_SECONDS)
-            purposes: dict[str, Callable[[Channel, dict[str, Any]], None]] = {
-                "command": self._commands,
-                "follow": self._follow,
-                "items": self._items,
-                "share": self._share,
-                "here": self._here,
-            }
-            purposes[first["for"]](channel, first)
+            purpose = first["for"]
+            if purpose in own:
+                own[purpose](channel)
+            elif self._watching.acquire(blocking=False):
+                try:
+                    watching[purpose](channel, first)
+                finally:
+                    self._watching.release()
         except (GuestError, KeyError, OSError):
             return
 
-    def _commands(self, channel: Channel, _: dict[str, Any]) -> None:
+    def _commands(self, channel: Channel) -> None:
         while not self._closed.is_set():
             request = channel.receive()[0]
             channel.send(self._answer(request), timeout=_SEND_SECONDS)
@@ -183,7 +190,7 @@ class ControlServer:
             return Answer(accepted=False, text=f"there is no command {word!r}")
         return self._flown.command(request["robot"], COMMANDS[word])
 
-    def _follow(self, channel: Channel, _: dict[str, Any]) -> None:
+    def _follow(self, channel: Channel) -> None:
         while not self._closed.is_set():
             began = time.monotonic()
             status, alerts = self._flown.status()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from http import HTTPStatus
 
 from starlette.requests import HTTPConnection
 
@@ -11,11 +12,22 @@ from aerodaas.console.access import bearer
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
 from aerodaas.service.errors import RefusedError
+from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Admission"]
 
 _SENDER = "aerodaas.principal"
 """Key of the sender in a request's ASGI scope."""
+_GONE = frozenset(
+    {
+        HTTPStatus.UNAUTHORIZED,
+        HTTPStatus.FORBIDDEN,
+        HTTPStatus.NOT_FOUND,
+        # Of many wrong tokens from the same address; the right one is never told so.
+        HTTPStatus.TOO_MANY_REQUESTS,
+    }
+)
+"""Refusals of who may not go on; any other one is the service's own trouble."""
 
 
 class Admission:
@@ -41,16 +53,27 @@ class Admission:
             raise
         connection.scope[_SENDER] = principal
 
-    def renew(
-        self, connection: HTTPConnection, role: Role, scope: Scope | None = None
-    ) -> Principal:
-        """Look anew at the sender of a request that lasts; raises RefusedError as `require`.
+    def stays(
+        self,
+        connection: HTTPConnection,
+        role: Role,
+        scope: Scope | None,
+        look: Callable[[Principal], object],
+    ) -> bool:
+        """Whether the sender of a request that lasts still may have it; counts as no further one.
 
-        It counts as no further request.
+        `look` raises RefusedError for who may not. The service's own trouble refuses nobody.
         """
         token, address = bearer(connection.headers), _address(connection)
-        connection.scope[_SENDER] = self._access.of(token, address)
-        return self.require(connection, role, scope)
+        try:
+            connection.scope[_SENDER] = self._access.of(token, address)
+            look(self.require(connection, role, scope))
+        except RefusedError as error:
+            return error.status not in _GONE
+        except AeroDaaSError:
+            # The database may not answer for a while.
+            return True
+        return True
 
     def require(
         self, connection: HTTPConnection, role: Role, scope: Scope | None = None

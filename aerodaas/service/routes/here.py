@@ -9,10 +9,11 @@ from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
-from aerodaas.analytics.guests.channel import GuestError
+from aerodaas.analytics.guests.channel import LARGEST_TEXT, GuestError
+from aerodaas.console.live import until_refused
 from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.service.access import Principal
 from aerodaas.service.desk import MissionDesk
-from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.routes.admission import Admission
@@ -43,65 +44,76 @@ class HereRoutes:
         return router
 
     async def here(self, socket: WebSocket, mission: str) -> None:
-        """Carry questions and answers until the mission is over or the user leaves."""
+        """Carry questions and answers until the mission is over, or the user leaves or must go."""
+
+        def look(principal: Principal) -> None:
+            self._desk.require_users_side(principal, mission)
+
+        def allowed() -> bool:
+            return self._admission.stays(socket, Role.PILOT, Scope.COMPUTE, look)
+
         try:
             principal = self._admission.require(socket, Role.PILOT, Scope.COMPUTE)
-            found = await asyncio.to_thread(self._desk.mission, principal, mission)
-            if found.tenant != principal.tenant:
-                raise RefusedError(403, f"{mission} is {found.tenant}'s")
+            with self._admission.auditing(principal, socket):
+                await asyncio.to_thread(look, principal)
         except AeroDaaSError as error:
             await refuse(socket.scope, socket.send, error)
             return
         await socket.accept()
+        user = _User(socket)
+        work = (self._carry(user, mission), user.answer(), until_refused(allowed))
+        jobs = [asyncio.create_task(one) for one in work]
         try:
-            await self._carry(socket, mission)
+            await asyncio.wait(jobs, return_when=asyncio.FIRST_COMPLETED)
         finally:
+            for job in jobs:
+                job.cancel()
+            await asyncio.gather(*jobs, return_exceptions=True)
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
 
-    async def _carry(self, socket: WebSocket, mission: str) -> None:
+    async def _carry(self, user: _User, mission: str) -> None:
         """Connect the user with the mission's flight, again if need be, until it is over."""
         while not self._desk.shown(mission).phase.over:
             folder = self._desk.flight(mission)
-            try:
-                if folder is not None and not await _carried(socket, folder):
-                    return
-            except GuestError:
-                # The flight has not begun to listen, or has ended.
-                pass
+            if folder is not None:
+                # The flight may not have begun to listen, or have ended.
+                with contextlib.suppress(GuestError):
+                    await user.be_asked(folder)
             await asyncio.sleep(_AGAIN_SECONDS)
 
 
-async def _carried(socket: WebSocket, folder: FlightFolder) -> bool:
-    """Carry messages until one side has gone; returns whether the user is still there."""
-    channel = await AsyncChannel.connect(folder, "here")
-    questions = asyncio.create_task(_ask(socket, channel))
-    answers = asyncio.create_task(_answer(socket, channel))
-    try:
-        await asyncio.wait((questions, answers), return_when=asyncio.FIRST_COMPLETED)
-        return not answers.done()
-    finally:
-        channel.close()
-        questions.cancel()
-        answers.cancel()
-        await asyncio.gather(questions, answers, return_exceptions=True)
+class _User:
+    """The user's side, connected with a flight or waiting for one."""
 
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._channel: AsyncChannel | None = None
 
-async def _ask(socket: WebSocket, channel: AsyncChannel) -> None:
-    """Carry questions to the user; raises GuestError when the flight has ended."""
-    while True:
-        question, blob = await channel.receive()
-        await socket.send_text(json.dumps({**question, "blob": bool(blob)}))
-        if blob:
-            await socket.send_bytes(blob)
+    async def be_asked(self, folder: FlightFolder) -> None:
+        """Carry questions to the user; raises GuestError when the flight has ended."""
+        channel = self._channel = await AsyncChannel.connect(folder, "here")
+        try:
+            while True:
+                question, blob = await channel.receive()
+                await self._socket.send_text(json.dumps({**question, "blob": bool(blob)}))
+                if blob:
+                    await self._socket.send_bytes(blob)
+        finally:
+            self._channel = None
+            channel.close()
 
+    async def answer(self) -> None:
+        """Carry answers to the flight; ends with the user, or what no user's side would say.
 
-async def _answer(socket: WebSocket, channel: AsyncChannel) -> None:
-    """Carry answers to the flight; raises WebSocketDisconnect when the user has gone."""
-    while True:
-        answer = _object(await socket.receive_text())
-        blob = await socket.receive_bytes() if answer.pop("blob", False) else b""
-        await channel.send(answer, blob)
+        It always listens: who has gone is noticed before the flight begins, too.
+        """
+        while len(text := await self._socket.receive_text()) <= LARGEST_TEXT:
+            answer = _object(text)
+            blob = await self._socket.receive_bytes() if answer.pop("blob", False) else b""
+            if self._channel is not None:
+                with contextlib.suppress(GuestError):
+                    await self._channel.send(answer, blob)
 
 
 def _object(text: str) -> dict[str, Any]:

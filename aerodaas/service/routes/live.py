@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from http import HTTPStatus
 
 from fastapi import APIRouter, WebSocket
 
@@ -11,15 +10,11 @@ from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.protocol.schemas import PictureForm, Role, Scope
 from aerodaas.service.desk import MissionDesk
-from aerodaas.service.errors import RefusedError
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LiveRoutes"]
-
-_GONE = frozenset({HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN, HTTPStatus.NOT_FOUND})
-"""Refusals of who may not watch; any other one is the service's own trouble."""
 
 
 class LiveRoutes:
@@ -61,15 +56,9 @@ class LiveRoutes:
             return
 
         def allowed() -> bool:
-            try:
-                principal = self._admission.renew(socket, Role.VIEWER, scope)
-                self._desk.mission(principal, mission)
-            except RefusedError as error:
-                return error.status not in _GONE
-            except AeroDaaSError:
-                # The database may not answer for a while.
-                return True
-            return True
+            return self._admission.stays(
+                socket, Role.VIEWER, scope, lambda who: self._desk.mission(who, mission)
+            )
 
         session = LiveSession(socket, self._desk, self._hub, mission)
         await session.run(rate, wanted, own=own, allowed=allowed)

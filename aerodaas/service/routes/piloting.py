@@ -92,9 +92,11 @@ class PilotingRoutes:
 
         def give(command: ControlCommand) -> AnswerOut:
             what = ControlsIn.of(robot, command)
-            answer = self._desk.fly(principal, mission, what)
+            # As the account is now: an operator's hand does not outlive the role.
+            sender = self._admission.require(socket, Role.PILOT, Scope.FLY)
+            answer = self._desk.fly(sender, mission, what)
             if told_of_controls(command):
-                self._audit.note_answer(principal, "controls", f"{mission}/{robot}", answer)
+                self._audit.note_answer(sender, "controls", f"{mission}/{robot}", answer)
             return answer
 
         def renew() -> None:

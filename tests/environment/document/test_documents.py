@@ -278,6 +278,13 @@ def own_address(env: Environment) -> None:
     fly(env)
 
 
+def whole_environment(env: Environment) -> None:
+    """Has the environment's data for a setting."""
+    edge = env.get_compute_resource_by_id("edge")
+    MonitoringAnalytics(battery_low=env.env_data).deploy(edge).analyse(odometry(env))
+    fly(env)
+
+
 def velocities(env: Environment) -> None:
     """Flies by velocities that it gives itself."""
     commands = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(0.2)])
@@ -296,6 +303,7 @@ def velocities(env: Environment) -> None:
         (hooks, r"no hooks of on_start, on_end or start_mission"),
         (callbacks, r"no callbacks of subscribe"),
         (own_address, r"RemoteAnalytics\(port=…\) comes from the environment file alone"),
+        (whole_environment, r"MonitoringAnalytics\(battery_low=…\): no document holds the env"),
         (velocities, r"velocity commands in a document come from analyses"),
         (lambda _: None, r"nothing flies"),
     ],
@@ -414,6 +422,11 @@ def tower(**settings: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
             "names no file or address",
         ),
         (tower(detector={"$condition": "print"}), r"no \$condition 'print'"),
+        (
+            # Named in the analysis' error, the whole file would be the document's author's.
+            monitoring(settings={"readings": [{"$environment": "data"}]}),
+            r"MonitoringAnalytics\.readings: there is no \$environment 'data' here",
+        ),
     ],
 )
 def test_what_cannot_be_flown_here_is_refused(

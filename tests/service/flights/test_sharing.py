@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import threading
 import time
@@ -194,6 +195,38 @@ def test_what_is_not_shared_is_refused_by_the_flight(
     with pytest.raises(SourceError, match=told):
         flight.camera(mission, stream).open()
     assert flight.pictures.packed == 0
+
+
+class Still(Pictures):
+    """A camera without pictures."""
+
+    def next_packed(self, timeout: float) -> None:
+        """None."""
+        time.sleep(timeout / 20)
+
+
+def test_who_watches_much_keeps_nobody_from_commanding(flight: Flight) -> None:
+    """As many views as the control socket has places leave some to the service itself."""
+    flight.pictures = Still()
+    views = [flight.link.items("one/cam") for _ in range(64)]
+    shown = [view for view in views if _shows(view)]
+    assert 0 < len(shown) < len(views)
+    late = FlightLink(flight.folder)
+    assert late.ask(do="heard").accepted
+    late.close()
+    # Each is closed with its generator.
+    views.clear()
+    shown.clear()
+    until = time.monotonic() + 20.0
+    while not _shows(flight.link.items("one/cam")):
+        assert time.monotonic() < until
+
+
+def _shows(view: Any) -> bool:  # noqa: ANN401 - a generator
+    with contextlib.suppress(MissionError):
+        next(view)
+        return True
+    return False
 
 
 def test_a_camera_ends_with_its_flight(flight: Flight) -> None:

@@ -1,0 +1,312 @@
+"""Connections that last: they end with their token, their role and their user."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from served import document, fleet, robot
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from aerodaas.analytics.guests.channel import LARGEST_TEXT
+from aerodaas.analytics.here.relay import HereRelay, HereUser
+from aerodaas.analytics.remote.listening import listen
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.analytics.remote.serving import web_server
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.console import controls as hand
+from aerodaas.console import live
+from aerodaas.protocol.piloting import ControlsIn
+from aerodaas.protocol.schemas import AccountIn, MissionPhase, Role, Scope, TokenIn
+from aerodaas.service import mission as missions
+from aerodaas.service.access import Accounts
+from aerodaas.service.app import build_service
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.flights.control import ControlServer, Flown
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.routes import here
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Store
+
+ENOUGH = 20.0
+SEEN = {
+    "id": "one/seen",
+    "here": {"produces": "Detections"},
+    "reads": ["one/cam"],
+}
+
+
+class Process:
+    """A process that runs."""
+
+    def poll(self) -> int | None:
+        """None."""
+
+
+class Flying:
+    """What a control socket asks of a flight."""
+
+    over = False
+
+    def command(self, robot: str, command: object) -> Any:  # noqa: ANN401
+        """Accept."""
+        del robot, command
+        return AnswerOut(accepted=True)
+
+    def status(self) -> tuple[dict[str, Any], list[str]]:
+        """Nothing to tell."""
+        return {}, []
+
+    def preflight(self) -> dict[str, Any]:
+        """No list."""
+        return {}
+
+    def analytics(self) -> None:
+        """None."""
+
+    def streams(self) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+class Service:
+    """A service in this process, whose flights are the test's."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / "fleet.json"
+        drone = robot("one")
+        drone["sensors"].append({"id": "cam", "type": "camera"})
+        self.path.write_text(json.dumps(fleet(drone)), encoding="utf-8")
+        config = EnvironmentConfig.load(self.path)
+        self.settings = ServiceSettings(
+            self.path, config, folder / "s", rehearse=False, monitor=False
+        )
+        self.settings.state.mkdir()
+        self.store = Store.open(folder / "service.db")
+        self.accounts = Accounts(self.store)
+        self.desks: list[MissionDesk] = []
+        self.port = 0
+        self.relay: HereRelay | None = None
+        self.token("root", role=Role.ADMIN)
+
+    def token(self, name: str, *scopes: Scope, role: Role = Role.PILOT, of: str = "farm") -> str:
+        """A token of an account, which is made if it is new."""
+        with contextlib.suppress(Exception):
+            self.accounts.add(AccountIn(name=name, tenant=of, role=role))
+        made = self.accounts.issue(TokenIn(account=name, scopes=list(scopes or Scope)))
+        return str(made.secret)
+
+    def revoke(self, name: str) -> None:
+        """Revoke an account's tokens."""
+        for one in self.accounts.tokens(name):
+            self.accounts.revoke(one.id)
+
+    @contextlib.contextmanager
+    def socket(self, path: str, token: str) -> Iterator[ClientConnection]:
+        """A WebSocket."""
+        url = f"ws://127.0.0.1:{self.port}/v1/missions/{path}"
+        with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as found:
+            yield found
+
+    def submit(self, **changes: object) -> str:
+        """A mission whose user's side sees by a camera; returns its id once it flies."""
+        from aerodaas.protocol.schemas import MissionIn  # noqa: PLC0415 - a request
+        from aerodaas.service.access import Principal  # noqa: PLC0415 - its sender
+
+        self.token("asha")
+        pilot = Principal("asha", "farm", Role.PILOT, frozenset(Scope), "t")
+        sensors = ["one/odometry", "one/cam"]
+        flight = document("one", (5, 0), sensors=sensors, analyses=[SEEN], **changes)
+        (desk,) = self.desks
+        return desk.submit(pilot, MissionIn.model_validate({"document": flight})).id
+
+    def fly(self, mission: str) -> ControlServer:
+        """The flight's own end, once the desk has begun it."""
+        (desk,) = self.desks
+        until(lambda: desk.shown(mission).phase is MissionPhase.FLYING)
+        folder = FlightFolder(self.settings.missions / mission / "f")
+        watch = LeaseWatch(FlightOrder.read(folder.order), lambda _: None)
+        self.relay = HereRelay(folder.path / "here")
+        server = ControlServer(folder, cast("Flown", Flying()), watch, self.relay)
+        server.start()
+        return server
+
+
+def until(look: Callable[[], object]) -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + ENOUGH
+    while not look():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
+    """A service that looks at its connections often."""
+    for module in (live, hand):
+        monkeypatch.setattr(module, "_RENEWAL_SECONDS", 0.1)
+    monkeypatch.setattr(here, "_AGAIN_SECONDS", 0.05)
+    monkeypatch.setattr(missions, "start_process", lambda *_, **__: Process())
+    start = MissionDesk.start
+    with tempfile.TemporaryDirectory(prefix="lasting-", dir="/tmp") as folder:
+        made = Service(Path(folder))
+
+        def started(desk: MissionDesk) -> None:
+            made.desks.append(desk)
+            start(desk)
+
+        monkeypatch.setattr(MissionDesk, "start", started)
+        server = web_server(build_service(made.settings, made.store), most_connections=50)
+        with listen("127.0.0.1", 0) as listener:
+            made.port = listener.getsockname()[1]
+            thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+            thread.start()
+            until(lambda: made.desks)
+            yield made
+            server.should_exit = True
+            thread.join(ENOUGH)
+        made.store.close()
+
+
+def closed(socket: ClientConnection) -> bool:
+    """Whether the service ends a connection, of whose messages nobody makes anything."""
+    try:
+        while True:
+            socket.recv(ENOUGH)
+    except ConnectionClosed:
+        return True
+    except TimeoutError:
+        return False
+
+
+@pytest.mark.parametrize("change", ["token", "account", "role"])
+def test_the_users_side_ends_with_its_token(service: Service, change: str) -> None:
+    """It sees by the mission's cameras and steers by what it answers."""
+    mission = service.submit()
+    flight = service.fly(mission)
+    with service.socket(f"{mission}/here", service.token("ivan")) as socket:
+        assert service.relay is not None
+        assert service.relay.wait_attached(ENOUGH)
+        if change == "token":
+            service.revoke("ivan")
+        elif change == "account":
+            service.accounts.change("ivan", disabled=True)
+        else:
+            service.accounts.change("ivan", role=Role.VIEWER)
+        assert closed(socket)
+    until(lambda: not cast("HereRelay", service.relay)._attached.is_set())
+    flight.close()
+
+
+@pytest.mark.parametrize("lacks", list(Scope))
+def test_the_users_side_needs_what_submitting_needs(service: Service, lacks: Scope) -> None:
+    """Its pictures, its navigation and its analyses would be had without the scope."""
+    mission = service.submit()
+    token = service.token("ivan", *(one for one in Scope if one is not lacks))
+    with pytest.raises(InvalidStatus) as refused, service.socket(f"{mission}/here", token):
+        pass
+    assert refused.value.response.status_code == 403
+    assert f"not good for {lacks.value}" in (refused.value.response.body or b"").decode()
+
+
+def test_a_user_who_leaves_before_the_flight_is_waited_for_no_longer(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each that was would hold one of the service's places until the mission is over."""
+    monkeypatch.setattr(MissionDesk, "flight", lambda *_: None)
+    left: list[bool] = []
+    answer = here._User.answer
+
+    async def noted(user: here._User) -> None:
+        try:
+            await answer(user)
+        finally:
+            left.append(True)
+
+    monkeypatch.setattr(here._User, "answer", noted)
+    mission = service.submit()
+    with service.socket(f"{mission}/here", service.token("ivan")) as socket:
+        socket.send(json.dumps({"number": 1}))
+    until(lambda: left)
+
+
+def test_what_the_users_side_says_reaches_the_flight(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Except what is longer than any answer, which ends the connection before it is read."""
+    heard: list[object] = []
+    monkeypatch.setattr(HereUser, "answered", lambda _, message, __: heard.append(message))
+    mission = service.submit()
+    flight = service.fly(mission)
+    with service.socket(f"{mission}/here", service.token("ivan")) as socket:
+        assert service.relay is not None
+        assert service.relay.wait_attached(ENOUGH)
+        socket.send(json.dumps({"number": 1, "item": None}))
+        until(lambda: heard)
+        socket.send(json.dumps({"number": 2, "item": "x" * LARGEST_TEXT}))
+        assert closed(socket)
+    assert heard == [{"number": 1, "item": None}]
+    flight.close()
+
+
+def test_wrong_tokens_beside_it_keep_no_view_open(service: Service) -> None:
+    """Of which there may be so many from one address that each is told to wait."""
+    mission = service.submit()
+    with service.socket(f"{mission}/live", service.token("ivan")) as socket:
+        socket.recv(ENOUGH)
+        for _ in range(12):
+            with pytest.raises(InvalidStatus), service.socket(f"{mission}/live", "wrong"):
+                pass
+        service.revoke("ivan")
+        assert closed(socket)
+
+
+def test_an_operators_hand_is_a_pilots_once_the_role_is_gone(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another tenant's drone is not steered any more."""
+    asked: list[tuple[Role, str]] = []
+
+    def fly(_: MissionDesk, who: Any, mission: str, what: ControlsIn) -> AnswerOut:  # noqa: ANN401
+        del mission
+        asked.append((who.role, "steers" if what.steer else "takes or leaves"))
+        return AnswerOut(accepted=True)
+
+    monkeypatch.setattr(MissionDesk, "fly", fly)
+    monkeypatch.setattr(hand, "_SILENT_SECONDS", ENOUGH)
+    mission = service.submit()
+    flight = service.fly(mission)
+    operator = service.token("olga", role=Role.OPERATOR, of="provider")
+    with service.socket(f"{mission}/controls?robot=one", operator) as socket:
+        assert json.loads(socket.recv(ENOUGH))["held"]
+        service.accounts.change("olga", role=Role.PILOT)
+        until(lambda: _steers(socket, asked) is Role.PILOT)
+    flight.close()
+
+
+def _steers(socket: ClientConnection, asked: list[tuple[Role, str]]) -> Role | None:
+    socket.send(json.dumps({"at": 1000 * time.monotonic(), "forward": 1}))
+    socket.recv(ENOUGH)
+    roles = [role for role, what in asked if what == "steers"]
+    return roles[-1] if roles else None
+
+
+def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
+    """What would take a gigabyte as JSON is not read as such."""
+    mission = service.submit()
+    flight = service.fly(mission)
+    with service.socket(f"{mission}/controls?robot=one", service.token("ivan")) as socket:
+        socket.recv(ENOUGH)
+        socket.send('{"at": 0, "forward": 1' + " " * 10_000 + "}")
+        assert not json.loads(socket.recv(ENOUGH))["held"]
+    flight.close()
