@@ -144,8 +144,8 @@ def align(log: VehicleLog, recorded: RecordedClock) -> Alignment:
     starts = starts_of(pairs)
     if len(starts) > _MOST_STARTS:
         raise RecordingError(
-            f"cannot be laid over the recording, in which the autopilot's clock began {len(starts)} "
-            f"times, more than {_MOST_STARTS}: no flight does"
+            "cannot be laid over the recording, in which the autopilot's clock began "
+            f"{len(starts)} times, more than {_MOST_STARTS}: no flight does"
         )
     for start in starts:
         clock = _within_days(fit_clock_line(start), log)
