@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig, SimulationConfig
@@ -190,6 +191,37 @@ def test_a_lease_counts_once_for_the_quota(one: Desk) -> None:
     mission = one.submit("one", lease=lease.id)
     one.turns()
     assert one.phase(mission) is MissionPhase.FLYING
+
+
+def _nested(levels: int) -> list[Any]:
+    return [_nested(levels - 1)] if levels else []
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("\ud800", "half of a surrogate pair"),
+        ({"\ud800": 1}, "half of a surrogate pair"),
+        (_nested(300), "more than 40 levels"),
+        (float("nan"), "must be a finite number"),
+    ],
+    ids=["text", "key", "deep", "number"],
+)
+@pytest.mark.parametrize("place", ["settings", "task", "triggers", "trajectory_scheduler"])
+def test_what_no_file_can_hold_is_refused_before_one_is_made(
+    value: object, told: str, place: str
+) -> None:
+    """It would be the service's own failure, with a folder for each."""
+    watch: dict[str, Any] = {"id": "one/watch", "analysis": "MonitoringAnalytics"}
+    changes: dict[str, Any] = {"analyses": [watch]}
+    if place == "triggers":
+        watch[place] = [{"target": "one", "command": "end_mission", "when": value}]
+    elif place == "trajectory_scheduler":
+        changes[place] = {"name": "optimal", "settings": {"x": value}}
+    else:
+        watch[place] = {"x": value}
+    with pytest.raises(ValidationError, match=told):
+        MissionIn.model_validate({"document": document("one", (5, 0), **changes)})
 
 
 def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
