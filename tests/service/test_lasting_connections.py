@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import json
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
 
@@ -34,6 +36,7 @@ from aerodaas.service.flights.control import ControlServer, Flown
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
@@ -92,7 +95,8 @@ class Service:
             self.path, config, folder / "s", rehearse=False, monitor=False
         )
         self.settings.state.mkdir()
-        self.store = Store.open(folder / "service.db")
+        self.file = folder / "service.db"
+        self.store = Store.open(self.file)
         self.accounts = Accounts(self.store)
         self.desks: list[MissionDesk] = []
         self.port = 0
@@ -117,6 +121,14 @@ class Service:
         url = f"ws://127.0.0.1:{self.port}/v1/missions/{path}"
         with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as found:
             yield found
+
+    def status(self, method: str, path: str, token: str, body: object = None) -> int:
+        """Status of the answer to a request."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ENOUGH)
+        headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+        connection.request(method, f"/v1/{path}", json.dumps(body) if body else None, headers)
+        with contextlib.closing(connection):
+            return connection.getresponse().status
 
     def submit(self, **changes: object) -> str:
         """A mission whose user's side sees by a camera; returns its id once it flies."""
@@ -299,6 +311,43 @@ def _steers(socket: ClientConnection, asked: list[tuple[Role, str]]) -> Role | N
     socket.recv(ENOUGH)
     roles = [role for role, what in asked if what == "steers"]
     return roles[-1] if roles else None
+
+
+def test_who_was_refused_is_not_remembered_while_the_database_is_gone(service: Service) -> None:
+    """Not even where the token was never tried after that; others command on."""
+    root, ivan = service.token("root"), service.token("ivan")
+    assert service.status("GET", "fleet", ivan) == 200
+    (token,) = [one.id for one in service.accounts.tokens("ivan")]
+    assert service.status("DELETE", f"tokens/{token}", root) == 200
+    olga = service.token("olga")
+    assert service.status("GET", "fleet", olga) == 200
+    change = {"scopes": ["sense"]}
+    assert service.status("PATCH", "accounts/olga", root, change) == 200
+    service.file.rename(service.file.with_suffix(".away"))
+    assert service.status("GET", "fleet", root) == 200
+    assert service.status("GET", "fleet", ivan) == 503
+    assert service.status("GET", "fleet", olga) == 503
+    service.file.with_suffix(".away").rename(service.file)
+
+
+def test_a_model_that_is_kept_holds_up_nobody(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its hash and the disk take a while, and a command may be waiting."""
+    begun, free = threading.Event(), threading.Event()
+
+    def put(*_: object) -> None:
+        begun.set()
+        assert free.wait(ENOUGH)
+
+    monkeypatch.setattr(ModelShelf, "put", put)
+    token = service.token("ivan")
+    with ThreadPoolExecutor(1) as pool:
+        kept = pool.submit(service.status, "PUT", f"models/{'0' * 64}", token, "model")
+        assert begun.wait(ENOUGH)
+        assert service.status("GET", "fleet", token) == 200
+        free.set()
+        assert kept.result() == 204
 
 
 def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
