@@ -252,6 +252,33 @@ def test_a_user_who_leaves_before_the_flight_is_waited_for_no_longer(
     until(lambda: left)
 
 
+def test_a_flights_question_is_answered_by_the_users_side(service: Service) -> None:
+    """Also by one that was there before the flight, and one that came anew; with a picture."""
+    mission = service.submit()
+    token = service.token("ivan")
+    with service.socket(f"{mission}/here", token) as before:
+        flight = service.fly(mission)
+        relay = cast("HereRelay", service.relay)
+        assert relay.wait_attached(ENOUGH)
+        assert _answered(relay, before) == {"item": 7}
+    until(lambda: not relay._attached.is_set())
+    with service.socket(f"{mission}/here", token) as again:
+        assert relay.wait_attached(ENOUGH)
+        assert _answered(relay, again) == {"item": 7}
+    flight.close()
+
+
+def _answered(relay: HereRelay, socket: ClientConnection) -> dict[str, Any]:
+    """What a question becomes to which the user says 7."""
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(relay.ask, {"do": "process", "key": "one/seen"}, b"picture")
+        question = json.loads(socket.recv(ENOUGH))
+        assert (question["key"], question["blob"]) == ("one/seen", True)
+        assert socket.recv(ENOUGH) == b"picture"
+        socket.send(json.dumps({"number": question["number"], "item": 7, "blob": False}))
+        return asked.result()
+
+
 def test_what_the_users_side_says_reaches_the_flight(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
