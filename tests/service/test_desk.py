@@ -31,6 +31,7 @@ from aerodaas.service.access import Principal, Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.link import FlightNews
 from aerodaas.service.flights.order import Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
@@ -325,6 +326,29 @@ def test_so_is_a_flight_that_cannot_be_heard(
 
 def _unreadable() -> None:
     raise OSError("unreadable")
+
+
+def test_a_flight_is_followed_once(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many ask for it first: each link more would look for its flight for ever."""
+    made: list[object] = []
+
+    class Link:
+        news = FlightNews()
+
+        def __init__(self, *_: object) -> None:
+            time.sleep(0.05)
+            made.append(self)
+
+        def close(self) -> None:
+            """Nothing."""
+
+    monkeypatch.setattr(missions, "FlightLink", Link)
+    mission = one.submit("one")
+    active = one.desk._missions[mission.id]
+    with ThreadPoolExecutor(8) as pool:
+        links = set(pool.map(lambda _: active.follow(), range(8)))
+    assert links == set(made)
+    assert len(made) == 1
 
 
 def test_trees_stand_where_the_missions_own_seed_has_them(
