@@ -27,11 +27,13 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.console import controls as hand
 from aerodaas.console import live
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AccountIn, MissionPhase, Role, Scope, TokenIn
+from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
+from aerodaas.service import gate
 from aerodaas.service import mission as missions
-from aerodaas.service.access import Accounts
+from aerodaas.service.access import Accounts, Principal
 from aerodaas.service.app import build_service
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.control import ControlServer, Flown
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
@@ -133,7 +135,6 @@ class Service:
     def submit(self, **changes: object) -> str:
         """A mission whose user's side sees by a camera; returns its id once it flies."""
         from aerodaas.protocol.schemas import MissionIn  # noqa: PLC0415 - a request
-        from aerodaas.service.access import Principal  # noqa: PLC0415 - its sender
 
         self.token("asha")
         pilot = Principal("asha", "farm", Role.PILOT, frozenset(Scope), "t")
@@ -178,7 +179,7 @@ def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
             start(desk)
 
         monkeypatch.setattr(MissionDesk, "start", started)
-        server = web_server(build_service(made.settings, made.store), most_connections=50)
+        server = web_server(build_service(made.settings, made.store), most_connections=100)
         with listen("127.0.0.1", 0) as listener:
             made.port = listener.getsockname()[1]
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
@@ -375,6 +376,31 @@ def test_a_model_that_is_kept_holds_up_nobody(
         assert service.status("GET", "fleet", token) == 200
         free.set()
         assert kept.result() == 204
+
+
+def test_who_asks_much_at_once_keeps_nobody_waiting(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some answers take long, and the threads that give them are everybody's."""
+    free = threading.Event()
+    seen_by = FleetView.seen_by
+
+    def slow(view: FleetView, who: Principal) -> FleetOut:
+        if who.account == "ivan":
+            assert free.wait(ENOUGH)
+        return seen_by(view, who)
+
+    monkeypatch.setattr(FleetView, "seen_by", slow)
+    greedy, other = service.token("ivan"), service.token("olga")
+    with ThreadPoolExecutor(45) as pool:
+        asked = [pool.submit(service.status, "GET", "fleet", greedy) for _ in range(45)]
+        until(lambda: sum(one.done() for one in asked) == 45 - gate._MOST_AT_ONCE)
+        assert service.status("GET", "fleet", other) == 200
+        free.set()
+    statuses = [one.result() for one in asked]
+    assert sorted(set(statuses)) == [200, 429]
+    assert statuses.count(200) == gate._MOST_AT_ONCE
+    assert service.status("GET", "fleet", greedy) == 200
 
 
 def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
