@@ -11,13 +11,14 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
-from aerodaas.config.json_text import read_json
+from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data
+from aerodaas.types.errors import ConfigError
 from aerodaas.types.identifiers import ScopedWord, Word
 from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
@@ -76,6 +77,18 @@ HERE_ITEMS: dict[HereItem, type] = {
 }
 """What an analysis at the user's side may produce, by name; `object` is anything but pictures, and
 a class of the application's own is known at the user's side alone."""
+
+
+def _plain(value: object) -> object:
+    """Refuse what no file can hold, which a request's JSON may; raises ValueError."""
+    try:
+        check_plain(value, "its value")
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+    return value
+
+
+_Settings = Annotated[dict[str, Any], Field(max_length=_MOST), AfterValidator(_plain)]
 
 
 class _Entry(BaseModel):
@@ -145,7 +158,7 @@ class SchedulerEntry(_Entry):
     """A registered scheduler and its settings."""
 
     name: Word
-    settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    settings: _Settings = Field(default_factory=dict)
 
 
 class TriggerEntry(_Entry):
@@ -155,7 +168,7 @@ class TriggerEntry(_Entry):
     """Id of the analysis that is woken, or of the robot that is commanded."""
     command: Literal["end_mission", "pause_mission", "resume_mission"] | None = None
     """The robot's method; None for an analysis."""
-    when: Any = None
+    when: Annotated[Any, AfterValidator(_plain)] = None
     """The condition, as a value of the document; None for every result."""
 
     @property
@@ -179,14 +192,14 @@ class AnalysisEntry(_Entry):
     analysis: Word | None = None
     here: HereEntry | None = None
     """For one at the user's side, which has neither `analysis` nor settings, compute or task."""
-    settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    settings: _Settings = Field(default_factory=dict)
     """Arguments of its constructor."""
     reads: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors by full id, and analyses; empty for a source of its own."""
     compute: ScopedWord | None = None
     rate: Annotated[float, Field(gt=0, le=_MOST_HERTZ)] | None = None
     """Hz of a source of its own, where the application set it."""
-    task: dict[str, Any] | None = None
+    task: _Settings | None = None
     """Benefit and costs for the analytics scheduler, where the application set them."""
     triggers: list[TriggerEntry] = Field(default_factory=list, max_length=_MOST)
 

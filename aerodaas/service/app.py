@@ -54,6 +54,7 @@ def build_service(
     audit = Audit(store)
     issuer = None if settings.oidc is None else OidcVerifier(settings.oidc)
     accounts, access = Accounts(store), Access(store, audit, tell, issuer=issuer)
+    accounts.on_change = access.forget
     quotas, garage = Quotas(store), Garage(settings.config, store)
     models = ModelShelf(settings.models)
     bookings = Bookings(settings.config, store, garage, quotas)

@@ -1,14 +1,16 @@
-"""The gate before the service: who sends a request, and how large it is, before it is read."""
+"""The gate before the service: who sends a request, how large it is, and beside how many."""
 
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from http import HTTPStatus
 
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from aerodaas.console.page import is_page
+from aerodaas.service.access import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
 from aerodaas.service.routes.admission import Admission
@@ -19,15 +21,20 @@ __all__ = ["Gate"]
 
 _LARGEST_BODY = 4 << 20
 """Bytes of a JSON body: a document of 10,000 waypoints has 2 MB."""
+_MOST_AT_ONCE = 16
+"""Requests of one account that are answered at once, less than the threads that answer: who asks
+for more, and for what takes long, would keep others' commands waiting."""
 
 
 class Gate:
-    """ASGI middleware that admits valid tokens only, and bodies of a bounded size."""
+    """ASGI middleware that admits valid tokens only, bodies of a bounded size, and few at once."""
 
     def __init__(self, app: ASGIApp, admission: Admission) -> None:
         """Protect `app`."""
         self._app = app
         self._admission = admission
+        self._answered: Counter[str] = Counter()
+        """Requests that are being answered, by account."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it."""
@@ -40,11 +47,25 @@ class Gate:
             return
         try:
             most = _bound_of(connection)
-            await asyncio.to_thread(self._admission.enter, connection)
+            sender = await asyncio.to_thread(self._admission.enter, connection)
+            if scope["type"] == "http" and self._answered[sender.account] >= _MOST_AT_ONCE:
+                await asyncio.to_thread(self._turn_away, sender, connection)
         except AeroDaaSError as error:
             await refuse(scope, send, error)
             return
-        await self._app(scope, _Bounded(receive, most), send)
+        # A WebSocket that lasts is none that others wait for.
+        count = Counter([sender.account] if scope["type"] == "http" else [])
+        self._answered += count
+        try:
+            await self._app(scope, _Bounded(receive, most), send)
+        finally:
+            self._answered -= count
+
+    def _turn_away(self, sender: Principal, connection: HTTPConnection) -> None:
+        status = int(HTTPStatus.TOO_MANY_REQUESTS)
+        text = f"{_MOST_AT_ONCE} requests of {sender.account} are being answered: wait for one"
+        with self._admission.auditing(sender, connection):
+            raise RefusedError(status, text, retry_after=1.0)
 
 
 def _bound_of(connection: HTTPConnection) -> int:

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -53,6 +54,7 @@ class ActiveMission:
         self.flight = FlightFolder(path / "f")
         self.rehearsal = FlightFolder(path / "r")
         self.link: FlightLink | None = None
+        self._linking = threading.Lock()
         self.version = 0
         """Counts the changes."""
         self.handing_over = False
@@ -177,10 +179,11 @@ class ActiveMission:
                 os.killpg(self._flying.pid, signal.SIGKILL)
 
     def follow(self) -> FlightLink:
-        """The link to the flight, made when it is first needed."""
-        if self.link is None:
-            self.link = FlightLink(self.flight, self._told)
-        return self.link
+        """The link to the flight, made when it is first needed, in any thread."""
+        with self._linking:
+            if self.link is None:
+                self.link = FlightLink(self.flight, self._told)
+            return self.link
 
     @property
     def recalled(self) -> bool:

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 import pytest
 import zstandard
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 from mcap_files import Said, write_file
@@ -27,6 +28,8 @@ from aerodaas.recording.decoding.limits import (
     MAX_CHUNK,
     MAX_METADATA,
 )
+from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
+from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
@@ -230,6 +233,48 @@ def test_a_name_ends_with_its_record(tmp_path: Path) -> None:
     path.write_bytes(MAGIC + record(Opcode.ATTACHMENT, body) * 1000 + padding)
     with little_memory(), Recording.open(path) as recording:
         assert recording.attachments == ["x"]
+
+
+def test_a_message_of_empty_messages_is_no_table(tmp_path: Path) -> None:
+    """Two bytes of each, packed to nearly none, take a hundred as a row."""
+    files = FileDescriptorSet()
+    file = files.file.add(name="many.proto", package="x", syntax="proto3")
+    file.message_type.add(name="Nothing")
+    field = file.message_type.add(name="Many").field.add(name="one", number=1, label=3, type=11)
+    field.type_name = ".x.Nothing"
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as output:
+        writer = Writer(output)
+        writer.start()
+        schema = writer.register_schema("x.Many", "protobuf", files.SerializeToString())
+        channel = writer.register_channel("/many", "protobuf", schema)
+        writer.add_message(channel, 1, b"\x0a\x00" * 10, 1)
+        writer.add_message(channel, 2, b"\x0a\x00" * (1 << 20), 2)
+        writer.finish()
+    assert path.stat().st_size < 10_000
+    with Recording.open(path) as recording:
+        few, many = (record.value for record in recording.records())
+    assert plain_fields(few) == {"one": [{}] * 10}
+    with little_memory(), pytest.raises(BrokenMessageError, match="bytes of fields"):
+        plain_fields(many)
+
+
+def test_messages_of_fields_of_their_own_are_no_table(tmp_path: Path) -> None:
+    """Each row would have the fields of all others, too."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as output:
+        writer = Writer(output)
+        writer.start()
+        channel = writer.register_channel("/odd", "json", 0)
+        for number in range(2000):
+            writer.add_message(channel, number, b'{"%d": 1}' % number, number)
+        writer.finish()
+    with (
+        little_memory(),
+        Recording.open(path) as recording,
+        pytest.raises(RecordingError, match=r"2003 different fields.*no table"),
+    ):
+        table_of(recording, "/odd")
 
 
 def test_channels_have_a_bound(tmp_path: Path) -> None:

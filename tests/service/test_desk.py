@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig, SimulationConfig
@@ -30,6 +31,7 @@ from aerodaas.service.access import Principal, Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.link import FlightNews
 from aerodaas.service.flights.order import Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
@@ -192,6 +194,37 @@ def test_a_lease_counts_once_for_the_quota(one: Desk) -> None:
     assert one.phase(mission) is MissionPhase.FLYING
 
 
+def _nested(levels: int) -> list[Any]:
+    return [_nested(levels - 1)] if levels else []
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("\ud800", "half of a surrogate pair"),
+        ({"\ud800": 1}, "half of a surrogate pair"),
+        (_nested(300), "more than 40 levels"),
+        (float("nan"), "must be a finite number"),
+    ],
+    ids=["text", "key", "deep", "number"],
+)
+@pytest.mark.parametrize("place", ["settings", "task", "triggers", "trajectory_scheduler"])
+def test_what_no_file_can_hold_is_refused_before_one_is_made(
+    value: object, told: str, place: str
+) -> None:
+    """It would be the service's own failure, with a folder for each."""
+    watch: dict[str, Any] = {"id": "one/watch", "analysis": "MonitoringAnalytics"}
+    changes: dict[str, Any] = {"analyses": [watch]}
+    if place == "triggers":
+        watch[place] = [{"target": "one", "command": "end_mission", "when": value}]
+    elif place == "trajectory_scheduler":
+        changes[place] = {"name": "optimal", "settings": {"x": value}}
+    else:
+        watch[place] = {"x": value}
+    with pytest.raises(ValidationError, match=told):
+        MissionIn.model_validate({"document": document("one", (5, 0), **changes)})
+
+
 def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
     """A flight that was ordered and has not begun is begun; one that has begun is not."""
     first, second = one.submit("one"), one.submit("two")
@@ -293,6 +326,29 @@ def test_so_is_a_flight_that_cannot_be_heard(
 
 def _unreadable() -> None:
     raise OSError("unreadable")
+
+
+def test_a_flight_is_followed_once(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many ask for it first: each link more would look for its flight for ever."""
+    made: list[object] = []
+
+    class Link:
+        news = FlightNews()
+
+        def __init__(self, *_: object) -> None:
+            time.sleep(0.05)
+            made.append(self)
+
+        def close(self) -> None:
+            """Nothing."""
+
+    monkeypatch.setattr(missions, "FlightLink", Link)
+    mission = one.submit("one")
+    active = one.desk._missions[mission.id]
+    with ThreadPoolExecutor(8) as pool:
+        links = set(pool.map(lambda _: active.follow(), range(8)))
+    assert links == set(made)
+    assert len(made) == 1
 
 
 def test_trees_stand_where_the_missions_own_seed_has_them(

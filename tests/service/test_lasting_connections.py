@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import http.client
 import json
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,15 +27,18 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.console import controls as hand
 from aerodaas.console import live
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AccountIn, MissionPhase, Role, Scope, TokenIn
+from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
+from aerodaas.service import gate
 from aerodaas.service import mission as missions
-from aerodaas.service.access import Accounts
+from aerodaas.service.access import Accounts, Principal
 from aerodaas.service.app import build_service
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.control import ControlServer, Flown
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
@@ -92,7 +97,8 @@ class Service:
             self.path, config, folder / "s", rehearse=False, monitor=False
         )
         self.settings.state.mkdir()
-        self.store = Store.open(folder / "service.db")
+        self.file = folder / "service.db"
+        self.store = Store.open(self.file)
         self.accounts = Accounts(self.store)
         self.desks: list[MissionDesk] = []
         self.port = 0
@@ -118,10 +124,17 @@ class Service:
         with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as found:
             yield found
 
+    def status(self, method: str, path: str, token: str, body: object = None) -> int:
+        """Status of the answer to a request."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=ENOUGH)
+        headers = {"Authorization": f"Bearer {token}", "Content-Type": "application/json"}
+        connection.request(method, f"/v1/{path}", json.dumps(body) if body else None, headers)
+        with contextlib.closing(connection):
+            return connection.getresponse().status
+
     def submit(self, **changes: object) -> str:
         """A mission whose user's side sees by a camera; returns its id once it flies."""
         from aerodaas.protocol.schemas import MissionIn  # noqa: PLC0415 - a request
-        from aerodaas.service.access import Principal  # noqa: PLC0415 - its sender
 
         self.token("asha")
         pilot = Principal("asha", "farm", Role.PILOT, frozenset(Scope), "t")
@@ -166,7 +179,7 @@ def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
             start(desk)
 
         monkeypatch.setattr(MissionDesk, "start", started)
-        server = web_server(build_service(made.settings, made.store), most_connections=50)
+        server = web_server(build_service(made.settings, made.store), most_connections=100)
         with listen("127.0.0.1", 0) as listener:
             made.port = listener.getsockname()[1]
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
@@ -240,6 +253,33 @@ def test_a_user_who_leaves_before_the_flight_is_waited_for_no_longer(
     until(lambda: left)
 
 
+def test_a_flights_question_is_answered_by_the_users_side(service: Service) -> None:
+    """Also by one that was there before the flight, and one that came anew; with a picture."""
+    mission = service.submit()
+    token = service.token("ivan")
+    with service.socket(f"{mission}/here", token) as before:
+        flight = service.fly(mission)
+        relay = cast("HereRelay", service.relay)
+        assert relay.wait_attached(ENOUGH)
+        assert _answered(relay, before) == {"item": 7}
+    until(lambda: not relay._attached.is_set())
+    with service.socket(f"{mission}/here", token) as again:
+        assert relay.wait_attached(ENOUGH)
+        assert _answered(relay, again) == {"item": 7}
+    flight.close()
+
+
+def _answered(relay: HereRelay, socket: ClientConnection) -> dict[str, Any]:
+    """What a question becomes to which the user says 7."""
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(relay.ask, {"do": "process", "key": "one/seen"}, b"picture")
+        question = json.loads(socket.recv(ENOUGH))
+        assert (question["key"], question["blob"]) == ("one/seen", True)
+        assert socket.recv(ENOUGH) == b"picture"
+        socket.send(json.dumps({"number": question["number"], "item": 7, "blob": False}))
+        return asked.result()
+
+
 def test_what_the_users_side_says_reaches_the_flight(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -299,6 +339,68 @@ def _steers(socket: ClientConnection, asked: list[tuple[Role, str]]) -> Role | N
     socket.recv(ENOUGH)
     roles = [role for role, what in asked if what == "steers"]
     return roles[-1] if roles else None
+
+
+def test_who_was_refused_is_not_remembered_while_the_database_is_gone(service: Service) -> None:
+    """Not even where the token was never tried after that; others command on."""
+    root, ivan = service.token("root"), service.token("ivan")
+    assert service.status("GET", "fleet", ivan) == 200
+    (token,) = [one.id for one in service.accounts.tokens("ivan")]
+    assert service.status("DELETE", f"tokens/{token}", root) == 200
+    olga = service.token("olga")
+    assert service.status("GET", "fleet", olga) == 200
+    change = {"scopes": ["sense"]}
+    assert service.status("PATCH", "accounts/olga", root, change) == 200
+    service.file.rename(service.file.with_suffix(".away"))
+    assert service.status("GET", "fleet", root) == 200
+    assert service.status("GET", "fleet", ivan) == 503
+    assert service.status("GET", "fleet", olga) == 503
+    service.file.with_suffix(".away").rename(service.file)
+
+
+def test_a_model_that_is_kept_holds_up_nobody(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its hash and the disk take a while, and a command may be waiting."""
+    begun, free = threading.Event(), threading.Event()
+
+    def put(*_: object) -> None:
+        begun.set()
+        assert free.wait(ENOUGH)
+
+    monkeypatch.setattr(ModelShelf, "put", put)
+    token = service.token("ivan")
+    with ThreadPoolExecutor(1) as pool:
+        kept = pool.submit(service.status, "PUT", f"models/{'0' * 64}", token, "model")
+        assert begun.wait(ENOUGH)
+        assert service.status("GET", "fleet", token) == 200
+        free.set()
+        assert kept.result() == 204
+
+
+def test_who_asks_much_at_once_keeps_nobody_waiting(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some answers take long, and the threads that give them are everybody's."""
+    free = threading.Event()
+    seen_by = FleetView.seen_by
+
+    def slow(view: FleetView, who: Principal) -> FleetOut:
+        if who.account == "ivan":
+            assert free.wait(ENOUGH)
+        return seen_by(view, who)
+
+    monkeypatch.setattr(FleetView, "seen_by", slow)
+    greedy, other = service.token("ivan"), service.token("olga")
+    with ThreadPoolExecutor(45) as pool:
+        asked = [pool.submit(service.status, "GET", "fleet", greedy) for _ in range(45)]
+        until(lambda: sum(one.done() for one in asked) == 45 - gate._MOST_AT_ONCE)
+        assert service.status("GET", "fleet", other) == 200
+        free.set()
+    statuses = [one.result() for one in asked]
+    assert sorted(set(statuses)) == [200, 429]
+    assert statuses.count(200) == gate._MOST_AT_ONCE
+    assert service.status("GET", "fleet", greedy) == 200
 
 
 def test_a_velocity_is_no_longer_than_one(service: Service) -> None:

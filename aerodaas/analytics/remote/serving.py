@@ -71,7 +71,10 @@ class _ImpatientProtocol(_Protocol):
         super().resume_writing()
         self._stop_taking()
 
-    def handle_websocket_upgrade(self, *more: Any) -> None:  # noqa: ANN401 - one or the other's
+    def handle_websocket_upgrade(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self,
+        *more: Any,  # noqa: ANN401 - of one of the two protocols
+    ) -> None:
         self.transport.set_write_buffer_limits()
         super().handle_websocket_upgrade(*more)
 

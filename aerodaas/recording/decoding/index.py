@@ -205,8 +205,8 @@ def _from_summary(file: BinaryIO, summary: Summary, size: int) -> FileIndex:
     ]
     if summary.statistics is not None:
         index.counts.update(summary.statistics.channel_message_counts)
-    named = (*summary.metadata_indexes, *summary.attachment_indexes)
-    if sum(place.length for place in named) > size:
+    named = sum(place.length for place in summary.metadata_indexes)
+    if named + sum(place.length for place in summary.attachment_indexes) > size:
         # Each would be read, and kept, as often as it is named.
         raise ValueError("the file's index names records that lie over one another")
     for place in summary.metadata_indexes:

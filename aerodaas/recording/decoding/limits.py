@@ -15,6 +15,7 @@ __all__ = [
     "MAX_JSON",
     "MAX_KEYS",
     "MAX_METADATA",
+    "MAX_PROTOBUF_FIELDS",
     "MAX_RATIO",
     "MAX_ROS",
     "MAX_UNPACKED",
@@ -36,6 +37,9 @@ MAX_JSON = 32 << 20
 MAX_ROS = 1 << 20
 """Bytes of a ROS 2 message other than a picture: a thousand detections take 400 kB, and thirty
 times as much as objects."""
+MAX_PROTOBUF_FIELDS = 1 << 20
+"""Bytes of a protobuf message, less its own bytes such as a picture's, that is written as a table;
+a message of two bytes within it takes a hundred times as many."""
 MAX_DEPTH = 32
 """Levels of nesting of a JSON message; ours have six, and Python's stack ends near 1000."""
 MAX_METADATA = 1 << 20

@@ -19,7 +19,11 @@ from pydantic import ConfigDict, Field, TypeAdapter, with_config
 from typing_extensions import NotRequired, TypedDict
 
 from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
-from aerodaas.recording.decoding.limits import MAX_DEPTH, MAX_JSON
+from aerodaas.recording.decoding.limits import (
+    MAX_DEPTH,
+    MAX_JSON,
+    MAX_PROTOBUF_FIELDS,
+)
 from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.vehicle import FlightEnd, VehicleMode
@@ -379,6 +383,10 @@ def plain_fields(message: Message) -> dict[str, Any]:
         }
         for name in lengths:
             message.ClearField(name)
+        if message.ByteSize() > MAX_PROTOBUF_FIELDS:
+            raise ValueError(  # noqa: TRY301 - told as all that is wrong with it
+                f"more than {MAX_PROTOBUF_FIELDS} bytes of fields"
+            )
         fields: dict[str, Any] = MessageToDict(message, preserving_proto_field_name=True)
         json.dumps(fields, ensure_ascii=False).encode()
     except Exception as error:

@@ -21,6 +21,10 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["table_of", "write_csv", "write_parquet"]
 
 Row = dict[str, Any]
+_SPARSE = 16
+"""Cells of a table for each one that holds anything; ours have hardly more than one."""
+_FEW = 1_000_000
+"""Cells that any table may have beyond that."""
 
 
 def table_of(recording: Recording, topic: str) -> list[Row]:
@@ -37,7 +41,8 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
         One dictionary per message, in the order of recording; missing fields are None.
 
     Raises:
-        RecordingError: If the channel or its encoding is unknown.
+        RecordingError: If the channel or its encoding is unknown, or hardly two messages have the
+            same fields.
     """
     name = _known(recording, topic)
     rows = []
@@ -60,6 +65,11 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
         _flatten(value, "", row)
         rows.append(row)
     columns = dict.fromkeys(key for row in rows for key in row)
+    if len(rows) * len(columns) > _SPARSE * sum(map(len, rows)) + _FEW:
+        raise RecordingError(
+            f"the messages of {name} have {len(columns)} different fields, hardly two the same: "
+            "they make no table"
+        )
     return [{column: row.get(column) for column in columns} for row in rows]
 
 

@@ -31,8 +31,8 @@ class Access:
     """Tells who sends a request by its token; wrong tokens are counted, slowed and audited.
 
     The right token is never refused for the wrong ones of others behind the same address. While
-    the database does not answer, a token that was right in the last ten minutes stays so, for its
-    drones must still obey. Threads may share it.
+    the database does not answer, a token that was right in the last ten minutes, and whose account
+    has not changed since, stays so, for its drones must still obey. Threads may share it.
     """
 
     def __init__(
@@ -95,6 +95,12 @@ class Access:
             required=False,
         )
         raise refusal
+
+    def forget(self, account: str) -> None:
+        """Remember no token of an account while the database does not answer: it has changed."""
+        with self._lock:
+            for key in [one for one, (who, _) in self._known.items() if who.account == account]:
+                del self._known[key]
 
     def _look_up(self, text: str) -> Principal | None:
         given = parse(text)

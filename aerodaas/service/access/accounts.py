@@ -36,6 +36,8 @@ class Accounts:
         self._store = store
         self._clock = clock
         self._lock = threading.Lock()
+        self.on_change: Callable[[str], None] = lambda _: None
+        """Called with the name of an account that has changed, or lost a token."""
 
     def first_token(self) -> str | None:
         """Make the account `admin` with a token of a year; None if there is a token already.
@@ -134,7 +136,9 @@ class Accounts:
                     raise RefusedError(409, "no administrator would be left: make another first")
                 return new
 
-            return _account_out(self._store.accounts.update(name, changed))
+            found = _account_out(self._store.accounts.update(name, changed))
+        self.on_change(name)
+        return found
 
     def get(self, name: str) -> AccountOut:
         """An account; raises RefusedError with status 404 if there is none."""
@@ -179,7 +183,9 @@ class Accounts:
 
     def revoke(self, token: str) -> TokenOut:
         """Revoke a token by its id; raises RefusedError with status 404 if there is none."""
-        return _token_out(self._store.tokens.update(token, lambda row: replace(row, revoked=True)))
+        row = self._store.tokens.update(token, lambda row: replace(row, revoked=True))
+        self.on_change(row.account)
+        return _token_out(row)
 
     def tokens(self, account: str | None = None) -> list[TokenOut]:
         """Tokens of an account, or all, oldest first, without their secrets."""

@@ -24,6 +24,8 @@ _CONNECT_SECONDS = 2.0
 _ANSWER_SECONDS = 10.0
 _SILENT_SECONDS = 15.0
 _AGAIN_SECONDS = 0.2
+_MOST_ASKED = 8
+"""Requests of a mission's users at once, each of which has a thread that others' may need."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,20 @@ class FlightNews:
     """The list before take-off by robot."""
 
 
+class _Lane:
+    """A connection for requests, one at a time."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.channel: Channel | None = None
+
+    def drop(self) -> None:
+        """Close the connection; with the lock held."""
+        if self.channel is not None:
+            self.channel.close()
+            self.channel = None
+
+
 class FlightLink:
     """Commands to one flight, its news, and its streams' items; safe in any thread."""
 
@@ -47,8 +63,8 @@ class FlightLink:
         """Follow the flight in `folder`; `told` is called after each news, in another thread."""
         self._folder = folder
         self._told = told
-        self._lock = threading.Lock()
-        self._channel: Channel | None = None
+        self._users, self._own = _Lane(), _Lane()
+        self._places = threading.BoundedSemaphore(_MOST_ASKED)
         self._closed = threading.Event()
         self.news = FlightNews()
         threading.Thread(target=self._follow, name="flight", daemon=True).start()
@@ -56,24 +72,40 @@ class FlightLink:
     def close(self) -> None:
         """Follow no more; the flight goes on."""
         self._closed.set()
-        with self._lock:
-            self._drop()
+        for lane in (self._users, self._own):
+            with lane.lock:
+                lane.drop()
 
     def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
         """Send a request and return its answer.
 
-        Raises MissionError if the flight cannot be reached; a request that was sent is not sent
-        again, for it may have been carried out.
+        One of a user (`operator` is False) waits for those of users before it; an operator's and
+        the service's own wait for none of them, for what a flight does not answer takes long.
+
+        Raises MissionError if the flight cannot be reached, or has too many to answer; a request
+        that was sent is not sent again, for it may have been carried out.
         """
-        with self._lock:
+        if request.get("operator", True):
+            return self._asked(self._own, request)
+        if not self._places.acquire(blocking=False):
+            raise MissionError(
+                f"the flight has {_MOST_ASKED} commands to answer: ask again in a moment"
+            )
+        try:
+            return self._asked(self._users, request)
+        finally:
+            self._places.release()
+
+    def _asked(self, lane: _Lane, request: dict[str, Any]) -> AnswerOut:
+        with lane.lock:
             try:
-                if self._channel is None:
-                    self._channel = self._connected("command")
-                self._channel.send(request, timeout=_ANSWER_SECONDS)
-                answer, _ = self._channel.receive(_ANSWER_SECONDS)
+                if lane.channel is None:
+                    lane.channel = self._connected("command")
+                lane.channel.send(request, timeout=_ANSWER_SECONDS)
+                answer, _ = lane.channel.receive(_ANSWER_SECONDS)
                 return AnswerOut.model_validate(answer)
             except (GuestError, OSError, ValidationError) as error:
-                self._drop()
+                lane.drop()
                 raise MissionError(f"the flight's process does not answer: {error}") from None
 
     def items(
@@ -113,11 +145,6 @@ class FlightLink:
         channel = Channel(connection)
         channel.send({"for": purpose, **more}, timeout=_CONNECT_SECONDS)
         return channel
-
-    def _drop(self) -> None:
-        if self._channel is not None:
-            self._channel.close()
-            self._channel = None
 
     def _follow(self) -> None:
         while not self._closed.is_set():

@@ -39,7 +39,7 @@ class Admission:
         self._audit = audit
         self._rates = rates
 
-    def enter(self, connection: HTTPConnection) -> None:
+    def enter(self, connection: HTTPConnection) -> Principal:
         """Find out who sends a request, before its body is read; raises RefusedError."""
         address = _address(connection)
         principal: Principal | None = None
@@ -52,6 +52,7 @@ class Admission:
                 self._refuse(principal, connection, error)
             raise
         connection.scope[_SENDER] = principal
+        return principal
 
     def stays(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -93,6 +94,7 @@ class FleetRoutes:
             content += part
             if len(content) > LARGEST_MODEL:
                 raise RefusedError(413, f"a model has at most {LARGEST_MODEL >> 20} MiB")
-        self._models.put(sha256, bytes(content))
+        # A large one takes a while to be hashed and written, and others do not wait for it.
+        await asyncio.to_thread(self._models.put, sha256, bytes(content))
         self._audit.write(principal, "model.put", sha256, f"{len(content)} bytes", accepted=True)
         return Response(status_code=204)

@@ -7,6 +7,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import PictureForm
+from aerodaas.service.flights import link
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -195,6 +197,36 @@ def test_what_is_not_shared_is_refused_by_the_flight(
     with pytest.raises(SourceError, match=told):
         flight.camera(mission, stream).open()
     assert flight.pictures.packed == 0
+
+
+def test_an_operators_word_waits_for_no_users(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of whose commands the flight answers one after the other, or none while its drone hangs."""
+    begun, free = threading.Event(), threading.Event()
+
+    def hang(robot: str, command: object) -> Any:  # noqa: ANN401
+        del robot, command
+        begun.set()
+        assert free.wait(20)
+        raise MissionError("late")
+
+    monkeypatch.setattr(flight, "command", hang)
+    monkeypatch.setattr(link, "_ANSWER_SECONDS", 60.0)
+    words = {"do": "pause", "robot": "one", "operator": False}
+    with ThreadPoolExecutor(40) as pool:
+        asked = [pool.submit(flight.link.ask, **words) for _ in range(40)]
+        assert begun.wait(20)
+        assert flight.link.ask(do="end", reason="revoked").accepted
+        assert sum(one.done() for one in asked) <= 40 - link._MOST_ASKED
+        until = time.monotonic() + 20
+        while sum(one.done() for one in asked) < 40 - link._MOST_ASKED:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        free.set()
+    refused = [one for one in asked if one.exception()]
+    assert len(refused) == 40 - link._MOST_ASKED
+    assert "8 commands to answer" in str(refused[0].exception())
 
 
 class Still(Pictures):
