@@ -10,6 +10,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from aerodaas.console.page import is_page
+from aerodaas.protocol.schemas import Role
 from aerodaas.service.access import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
@@ -48,13 +49,14 @@ class Gate:
         try:
             most = _bound_of(connection)
             sender = await asyncio.to_thread(self._admission.enter, connection)
-            if scope["type"] == "http" and self._answered[sender.account] >= _MOST_AT_ONCE:
+            # A WebSocket that lasts is none that others wait for; an operator is never turned away.
+            counts = scope["type"] == "http" and not sender.role.reaches(Role.OPERATOR)
+            if counts and self._answered[sender.account] >= _MOST_AT_ONCE:
                 await asyncio.to_thread(self._turn_away, sender, connection)
         except AeroDaaSError as error:
             await refuse(scope, send, error)
             return
-        # A WebSocket that lasts is none that others wait for.
-        count = Counter([sender.account] if scope["type"] == "http" else [])
+        count = Counter([sender.account] if counts else [])
         self._answered += count
         try:
             await self._app(scope, _Bounded(receive, most), send)

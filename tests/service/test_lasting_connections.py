@@ -403,6 +403,17 @@ def test_who_asks_much_at_once_keeps_nobody_waiting(
     assert service.status("GET", "fleet", greedy) == 200
 
 
+def test_an_operator_is_never_turned_away(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever else the account has asked for: it may be a drone that must come home."""
+    monkeypatch.setattr(gate, "_MOST_AT_ONCE", 0)
+    token = service.token("olga")
+    service.accounts.change("olga", role=Role.OPERATOR)
+    assert service.status("GET", "fleet", token) == 200
+    assert service.status("GET", "fleet", service.token("ivan")) == 429
+
+
 def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
     """What would take a gigabyte as JSON is not read as such."""
     mission = service.submit()
