@@ -21,6 +21,7 @@ const STEP = 0.05;
 const HISTORY = 1200;
 const SUMS = 0.5;
 const STALE = 2500;
+const GROUNDED = ["idle", "preflight", "landed", "aborted"];
 const CONFIRMING = 30000;
 
 export type Word = CommandIn["command"];
@@ -89,6 +90,8 @@ export class Flight {
   /** Where what was seen stands. */
   readonly marks = new GroundMarks();
   private told: string[] = [];
+  /** Mission seconds of each robot's newest status, and when that came. */
+  private readonly news = new Map<string, { time: number; came: number }>();
   private orderCount = 0;
 
   constructor(
@@ -231,7 +234,7 @@ export class Flight {
 
   private take(mission: MissionOut): void {
     this.mission = mission;
-    this.heard = Date.now();
+    this.heard = this.newest(mission);
     this.over = ["landed", "failed", "cancelled", "refused"].includes(mission.phase);
     for (const [robot, status] of Object.entries(mission.status)) this.follow(robot, status);
     const sums = mission.analytics;
@@ -240,6 +243,21 @@ export class Flight {
     }
     this.takeAlerts(mission.alerts);
     for (const order of this.orders) this.confirm(order);
+  }
+
+  /** When every drone in the air had told something: a server repeats what it knows of a flight
+   *  whose process hangs. */
+  private newest(mission: MissionOut): number {
+    const now = Date.now();
+    let heard = now;
+    for (const [robot, status] of Object.entries(mission.status)) {
+      if (this.news.get(robot)?.time !== status.time) {
+        this.news.set(robot, { time: status.time, came: now });
+      }
+      if (GROUNDED.includes(status.state)) continue;
+      heard = Math.min(heard, this.news.get(robot)?.came ?? now);
+    }
+    return heard;
   }
 
   private follow(robot: string, status: StatusOut): void {

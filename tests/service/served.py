@@ -17,6 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import psutil
 from typing_extensions import Self
 
 START_SECONDS = 60.0
@@ -176,3 +177,13 @@ class Served:
         while not condition():
             assert time.monotonic() < until, self.log.read_text()[-3000:]
             time.sleep(0.1)
+
+
+def process_of(provider: Served, mission: str) -> psutil.Process:
+    """The process of a mission."""
+    folder = str(provider.folder / "s" / "m" / mission)
+    for process in psutil.process_iter(["cmdline"]):
+        line = process.info["cmdline"] or [""]
+        if "aerodaas.service.flights" in line and line[-1].startswith(folder):
+            return process
+    raise AssertionError(mission)

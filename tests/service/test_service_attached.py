@@ -7,9 +7,8 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-import psutil
 import pytest
-from served import Served, document, fleet, robot
+from served import Served, document, fleet, process_of, robot
 from websockets.sync.client import connect
 
 from aerodaas.recording.reader import Recording
@@ -57,16 +56,6 @@ def items(provider: Served, mission: str, token: str, count: int) -> list[Any]:
             if text.get("kind") == "item":
                 found.append(text["item"])
     return found
-
-
-def process_of(provider: Served, mission: str) -> psutil.Process:
-    """The process of a mission."""
-    folder = str(provider.folder / "s" / "m" / mission)
-    for process in psutil.process_iter(["cmdline"]):
-        line = process.info["cmdline"] or [""]
-        if "aerodaas.service.flights" in line and line[-1].startswith(folder):
-            return process
-    raise AssertionError(mission)
 
 
 def test_another_tenant_senses_beside_the_flight(provider: Served) -> None:
