@@ -119,8 +119,8 @@ def _inherited() -> dict[str, str]:
 
 
 def _failure(told: dict[str, object] | None) -> str:
-    reason = "timed out" if told is None else str(told.get("error", "its supervisor was killed"))
-    if "timed out" not in reason:
+    reason = None if told is None else str(told.get("error", "its supervisor was killed"))
+    if reason is not None and "timed out" not in reason:
         return f"Ray does not start on this machine: {reason}"
     load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     return (

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
@@ -217,7 +218,7 @@ def _plot(result: LabResult, names: list[str], resources: Resources, folder: Pat
         file = folder / f"{stem}_timeline_{_file_name(name)}.png"
         plot_timeline(traces[name], file, title, middle, middle + 6)
     plot_observations(traces, path, folder / f"{stem}_over_time.png")
-    Console().print(f"plots in {folder}", highlight=False, markup=False)
+    typer.echo(f"plots in {folder}")
 
 
 def _file_name(text: str) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import typer
 from rich.console import Console
 
 from aerodaas.cli.lab_study import spread_of, workload_of
@@ -71,8 +72,8 @@ def sweep(
     if has_extra("plots"):
         files += _plot(result, figures, out)
     else:
-        Console().print("plots: pip install 'aerodaas[plots]'", highlight=False, markup=False)
-    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
+        typer.echo("plots: pip install 'aerodaas[plots]'")
+    typer.echo(f"in {out}: {', '.join(files)}")
 
 
 def parse_sweeps(texts: Sequence[str]) -> dict[str, list[Any]]:

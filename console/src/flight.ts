@@ -21,7 +21,8 @@ const STEP = 0.05;
 const HISTORY = 1200;
 const SUMS = 0.5;
 const STALE = 2500;
-const GROUNDED = ["idle", "preflight", "landed", "aborted"];
+/** States of a drone that is not in the air. */
+export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
 const CONFIRMING = 30000;
 
 export type Word = CommandIn["command"];
@@ -250,12 +251,11 @@ export class Flight {
   private newest(mission: MissionOut): number {
     const now = Date.now();
     let heard = now;
-    for (const [robot, status] of Object.entries(mission.status)) {
-      if (this.news.get(robot)?.time !== status.time) {
-        this.news.set(robot, { time: status.time, came: now });
-      }
-      if (GROUNDED.includes(status.state)) continue;
-      heard = Math.min(heard, this.news.get(robot)?.came ?? now);
+    for (const [robot, { time, state }] of Object.entries(mission.status)) {
+      const last = this.news.get(robot);
+      const newest = last?.time === time ? last : { time, came: now };
+      this.news.set(robot, newest);
+      if (!GROUNDED.has(state)) heard = Math.min(heard, newest.came);
     }
     return heard;
   }

@@ -5,7 +5,7 @@ import { useEffect, useMemo, useState } from "preact/hooks";
 import { SideBySide } from "./beside";
 import { AnalyticsCharts, Charts } from "./charts";
 import { Refused, ask, keepToken, readFragment, takeToken, writeFragment } from "./connection";
-import type { Flight } from "./flight";
+import { type Flight, GROUNDED } from "./flight";
 import { FlightMap } from "./map";
 import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
 import { type LeasedArea, type Place, type Point, areasOf, placeOf } from "./place";
@@ -30,7 +30,6 @@ type Theme = (typeof THEMES)[number];
 const LOOK = 2000;
 /** Tenant of a flight of one's own. */
 const OWN = "own";
-const GROUND = new Set(["idle", "preflight", "landed", "aborted"]);
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 interface Known {
@@ -251,7 +250,7 @@ function Console(props: ConsoleProps) {
   const fence = place.fences.find((one) => one.robot === robot);
   /** Whether this is a provider's page, with a fleet and other missions than one's own. */
   const provided = first.tenant !== OWN;
-  const grounded = GROUND.has(flight.status(robot)?.state ?? "idle");
+  const grounded = GROUNDED.has(flight.status(robot)?.state ?? "idle");
   const others = missions.filter((one) => one.recording && one.id !== first.id);
   return (
     <div class={`page ${recorded ? "played" : ""}`}>
@@ -306,7 +305,7 @@ function Console(props: ConsoleProps) {
       {flight.stale && (
         <p class="banner bad" role="alert" data-testid="banner">
           No word from the flight for {((Date.now() - flight.heard) / 1000).toFixed(0)} s: what is
-          shown is old. Connecting again…
+          shown is old.{!flight.connected && " Connecting again…"}
         </p>
       )}
       {flight.over && (

@@ -107,7 +107,7 @@ class FallDetector:
         self._places: deque[Array] = deque(maxlen=_KEPT // 2)
         """Recent standing positions, metres east, north and up of home."""
         self._looks: deque[_Look] = deque(maxlen=_KEPT)
-        self._stood_up: deque[_Look] = deque()
+        self._tops: deque[_Look] = deque()
         """The standing body's recent tops, raised hands included."""
         self._stature = 0.0
         """Height of the body that stands, metres."""
@@ -165,7 +165,7 @@ class FallDetector:
 
     def _measure(self, stamp: int, top: float) -> None:
         """Tell the body's height by one more top of it."""
-        tops = self._stood_up
+        tops = self._tops
         tops.append(_Look(stamp, top))
         while seconds(stamp - tops[0].stamp) > _GROWN:
             tops.popleft()
@@ -229,7 +229,7 @@ class FallDetector:
         if not 0 <= seconds(stamp - known) <= (_FORGOTTEN if self._fell else _MOMENT):
             self._places.clear()
             self._looks.clear()
-            self._stood_up.clear()
+            self._tops.clear()
             self._fell = False
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from rich.console import Console
+import typer
 
 from aerodaas.cli.lab_study import spread_of
 from aerodaas.cli.leaderboard.markdown import markdown_page
@@ -85,7 +85,7 @@ def leaderboard(
     }
     for name, write in files.items():
         _writing(out, partial(write, out / name))
-    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
+    typer.echo(f"in {out}: {', '.join(files)}")
 
 
 def _idea(name: str) -> str:

@@ -7,7 +7,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
-from rich.console import Console
+import typer
 
 from aerodaas.cli.rows import write_csv
 from aerodaas.cli.seeds.figures import rows, show
@@ -49,9 +49,7 @@ def run_seeds(
         if done:
             done.sort(key=lambda run: run.seed)
             _tell(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
-            Console().print(
-                f"in {job.options.record}", highlight=False, soft_wrap=True, markup=False
-            )
+            typer.echo(f"in {job.options.record}")
     failed = [str(run.seed) for run in done if run.failure]
     if failed:
         raise MissionError(f"{len(failed)} of {seeds} runs failed: seeds {', '.join(failed)}")
