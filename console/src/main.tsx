@@ -394,7 +394,7 @@ function Connection({ flight }: { flight: Flight }) {
     : flight.over
     ? ["", "over"]
     : flight.stale
-      ? ["bad", "not connected"]
+      ? ["bad", flight.connected ? "no word" : "not connected"]
       : ["good", "live"];
   return (
     <span class={`badge ${tone}`} data-testid="connection">

@@ -28,6 +28,10 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
         flight.suspend()
         try:
             page.until(f"{_BANNER}?.innerText.includes('No word from the flight')")
+            # The service is there: only the flight is not.
+            assert page.run("document.querySelector('[data-testid=connection]').innerText") == (
+                "no word"
+            )
         finally:
             flight.resume()
         page.until(f"{_BANNER} === null")
