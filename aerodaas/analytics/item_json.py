@@ -20,13 +20,13 @@ import numpy as np
 
 from aerodaas.config.annotations import is_subclass
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types import data, geometry, status, target, vehicle, waypoints
+from aerodaas.types import data, geometry, payload, status, target, traffic, vehicle, waypoints
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.guest_item import GuestItem
 
-__all__ = ["ItemError", "decoded", "encoded"]
+__all__ = ["KNOWN_CLASSES", "ItemError", "decoded", "encoded"]
 
-_CLASSES: dict[str, type] = {
+KNOWN_CLASSES: dict[str, type] = {
     one.__name__: one
     for one in (
         data.Alert,
@@ -38,14 +38,18 @@ _CLASSES: dict[str, type] = {
         data.Odometry,
         data.Readings,
         geometry.CameraModel,
+        payload.GimbalAttitude,
+        status.BatteryOutlook,
         status.Decision,
         status.MissionStatus,
         target.FollowedTarget,
+        traffic.Traffic,
         vehicle.VehicleState,
         waypoints.VelocityCommand,
         waypoints.Waypoint,
     )
 }
+"""Classes whose objects are written field by field, by name."""
 _DEEPEST = 12
 _LONGEST = 100_000
 """Most parts of one item."""
@@ -78,8 +82,25 @@ def _plain(item: object) -> Any:  # noqa: ANN401 - JSON
 
 
 def _opaque(hidden: GuestItem) -> dict[str, Any]:
-    content = base64.b64encode(hidden.data).decode()
+    content = _text(hidden.data)
     return {"is": "GuestItem", "kind": hidden.kind, "value": hidden.value, "data": content}
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()
+
+
+def _data(text: str) -> bytes:
+    return base64.b64decode(text, validate=True)
+
+
+def _binary(item: bytes | np.ndarray[Any, Any]) -> dict[str, Any]:
+    if isinstance(item, bytes):
+        return {"is": "bytes", "of": _text(item)}
+    if item.dtype.kind not in _KINDS:
+        raise _UnknownError
+    whole = _text(np.ascontiguousarray(item).tobytes())
+    return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": whole}
 
 
 def _write(item: object) -> Any:  # noqa: ANN401 - JSON
@@ -87,13 +108,15 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
         item = item.value if isinstance(item, enum.Enum) else item.item()
     if type(item) in _PLAIN:
         return _plain(item)
+    if isinstance(item, bytes | np.ndarray):
+        return _binary(item)
     name = type(item).__name__
     content: list[Any] | dict[str, Any] | None = None
     if type(item) in {list, tuple}:
         content = [_write(one) for one in typing.cast("list[object]", item)]
     elif type(item) is dict and all(isinstance(key, str) for key in item):
         content = {key: _write(one) for key, one in item.items()}
-    elif _CLASSES.get(name) is type(item):
+    elif KNOWN_CLASSES.get(name) is type(item):
         content = {one: _write(getattr(item, one)) for one in _names(type(item))}
     elif isinstance(item, AeroNavigation) and item.stream is None:
         return {
@@ -105,9 +128,6 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
         }
     elif isinstance(item, GuestItem):
         return _opaque(item)
-    elif isinstance(item, np.ndarray) and item.dtype.kind in _KINDS:
-        whole = base64.b64encode(np.ascontiguousarray(item).tobytes()).decode()
-        return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": whole}
     if content is None:
         raise _UnknownError
     return {"is": name, "of": content}
@@ -143,7 +163,7 @@ class _Reader:
         return self._inner(kind, content["of"] if kind is not None else None, content, depth)
 
     def _hidden(self, content: Mapping[str, Any], depth: int) -> GuestItem:
-        name, hidden = content["kind"], base64.b64decode(content["data"], validate=True)
+        name, hidden = content["kind"], _data(content["data"])
         if not isinstance(name, str) or not name.isidentifier():
             raise ItemError("a class without a name")
         self._limit_plain(content["value"], depth)
@@ -152,14 +172,16 @@ class _Reader:
     def _inner(self, kind: Any, inner: Any, content: Any, depth: int) -> Any:  # noqa: ANN401 - JSON
         if kind == "float" and inner in _NOT_FINITE:
             return float(inner)
+        if kind == "bytes" and isinstance(inner, str):
+            return _data(inner)
         if kind in {"list", "tuple", "AeroNavigation"} and isinstance(inner, list):
             found = [self.read(one, depth + 1) for one in inner]
             if kind == "AeroNavigation":
                 return _navigation(content, found)
             return found if kind == "list" else tuple(found)
-        if isinstance(inner, dict) and (kind == "dict" or kind in _CLASSES):
+        if isinstance(inner, dict) and (kind == "dict" or kind in KNOWN_CLASSES):
             fields = {key: self.read(one, depth + 1) for key, one in inner.items()}
-            return fields if kind == "dict" else _built(_CLASSES[kind], fields)
+            return fields if kind == "dict" else _built(KNOWN_CLASSES[kind], fields)
         raise ItemError(f"there is no class {str(kind)[:40]!r} that may be sent")
 
     def _limit_plain(self, value: Any, depth: int) -> None:  # noqa: ANN401 - JSON
@@ -188,7 +210,7 @@ def _array(content: Mapping[str, Any]) -> np.ndarray[Any, Any]:
     if kind.kind not in _KINDS:
         raise ItemError(f"an array of {kind}")
     shape = [int(one) for one in content["shape"]]
-    whole = base64.b64decode(content["data"], validate=True)
+    whole = _data(content["data"])
     if len(shape) > _DEEPEST or any(one < 0 for one in shape):
         raise ItemError("an array of an impossible shape")
     return np.frombuffer(whole, kind).reshape(shape)

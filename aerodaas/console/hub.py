@@ -9,14 +9,18 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+from aerodaas.analytics.wire_items import ItemError
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Item", "StreamHub", "Watcher"]
+
+_log = logging.getLogger(__name__)
 
 Packed: TypeAlias = tuple[dict[str, Any], bytes]
 """A message and its blob, as a stream's reader has them."""
@@ -118,6 +122,8 @@ class StreamHub:
         self._items = items
         self._lock = threading.Lock()
         self._sources: dict[tuple[str, str, PictureForm], _Source] = {}
+        self._told: set[tuple[str, str]] = set()
+        """Missions' streams of which it was told that they cannot be shown."""
 
     def watch(self, mission: str, stream: str, form: PictureForm) -> Watcher:
         """Begin to watch a stream, its pictures in a form; `leave` ends it.
@@ -144,16 +150,21 @@ class StreamHub:
 
     def _read(self, key: tuple[str, str, PictureForm], source: _Source) -> None:
         try:
-            with contextlib.suppress(AeroDaaSError):
-                for message, blob in self._items(*key):
-                    item = Item(json.dumps(message), blob, message.get(_KEY)) if message else None
-                    with self._lock:
-                        watchers = list(source.watchers)
-                        if not watchers:
-                            return
-                        if item is not None:
-                            source.keep(item)
-                            source.tell(watchers, item)
+            for message, blob in self._items(*key):
+                item = Item(json.dumps(message), blob, message.get(_KEY)) if message else None
+                with self._lock:
+                    watchers = list(source.watchers)
+                    if not watchers:
+                        return
+                    if item is not None:
+                        source.keep(item)
+                        source.tell(watchers, item)
+        except ItemError as error:
+            if key[:2] not in self._told:
+                self._told.add(key[:2])
+                _log.warning("%s: %s cannot be shown: %s", *key[:2], error)
+        except AeroDaaSError:
+            pass  # The flight is over, or has no such stream.
         finally:
             with self._lock:
                 if self._sources.get(key) is source:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.appearance import appearance_in_box
+from aerodaas.types.appearance import ZONE_BYTES, ZONES, appearance_in_box
 from aerodaas.types.depth import depth_in_box, nearest_in_cells
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import Box, CameraModel, Vector
@@ -159,7 +159,10 @@ class Frame:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """One object found in a frame; the box is in the frame's own pixels."""
+    """One object found in a frame; the box is in the frame's own pixels.
+
+    Raises ValueError for key points or an appearance of another size.
+    """
 
     box: Box
     """Left, top, right, bottom."""
@@ -174,6 +177,13 @@ class Detection:
     """Metres along the optical axis to its surface, where the camera measured that."""
     appearance: bytes | None = None
     """A person's colours, for `types.appearance.unlikeness`; None for other things."""
+
+    def __post_init__(self) -> None:
+        """Refuse what those who read them would stumble over."""
+        if self.keypoints is not None and self.keypoints.shape[1:] != (3,):
+            raise ValueError(f"key points of shape {self.keypoints.shape}, not K x 3")
+        if self.appearance is not None and len(self.appearance) != ZONES * ZONE_BYTES:
+            raise ValueError(f"an appearance of {len(self.appearance)} bytes")
 
     @property
     def centre(self) -> tuple[float, float]:

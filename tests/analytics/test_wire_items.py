@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import enum
 import json
 import random
+import types
+import typing
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,8 +18,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from aerodaas.analytics.item_json import KNOWN_CLASSES
 from aerodaas.analytics.wire_items import ItemError, pack, unpack
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.types.appearance import ZONE_BYTES, ZONES
 from aerodaas.types.data import (
     Alert,
     Battery,
@@ -30,8 +35,10 @@ from aerodaas.types.data import (
 )
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.guest_item import GuestItem
+from aerodaas.types.payload import GimbalAttitude
 from aerodaas.types.picture_size import MAX_PIXELS
-from aerodaas.types.status import Decision, MissionState, MissionStatus
+from aerodaas.types.status import BatteryOutlook, Decision, MissionState, MissionStatus
+from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.types.waypoints import (
     NavigationType,
@@ -61,6 +68,7 @@ waypoints = st.builds(
 commands = st.builds(VelocityCommand, *[st.floats(-5, 5)] * 4)
 batteries = st.builds(Battery, floats, floats)
 keypoints = hnp.arrays(np.float32, st.tuples(st.integers(0, 5), st.just(3)))
+appearances = st.binary(min_size=ZONES * ZONE_BYTES, max_size=ZONES * ZONE_BYTES)
 boxes = st.builds(
     Detection,
     st.tuples(real, real, real, real),
@@ -68,6 +76,8 @@ boxes = st.builds(
     floats,
     track_id=st.none() | st.integers(0, 99),
     keypoints=st.none() | keypoints,
+    depth=st.none() | real,
+    appearance=st.none() | appearances,
 )
 cells = hnp.arrays(np.uint16, (3, 4))
 detections = st.builds(
@@ -80,6 +90,8 @@ detections = st.builds(
     st.none() | odometry,
     st.none() | cells,
 )
+gimbals = st.builds(GimbalAttitude, stamps, real, real)
+aircraft = st.builds(Traffic, st.integers(0, 2**24 - 1), words, vectors, vectors, floats)
 states = st.builds(
     VehicleState,
     stamps,
@@ -92,7 +104,10 @@ states = st.builds(
     faults=st.lists(words, max_size=2).map(tuple),
     extra=st.dictionaries(words, floats, max_size=2),
     ended=st.none() | st.sampled_from(FlightEnd),
+    gimbal=st.none() | gimbals,
+    traffic=st.lists(aircraft, max_size=2).map(tuple),
 )
+outlooks = st.builds(BatteryOutlook, real, real, floats)
 statuses = st.builds(
     MissionStatus,
     stamps,
@@ -102,6 +117,7 @@ statuses = st.builds(
     pending=st.lists(waypoints, max_size=2).map(tuple),
     visited=st.lists(words, max_size=2).map(tuple),
     waypoint_counts=st.tuples(st.integers(0, 9), st.integers(0, 9)),
+    outlook=st.none() | outlooks,
 )
 readings = st.builds(Readings, stamps, st.dictionaries(words, floats, max_size=3))
 alerts = st.builds(Alert, headers, words, words, st.dictionaries(words, floats | words, max_size=2))
@@ -146,6 +162,35 @@ def test_an_item_is_read_as_it_was_written(item: object) -> None:
     assert type(found) is type(item)
     assert found == item
     assert not blob
+
+
+def kinds(hint: Any) -> Iterator[Any]:  # noqa: ANN401 - an annotation
+    """The classes of what a field may hold, and of what is in that."""
+    # From NumPy 2.5 on, NDArray is a named alias.
+    hint = getattr(typing.get_origin(hint), "__value__", hint)
+    if typing.get_origin(hint) in {typing.Union, types.UnionType, tuple, dict}:
+        for one in typing.get_args(hint):
+            if one is not Ellipsis:
+                yield from kinds(one)
+    else:
+        yield typing.get_origin(hint) or hint
+
+
+def example(kind: Any) -> object:  # noqa: ANN401 - a class
+    """Something of a class."""
+    if kind is np.ndarray:
+        return np.zeros(3)
+    return next(iter(kind)) if issubclass(kind, enum.Enum) else kind()
+
+
+@pytest.mark.parametrize("known", KNOWN_CLASSES.values(), ids=str)
+def test_whatever_a_known_class_may_hold_goes_over_the_wire(known: type) -> None:
+    """A field of a kind that does not would take all of the item with it, once it is set."""
+    for hint in typing.get_type_hints(known).values():
+        for kind in kinds(hint):
+            if kind not in KNOWN_CLASSES.values() and kind is not Any:
+                item = example(kind)
+                assert type(unpack(*sent(item))) in {type(item), str}
 
 
 @given(frames())
@@ -292,6 +337,15 @@ def test_bytes_beside_what_is_no_picture_are_refused() -> None:
     """They would have to be something."""
     with pytest.raises(ItemError, match="no frame"):
         unpack(5, b"x")
+
+
+@pytest.mark.parametrize(("field", "value"), [("appearance", b"x"), ("keypoints", np.zeros(4))])
+def test_a_detection_has_parts_of_its_sizes(field: str, value: object) -> None:
+    """A tracker that looks at them is another's."""
+    content, _ = sent(Detection((0.0, 0.0, 1.0, 1.0), "person", 0.5))
+    content["of"][field], _ = pack(value)
+    with pytest.raises(ItemError, match="malformed item: ValueError"):
+        unpack(content)
 
 
 def test_a_position_has_three_numbers() -> None:

@@ -113,6 +113,19 @@ def test_depth_is_sent_alone_and_only_where_it_was_measured() -> None:
     assert message["item"]["bytes"] == [len(blob)]
 
 
+def test_a_page_is_told_of_a_person_whose_clothes_can_be_told() -> None:
+    """As any that is near enough."""
+    image = np.zeros((200, 200, 3), np.uint8)
+    image[:100, 80:120] = 60, 120, 200
+    image[100:, 80:120] = 30, 30, 90
+    shown = Detections.of(
+        Frame(Header(1, 2, SOURCE), image), [Detection((80, 10, 120, 190), "person", 0.9)]
+    )
+    assert shown[0].appearance is not None
+    ((message, _),) = packed(PictureForm.JPEG, shown)
+    assert unpack(message["item"]) == shown
+
+
 def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands() -> None:
     """With the header of the frame that the command was made from; programs get the command."""
     made = Header(7, 5, SOURCE)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aerodaas.analytics.wire_items import pack
+from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.console import packed_reader
 from aerodaas.console.hub import StreamHub, Watcher
 from aerodaas.console.packed_reader import PackedReader
@@ -183,3 +183,22 @@ def test_each_frame_is_encoded_and_written_once_for_all(
 
     asyncio.run(check())
     assert encoded == list(range(COUNT))
+
+
+def test_a_stream_that_cannot_be_written_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
+    """Pages ask for it again and again, and would show nothing without a word."""
+
+    def items(*_: object) -> Iterator[tuple[dict[str, Any], bytes]]:
+        raise ItemError("Strange is of no class that goes over the wire")
+        yield {}, b""
+
+    async def look() -> None:
+        hub = StreamHub(items)
+        for _ in range(3):
+            assert await asyncio.wait_for((await _watch(hub)).next(), 20) is None
+
+    asyncio.run(look())
+    (record,) = caplog.records
+    assert record.getMessage() == (
+        "m: cam cannot be shown: Strange is of no class that goes over the wire"
+    )
