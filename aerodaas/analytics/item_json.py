@@ -23,6 +23,7 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data, geometry, payload, status, target, traffic, vehicle, waypoints
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.guest_item import GuestItem
+from aerodaas.types.records import secrets_of
 
 __all__ = ["KNOWN_CLASSES", "ItemError", "decoded", "encoded"]
 
@@ -50,6 +51,21 @@ KNOWN_CLASSES: dict[str, type] = {
     )
 }
 """Classes whose objects are written field by field, by name."""
+_KNOWN_ENUMS: dict[str, type[enum.Enum]] = {
+    one.__name__: one
+    for one in (
+        status.MissionState,
+        target.TargetState,
+        vehicle.FlightEnd,
+        vehicle.VehicleMode,
+        waypoints.HeightReference,
+        waypoints.NavigationType,
+        waypoints.SchedulingType,
+        waypoints.WaypointType,
+    )
+}
+"""Enumerations whose members are written by name of the class, where no field's annotation says
+which it is."""
 _DEEPEST = 12
 _LONGEST = 100_000
 """Most parts of one item."""
@@ -94,22 +110,34 @@ def _data(text: str) -> bytes:
     return base64.b64decode(text, validate=True)
 
 
-def _binary(item: bytes | np.ndarray[Any, Any]) -> dict[str, Any]:
+def _leaf(item: bytes | enum.Enum | np.ndarray[Any, Any]) -> dict[str, Any]:
+    """Write what has no items within, but is not one of JSON's own."""
     if isinstance(item, bytes):
         return {"is": "bytes", "of": _text(item)}
-    if item.dtype.kind not in _KINDS:
+    if isinstance(item, enum.Enum):
+        name = type(item).__name__
+        if _KNOWN_ENUMS.get(name) is not type(item):
+            raise _UnknownError
+        return {"is": name, "of": item.value}
+    # A class of its own, such as a masked array, has more than its numbers.
+    if type(item) is not np.ndarray or item.dtype.kind not in _KINDS:
         raise _UnknownError
     whole = _text(np.ascontiguousarray(item).tobytes())
     return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": whole}
 
 
+def _field(item: object) -> Any:  # noqa: ANN401 - JSON
+    """Write what is in a field, whose annotation tells of which enumeration a value is."""
+    return _write(item.value if isinstance(item, enum.Enum) else item)
+
+
 def _write(item: object) -> Any:  # noqa: ANN401 - JSON
-    if isinstance(item, enum.Enum | np.generic):
-        item = item.value if isinstance(item, enum.Enum) else item.item()
+    if isinstance(item, np.generic):
+        item = item.item()
     if type(item) in _PLAIN:
         return _plain(item)
-    if isinstance(item, bytes | np.ndarray):
-        return _binary(item)
+    if isinstance(item, bytes | enum.Enum | np.ndarray):
+        return _leaf(item)
     name = type(item).__name__
     content: list[Any] | dict[str, Any] | None = None
     if type(item) in {list, tuple}:
@@ -117,7 +145,7 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
     elif type(item) is dict and all(isinstance(key, str) for key in item):
         content = {key: _write(one) for key, one in item.items()}
     elif KNOWN_CLASSES.get(name) is type(item):
-        content = {one: _write(getattr(item, one)) for one in _names(type(item))}
+        content = {one: _field(getattr(item, one)) for one in _shown_names(KNOWN_CLASSES[name])}
     elif isinstance(item, AeroNavigation) and item.stream is None:
         return {
             "is": "AeroNavigation",
@@ -174,6 +202,8 @@ class _Reader:
             return float(inner)
         if kind == "bytes" and isinstance(inner, str):
             return _data(inner)
+        if kind in _KNOWN_ENUMS:
+            return _KNOWN_ENUMS[kind](inner)
         if kind in {"list", "tuple", "AeroNavigation"} and isinstance(inner, list):
             found = [self.read(one, depth + 1) for one in inner]
             if kind == "AeroNavigation":
@@ -220,8 +250,13 @@ def _built(kind: type, fields: dict[str, Any]) -> Any:  # noqa: ANN401 - an inst
     hints = _hints(kind)
     found = {}
     for name, value in fields.items():
-        if name not in hints or not _conforms(value, hints[name]):
-            raise ItemError(f"{kind.__name__}.{name[:40]} is of a wrong type")
+        if name not in hints:
+            raise ItemError(f"{kind.__name__} has no {name[:40]}")
+        if not _conforms(value, hints[name]):
+            raise ItemError(
+                f"{kind.__name__}.{name} is of a wrong type: {type(value).__name__}, where it is "
+                f"to be {_words(hints[name])}"
+            )
         found[name] = _as_enum(value, hints[name])
     return kind(**found)
 
@@ -235,6 +270,16 @@ def _as_enum(value: Any, hint: Any) -> Any:  # noqa: ANN401 - an annotation
 def _names(kind: type) -> tuple[str, ...]:
     fields: tuple[str, ...] | None = getattr(kind, "_fields", None)
     return fields or tuple(one.name for one in dataclasses.fields(kind))
+
+
+@lru_cache(maxsize=64)
+def _shown_names(kind: type) -> tuple[str, ...]:
+    """Names of the fields that are no secrets."""
+    return tuple(one for one in _names(kind) if one not in secrets_of(kind))
+
+
+def _words(hint: Any) -> str:  # noqa: ANN401 - an annotation
+    return hint.__name__ if type(hint) is type else str(hint)[:100]
 
 
 @lru_cache(maxsize=64)

@@ -19,6 +19,7 @@ import numpy as np
 from foxglove import Schema
 
 from aerodaas.types.identifiers import INTERNAL, is_internal
+from aerodaas.types.records import secrets_of
 
 __all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
 
@@ -147,12 +148,13 @@ def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
 @lru_cache(maxsize=1024)
 def _declared(kind: type) -> tuple[tuple[str, ...], bool]:
     """Fields and slots of a class, and whether its objects' further attributes are data, too."""
+    secret = secrets_of(kind)
     names = [field.name for field in dataclasses.fields(kind)] if is_dataclass(kind) else []
     own = kind.__module__.partition(".")[0] not in sys.stdlib_module_names
     if own:
         slots = (getattr(one, "__slots__", ()) for one in kind.__mro__)
         names += [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
-    return tuple(dict.fromkeys(names)), own
+    return tuple(name for name in dict.fromkeys(names) if name not in secret), own
 
 
 def _words(value: object) -> str:

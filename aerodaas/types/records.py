@@ -10,9 +10,21 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-__all__ = ["Record", "fast_pickle", "record_of", "shared_pickle", "valued"]
+__all__ = [
+    "SECRET",
+    "Record",
+    "fast_pickle",
+    "record_of",
+    "secrets_of",
+    "shared_pickle",
+    "valued",
+    "without_secrets",
+]
 
 C = TypeVar("C", bound=type[Any])
+R = TypeVar("R")
+SECRET: Mapping[str, bool] = {"secret": True}
+"""Metadata of a dataclass' field that is recorded nowhere, and never sent to others."""
 _PLAIN = frozenset({bool, float, int, str})
 """What most fields are; all else is asked what it is, which takes several times as long."""
 _MOST_SHARED = 4096
@@ -36,6 +48,21 @@ _records: dict[type[Any], Record] = {}
 def record_of(cls: type[Any]) -> Record | None:
     """Return what is known of a class of `fast_pickle` or `shared_pickle`; None of any other."""
     return _records.get(cls)
+
+
+@lru_cache(maxsize=1024)
+def secrets_of(cls: type) -> frozenset[str]:
+    """Names of a class' fields that are `SECRET`; none of what is no dataclass."""
+    fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
+    return frozenset(one.name for one in fields if one.metadata.get("secret"))
+
+
+def without_secrets(record: R) -> R:
+    """The same record for others to see: each field that is `SECRET` has its default."""
+    kind: Any = type(record)
+    secret = secrets_of(kind)
+    defaults = {one.name: one.default for one in dataclasses.fields(kind) if one.name in secret}
+    return dataclasses.replace(record, **defaults)  # type: ignore[type-var]
 
 
 def valued(cls: C) -> C:

@@ -14,7 +14,7 @@ from aerodaas.types.clock import Clock
 from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.geometry import Vector
 from aerodaas.types.payload import Gimbal, GimbalAttitude, PhotoCamera
-from aerodaas.types.records import fast_pickle
+from aerodaas.types.records import SECRET, fast_pickle
 from aerodaas.types.traffic import Traffic
 
 __all__ = [
@@ -146,9 +146,9 @@ class VehicleState:
     limits need one; None without a fresh reading in its range."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
-    video: str = field(default="", repr=False)
-    """Address of its camera's video, as it says; it may hold a password, and is recorded nowhere.
-    Empty where it tells none that may be read."""
+    video: str = field(default="", repr=False, metadata=SECRET)
+    """Address of its camera's video, as it says; it may hold a password, so it is recorded nowhere
+    and sent to nobody else. Empty where it tells none that may be read."""
 
 
 @runtime_checkable

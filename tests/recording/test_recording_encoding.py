@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from filled import filled
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from pydantic import BaseModel
 from aerodaas.recording.encoding import json_bytes, json_schema, plain, stream_of, topic
 from aerodaas.recording.rotation import OPTICAL, Rotation, compose, from_rpy
 from aerodaas.types.geometry import CameraModel, rotation_from_rpy
+from aerodaas.types.vehicle import VehicleState
 
 ANGLES = st.floats(-math.pi, math.pi)
 ANYTHING = st.recursive(
@@ -260,6 +262,14 @@ def test_what_objects_become(value: object, found: object) -> None:
     back = plain(value)
     assert back == found
     assert type(back) is type(found)
+
+
+def test_a_secret_is_recorded_nowhere() -> None:
+    """A vehicle's state in an item of an application's own class: its video's address is none."""
+    state = filled(VehicleState, video="rtsp://me:password@10.0.0.2")
+    found = plain({"seen": [state]})
+    assert found["seen"][0]["armed"] is True
+    assert "password" not in str(found)
 
 
 def test_arrays_up_to_4096_numbers_are_whole() -> None:

@@ -18,6 +18,7 @@ from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import GuestQuota
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.errors import ModelError
+from aerodaas.types.records import without_secrets
 
 __all__ = ["GuestAnalysis"]
 
@@ -86,7 +87,8 @@ class GuestAnalysis(Analytics[Any]):
                 raise ModelError(f"the guest {self.guest} did not start: {failed}")
             return None
         try:
-            vehicle = context.vehicle() if self.sees_vehicle else None
+            state = context.vehicle() if self.sees_vehicle else None
+            vehicle = None if state is None else without_secrets(state)
             blob = pickle.dumps((item, vehicle), protocol=5)
             request = {"do": "process", "key": self.key, "now": context.now(), "on": context.kind}
             answer, _ = process.ask(request, blob, _ITEM)
