@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -64,3 +66,27 @@ def rebuilt(
             )
     writer.finish()
     return file.getvalue()
+
+
+def fields(value: object, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Places of all fields in a JSON value."""
+    found = []
+    if isinstance(value, dict):
+        for key, item in value.items():
+            found += [(*place, key), *fields(item, (*place, key))]
+    elif isinstance(value, list) and value:
+        found += [(*place, 0), *fields(value[0], (*place, 0))]
+    return found
+
+
+def with_field(value: Any, place: tuple[Any, ...], odd: object) -> Any:  # noqa: ANN401
+    """The value with another thing at a place; without the field for `...`."""
+    copy = json.loads(json.dumps(value))
+    inside = copy
+    for part in place[:-1]:
+        inside = inside[part]
+    if odd is ...:
+        del inside[place[-1]]
+    else:
+        inside[place[-1]] = odd
+    return copy

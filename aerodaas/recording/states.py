@@ -11,6 +11,7 @@ import numpy as np
 from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.geometry import Vector
+from aerodaas.types.payload import GimbalAttitude
 from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
@@ -46,6 +47,7 @@ def state_of(value: dict[str, Any]) -> VehicleState:
     odometry = odometry_of(value["odometry"])
     assert odometry is not None  # noqa: S101 - never null
     battery, gps, ended = value["battery"], value.get("gps"), value.get("ended")
+    gimbal = value.get("gimbal")
     return VehicleState(
         value["stamp"],
         odometry,
@@ -57,14 +59,22 @@ def state_of(value: dict[str, Any]) -> VehicleState:
         tuple(value["faults"]),
         dict(value["extra"]),
         FlightEnd(ended) if ended else None,
+        gimbal=_attitude_of(gimbal) if gimbal else None,
+        zoom=value.get("zoom"),
         traffic=tuple(map(_traffic_of, value.get("traffic", ()))),
         below=value.get("below"),
+        actuators=dict(value.get("actuators", {})),
     )
+
+
+def _attitude_of(value: dict[str, Any]) -> GimbalAttitude:
+    angles = (_number(value[name]) for name in ("pitch", "yaw", "roll"))
+    return GimbalAttitude(value["stamp"], *angles)
 
 
 def _traffic_of(value: dict[str, Any]) -> Traffic:
     place, velocity = _vector(value["position"]), _vector(value["velocity"])
-    return Traffic(value["address"], value["callsign"], place, velocity, value["age"])
+    return Traffic(value["address"], value["callsign"], place, velocity, _number(value["age"]))
 
 
 def _vector(value: dict[str, float | None]) -> Vector:

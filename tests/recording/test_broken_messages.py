@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rewritten import rewritten
+from rewritten import fields, rewritten, with_field
 from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
@@ -92,30 +92,6 @@ def test_one_broken_message_of_each_channel(flown: Path, tmp_path: Path, kind: s
         repeated = {topic for topic, count in met.items() if count > 1}
         assert {topic for topic in ours & repeated if recording.skipped[topic] != 1} == set()
     read_all(path, flown, tmp_path / "out")
-
-
-def fields(value: object, place: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Places of all fields in a JSON value."""
-    found = []
-    if isinstance(value, dict):
-        for key, item in value.items():
-            found += [(*place, key), *fields(item, (*place, key))]
-    elif isinstance(value, list) and value:
-        found += [(*place, 0), *fields(value[0], (*place, 0))]
-    return found
-
-
-def with_field(value: Any, place: tuple[Any, ...], odd: object) -> Any:  # noqa: ANN401
-    """The value with another thing at a place; without the field for `...`."""
-    copy = json.loads(json.dumps(value))
-    inside = copy
-    for part in place[:-1]:
-        inside = inside[part]
-    if odd is ...:
-        del inside[place[-1]]
-    else:
-        inside[place[-1]] = odd
-    return copy
 
 
 @pytest.mark.parametrize("odd", [..., *ODD], ids=repr)

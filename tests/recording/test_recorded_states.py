@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filled import filled, names
+from rewritten import fields, rewritten, with_field
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
@@ -17,6 +21,7 @@ from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
 from aerodaas.types.data import Battery, GpsFix, Header, Odometry
+from aerodaas.types.payload import GimbalAttitude
 from aerodaas.types.status import RECENT, Message, MissionState, MissionStatus
 from aerodaas.types.traffic import Traffic
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
@@ -69,6 +74,34 @@ def test_states_come_back_whole_for_each_robot(tmp_path: Path) -> None:
     assert found["a"][1].gps is None
     assert found["a"][1].truth is None
     assert found["a"][1].ended is None
+
+
+def test_each_field_of_a_state_comes_back(tmp_path: Path) -> None:
+    """But for the address of its video, which is recorded nowhere."""
+    state = filled(VehicleState)
+    ((back,),) = (found for found in played(tmp_path / "a.mcap", ("a", state)).values() if found)
+    for name in names(VehicleState):
+        assert repr(getattr(back, name)) == repr(getattr(filled(VehicleState, video=""), name)), name
+
+
+@pytest.mark.parametrize("odd", [..., None, [], {}, "x", -1, True], ids=repr)
+def test_a_strangers_state_is_whole_or_left_out(tmp_path: Path, odd: object) -> None:
+    """Each part of it may be anything, or missing: nothing that reads it raises."""
+    path, states = tmp_path / "a.mcap", [filled(VehicleState, stamp=stamp) for stamp in range(200)]
+    played(path, *(("a", state) for state in states))
+    turns = itertools.count()
+
+    def change(topic: str, data: bytes) -> bytes:
+        if topic != "/a/state":
+            return data
+        value = json.loads(data)
+        places = fields(value)
+        return json.dumps(with_field(value, places[next(turns) % len(places)], odd)).encode()
+
+    with Recording.open(rewritten(path, tmp_path / "odd.mcap", change=change)) as recording:
+        for _, state in vehicle_states(recording, "a"):
+            repr(state)
+            assert isinstance(state.gimbal, GimbalAttitude | None)
 
 
 def test_what_was_not_a_number_is_none_again(tmp_path: Path) -> None:

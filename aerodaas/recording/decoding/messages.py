@@ -86,7 +86,24 @@ class _Fix(TypedDict):
     altitude: Gap
     horizontal_sigma: NotRequired[Gap]
     vertical_sigma: NotRequired[Gap]
-    satellites: NotRequired[Gap]
+    satellites: NotRequired[Count | Gap]
+
+
+@with_config(_OPEN)
+class _Attitude(TypedDict):
+    stamp: Stamp
+    pitch: Gap
+    yaw: Gap
+    roll: Gap
+
+
+@with_config(_OPEN)
+class _Traffic(TypedDict):
+    address: Count
+    callsign: Word
+    position: _Vector
+    velocity: _Vector
+    age: Gap
 
 
 @with_config(_OPEN)
@@ -101,7 +118,11 @@ class _VehicleState(TypedDict):
     extra: dict[Word, Reading]
     gps: NotRequired[_Fix | None]
     truth: NotRequired[_Odometry | None]
+    gimbal: NotRequired[_Attitude | None]
+    zoom: NotRequired[Number | None]
+    traffic: NotRequired[list[_Traffic]]
     below: NotRequired[Number | None]
+    actuators: NotRequired[dict[Word, Word]]
     ended: NotRequired[Literal[tuple(end.value for end in FlightEnd)] | None]  # type: ignore[valid-type]
 
 
