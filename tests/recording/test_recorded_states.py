@@ -81,7 +81,9 @@ def test_each_field_of_a_state_comes_back(tmp_path: Path) -> None:
     state = filled(VehicleState)
     ((back,),) = (found for found in played(tmp_path / "a.mcap", ("a", state)).values() if found)
     for name in names(VehicleState):
-        assert repr(getattr(back, name)) == repr(getattr(filled(VehicleState, video=""), name)), name
+        assert repr(getattr(back, name)) == repr(getattr(filled(VehicleState, video=""), name)), (
+            name
+        )
 
 
 @pytest.mark.parametrize("odd", [..., None, [], {}, "x", -1, True], ids=repr)

@@ -33,6 +33,7 @@ MISSION = json_schema(
     faults="array",
     outlook={},
     photos="array",
+    pilot="string",
 )
 NAVIGATION = json_schema(
     "Navigation",
@@ -40,6 +41,7 @@ NAVIGATION = json_schema(
     source="string",
     type="string",
     scheduling="string",
+    priority={},
     waypoints="array",
     commands="array",
 )
@@ -73,6 +75,7 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
         "faults": item.faults,
         "outlook": item.outlook,
         "photos": item.photos,
+        "pilot": item.pilot,
     }
     yield Entry(topic(stream, "mission"), MISSION, json_bytes(value), item.stamp)
     if session.changed("state", stream, item.state):
@@ -105,6 +108,7 @@ def navigation(item: AeroNavigation, message: Message[Any], session: Session) ->
         "source": header.source,
         "type": item.navigation_type.value,
         "scheduling": item.scheduling_type.value,
+        "priority": item.priority,
         "waypoints": item.waypoints,
         "commands": item.commands,
     }

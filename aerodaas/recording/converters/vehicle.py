@@ -250,9 +250,11 @@ def _setpoint_json(setpoint: Setpoint | None) -> dict[str, Any] | None:
             "yaw": setpoint.yaw,
             "speed": setpoint.speed,
             "passing_speed": setpoint.passing_speed,
+            "line_from": None if setpoint.line_from is None else xyz(setpoint.line_from),
         }
     return {
         "kind": "velocity",
         "velocity": xyz(setpoint.velocity),
         "yaw_rate": setpoint.yaw_rate,
+        "evasive": setpoint.evasive,
     }

@@ -144,6 +144,7 @@ class _MissionStatus(TypedDict):
     given_up: list[Word]
     distance: Number
     outlook: NotRequired[_Outlook | None]
+    pilot: NotRequired[Word]
 
 
 @with_config(_OPEN)

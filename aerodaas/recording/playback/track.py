@@ -123,6 +123,7 @@ class TrackBuilder:
             {
                 "state": value["state"],
                 "reason": value["reason"],
+                "pilot": value.get("pilot", ""),
                 "target": name if isinstance(name, str) else None,
                 "visited": value["visited"][-_MOST_BEHIND:],
                 "given_up": value["given_up"][-_MOST_BEHIND:],

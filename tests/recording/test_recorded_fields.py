@@ -1,0 +1,92 @@
+"""Whatever a class may hold is recorded, or is named here as left out on purpose."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from filled import filled, names
+
+from aerodaas.config.model import RecordingConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.recording.converters import Session, convert
+from aerodaas.types.data import Alert, Battery, Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.payload import Photo
+from aerodaas.types.status import Decision, Message, MissionStatus, SetpointRecord
+from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.types.vitals import Vitals
+from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
+
+HEADER = Header(4, 5, "drone/cam")
+NOWHERE = ""
+"""Recorded under no name, on purpose."""
+ELSEWHERE: dict[type, dict[str, str]] = {
+    # The password that it may hold.
+    VehicleState: {"video": NOWHERE},
+    # The plan has the waypoints; progress is the quotient.
+    MissionStatus: {"waypoint_counts": "progress"},
+    # Made from the picture, which is recorded: clothes by their colours, and the depth beside it.
+    Detection: {"appearance": NOWHERE},
+    Detections: {"header": "stamp", "camera": NOWHERE, "odometry": NOWHERE, "nearest": NOWHERE},
+    # In messages of their own: picture, depth, calibration and mount.
+    Frame: {"header": "stamp", "image": NOWHERE, "camera": NOWHERE, "depth": NOWHERE},
+    Alert: {"header": "stamp"},
+    # As exact as it is drawn; by the pictures' own exact place.
+    Photo: {"truth": NOWHERE},
+    Vitals: {"taken": "stamp", "memory": "memory_mb"},
+}
+"""Fields by the name under which they are recorded, where that is another."""
+
+
+def recorded(item: object) -> list[dict[str, Any]]:
+    """The JSON messages of an item."""
+    message = Message("drone/s", 1, 6, HEADER, 0, (), item)
+    entries = convert(item, message, Session(RecordingConfig(), 0))
+    return [json.loads(it.data) for it in entries if it.schema.encoding == "jsonschema"]
+
+
+def lost(kind: type, found: Mapping[str, Any]) -> set[str]:
+    """Fields of a class that a recorded object has not."""
+    known = ELSEWHERE.get(kind, {})
+    return {name for name in names(kind) if known.get(name, name) not in {NOWHERE, *found}}
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        VehicleState,
+        MissionStatus,
+        Decision,
+        Alert,
+        Battery,
+        Photo,
+        SetpointRecord,
+        Vitals,
+        Frame,
+        Detections,
+    ],
+)
+def test_each_field_is_recorded(kind: type) -> None:
+    """By its name."""
+    found = recorded(filled(kind))[0]
+    assert lost(kind, found) == set()
+    assert None not in found.values()
+
+
+def test_what_is_inside_is_recorded() -> None:
+    """Detections, setpoints, odometry, waypoints and commands, with each of their fields."""
+    (found,) = recorded(filled(Detections))
+    assert lost(Detection, found["items"][0]) == set()
+    for kind in (PositionSetpoint, VelocitySetpoint):
+        one = recorded(SetpointRecord(1, filled(kind), filled(kind)))[0]
+        assert lost(kind, one["asked"]) == lost(kind, one["sent"]) == set()
+    state = recorded(filled(VehicleState))[0]
+    assert lost(Odometry, state["odometry"]) == lost(Odometry, state["truth"]) == set()
+    given = [filled(Waypoint), filled(VelocityCommand)]
+    navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, given, priority=2)
+    (found,) = recorded(navigation)
+    assert lost(Waypoint, found["waypoints"][0]) == set()
+    assert lost(VelocityCommand, found["commands"][0]) == set()
+    assert found["priority"] == 2
