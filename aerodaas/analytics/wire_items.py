@@ -81,7 +81,7 @@ def unpack(content: Any, blob: bytes = b"") -> Any:  # noqa: ANN401 - JSON to an
 
 
 def _refused(item: object) -> GuestItem:
-    raise ItemError(f"{type(item).__name__} is of no class that goes over the wire")
+    raise ItemError(f"{type(item).__name__} is of no class that goes over the wire, or holds one")
 
 
 def _written(suffix: str, image: NDArray[Any], words: list[int]) -> bytes:

@@ -14,7 +14,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from aerodaas.analytics.wire_items import ItemError
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.errors import AeroDaaSError
 
@@ -123,7 +122,7 @@ class StreamHub:
         self._lock = threading.Lock()
         self._sources: dict[tuple[str, str, PictureForm], _Source] = {}
         self._told: set[tuple[str, str]] = set()
-        """Missions' streams of which it was told that they cannot be shown."""
+        """Missions' streams of which it was told that items are left out."""
 
     def watch(self, mission: str, stream: str, form: PictureForm) -> Watcher:
         """Begin to watch a stream, its pictures in a form; `leave` ends it.
@@ -151,6 +150,7 @@ class StreamHub:
     def _read(self, key: tuple[str, str, PictureForm], source: _Source) -> None:
         try:
             for message, blob in self._items(*key):
+                self._tell_left_out(key[:2], message)
                 item = Item(json.dumps(message), blob, message.get(_KEY)) if message else None
                 with self._lock:
                     watchers = list(source.watchers)
@@ -159,10 +159,6 @@ class StreamHub:
                     if item is not None:
                         source.keep(item)
                         source.tell(watchers, item)
-        except ItemError as error:
-            if key[:2] not in self._told:
-                self._told.add(key[:2])
-                _log.warning("%s: %s cannot be shown: %s", *key[:2], error)
         except AeroDaaSError:
             pass  # The flight is over, or has no such stream.
         finally:
@@ -170,3 +166,8 @@ class StreamHub:
                 if self._sources.get(key) is source:
                     del self._sources[key]
                 source.tell(list(source.watchers), None)
+
+    def _tell_left_out(self, stream: tuple[str, str], message: dict[str, Any]) -> None:
+        if message.get("kind") == "left_out" and stream not in self._told:
+            self._told.add(stream)
+            _log.warning("%s: an item of %s is left out: %s", *stream, message.get("reason"))

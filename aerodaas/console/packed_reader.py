@@ -22,7 +22,7 @@ from aerodaas.recording.playback.page_items import (
 )
 from aerodaas.terrain.ground import Ground
 from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import ConfigError
+from aerodaas.types.errors import AeroDaaSError, ConfigError, failure_line
 from aerodaas.types.status import Message
 
 __all__ = ["PackedReader", "drawn_streams", "ground_of"]
@@ -52,7 +52,10 @@ class PackedReader:
         self._encoder: H264Encoder | None = None
 
     def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
-        """The next item; None if there was none within `timeout` wall seconds."""
+        """The next item; None if there was none within `timeout` wall seconds.
+
+        In the place of one that cannot be written, the message tells for what `reason`.
+        """
         return self._packed(self._reader.next_message, timeout)
 
     def latest_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
@@ -66,11 +69,16 @@ class PackedReader:
             message = read(timeout)
         except (TimeoutError, StopIteration):
             return None
-        found = self._formed(message.item, message.header)
+        named = {"stream": self._stream, "seq": message.seq}
+        try:
+            found = self._formed(message.item, message.header)
+        except Exception as error:  # noqa: BLE001 - a plug-in's item may raise anything
+            reason = str(error) if isinstance(error, AeroDaaSError) else failure_line(error)
+            return {"kind": "left_out", **named, "reason": reason}, b""
         if found is None:
             return None
         item, blob, more = found
-        head = {"kind": "item", "stream": self._stream, "seq": message.seq, **more}
+        head = {"kind": "item", **named, **more}
         stamps = {"stamp": message.stamp, "captured": message.captured}
         return {**head, **stamps, "item": item, "blob": bool(blob)}, blob
 

@@ -162,6 +162,21 @@ def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands
     assert PackedReader(Commands(), "follower", PictureForm.DEPTH).next_packed(0.1) is None
 
 
+class Strange(Detection):
+    """A detection of a plug-in's own class."""
+
+
+def test_an_item_that_cannot_be_written_is_told_of() -> None:
+    """In its place, and the next ones come: a stream of some of them goes on."""
+    header = Header(3, 5, SOURCE)
+    odd = Detections(header, (Strange((0.0, 0.0, 1.0, 1.0), "person", 0.5),), 64, 48)
+    for form in (PictureForm.WHOLE, PictureForm.JPEG):
+        (first, _), (second, _) = packed(form, odd, Detections(header, (), 64, 48))
+        assert (first["kind"], first["stream"]) == ("left_out", SOURCE)
+        assert first["reason"] == "Detections is of no class that goes over the wire, or holds one"
+        assert (second["kind"], second["item"]["is"]) == ("item", "Detections")
+
+
 PLATEAU = ground(lambda east, _: np.where(east > 10, 5.0, 0.0))
 """Five metres up, from a cliff east of home on."""
 

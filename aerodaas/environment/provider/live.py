@@ -28,6 +28,8 @@ class ReceivedItem:
     content: Any
     """For `wire_items.unpack`."""
     blob: bytes
+    left_out: str = ""
+    """Why it is not there; empty for one that is."""
 
 
 class LiveConnection(WireConnection):
@@ -46,7 +48,7 @@ class LiveConnection(WireConnection):
                 return
             if kind == "mission":
                 yield self._mission(message)
-            elif kind == "item":
+            elif kind in {"item", "left_out"}:
                 yield self._item(message, blob)
 
     def _mission(self, message: dict[str, Any]) -> MissionOut:
@@ -60,4 +62,7 @@ class LiveConnection(WireConnection):
         stream, seq = message.get("stream"), message.get("seq")
         if not isinstance(stream, str) or not isinstance(seq, int):
             raise self.exchange.strange("an item without its stream or number")
-        return ReceivedItem(stream, seq, message.get("item"), blob)
+        left_out = ""
+        if message["kind"] == "left_out":
+            left_out = str(printed(message.get("reason"))) or "the provider does not say why"
+        return ReceivedItem(stream, seq, message.get("item"), blob, left_out)

@@ -98,6 +98,8 @@ class WireReader:
 
     def _take(self, message: ReceivedItem) -> None:
         try:
+            if message.left_out:
+                raise ItemError(message.left_out)
             item = unpack(message.content, message.blob)
         except ItemError as error:
             warnings.warn(f"{self._stream}: an item is left out: {error}", stacklevel=2)

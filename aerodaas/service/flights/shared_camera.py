@@ -96,14 +96,17 @@ class SharedCamera:
             message, blob = self._channel.receive(_ANSWER_SECONDS)
             if not message:
                 return None
-            item = unpack(message["item"], blob)
+            item = unpack(message.get("item"), blob)
         except GuestError:
             self.finished = True
             return None
         except ItemError:
             self.skipped += 1
             return None
-        return (item, int(message["captured"])) if isinstance(item, Frame) else None
+        if not isinstance(item, Frame):
+            self.skipped += 1
+            return None
+        return item, int(message["captured"])
 
     def close(self) -> None:
         """Ask no more."""

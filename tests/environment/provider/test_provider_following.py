@@ -142,6 +142,19 @@ def test_a_malformed_item_is_left_out(client: ProviderClient, stub: Stub) -> Non
         assert WireReader(client, follower, "drone/odom").next(SECONDS) == "well"
 
 
+def test_an_item_that_the_provider_cannot_send_is_told(client: ProviderClient, stub: Stub) -> None:
+    """Of a plug-in's own class, say: the user of a stream of nothing else hears why it is still."""
+    told = {
+        "kind": "left_out",
+        "seq": 0,
+        "reason": "Strange is of no class that goes over the wire",
+    }
+    stub.items = [(told, b""), *heads("well")]
+    follower = following(client)
+    with pytest.warns(UserWarning, match="drone/odom: an item is left out: Strange is of no class"):
+        assert WireReader(client, follower, "drone/odom").next(SECONDS) == "well"
+
+
 def test_a_stream_is_read_on_after_a_lost_connection(client: ProviderClient, stub: Stub) -> None:
     """The reader waits meanwhile."""
     stub.items = heads("one")
