@@ -107,6 +107,13 @@ class HereServer:
                 self._kept.popitem(last=False)
         return GuestItem(type(item).__name__, plain(item), name)
 
+    def revealed(self, item: object) -> object:
+        """The application's own object that a GuestItem stands for; anything else as it is.
+
+        Raises ItemError for one that is no longer kept.
+        """
+        return self._revealed(item) if isinstance(item, GuestItem) else item
+
     def _revealed(self, item: GuestItem) -> object:
         with self._keeping:
             if item.data not in self._kept:

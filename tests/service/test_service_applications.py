@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import enum
 import runpy
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -124,6 +126,45 @@ def test_an_analysis_of_ones_own_stays_at_the_users_side(campus: Served, tmp_pat
     assert max(told) > 1.5
     with Recording.open(tmp_path / "out" / "flight.mcap") as recording:
         assert any("heights" in topic for topic in recording.topics)
+
+
+class Colour(enum.Enum):
+    """What an item of a class of one's own may hold."""
+
+    RED = "red"
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An item of a class of one's own."""
+
+    place: Odometry
+    colour: Colour
+
+
+class Marks(Analytics[Mark]):
+    """Marks each place."""
+
+    accepts = (Odometry,)
+
+    def process(self, item: Odometry, context: object) -> Mark:
+        """Mark it."""
+        del context
+        return Mark(item, Colour.RED)
+
+
+def test_items_of_ones_own_class_are_read_as_they_were_made(campus: Served, tmp_path: Path) -> None:
+    """As in a flight of one's own, though the provider knows nothing of the class."""
+    environment = provided(campus, tmp_path)
+    drone = environment.get_robot_by_id("north")
+    marks = Marks().analyse(drone.get_sensor_by_id("odometry").get_data_stream())
+    drone.navigate(hop((0.0, 3.0)))
+    environment.start_mission(wait=False)
+    found = marks.get_data(60.0)
+    environment.wait()
+    assert type(found) is Mark
+    assert found.colour is Colour.RED
+    assert isinstance(found.place, Odometry)
 
 
 def test_what_the_provider_refuses_is_told_at_the_line(campus: Served, tmp_path: Path) -> None:

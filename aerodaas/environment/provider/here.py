@@ -35,6 +35,10 @@ class HereLink:
         self._workers = ThreadPoolExecutor(_WORKERS, "here")
         threading.Thread(target=self._run, name="here", daemon=True).start()
 
+    def revealed(self, item: object) -> object:
+        """As `HereServer.revealed`."""
+        return self._server.revealed(item)
+
     def close(self) -> None:
         """Answer no more; raises what an analysis raises when it is closed."""
         self._closed.set()

@@ -123,7 +123,10 @@ class ProvidedRun:
                 raise GraphError(
                     f"{stream} does not run: call get_data_stream() before start_mission()"
                 )
-            return WireReader(self._client, follower, stream)
+            here = self._here
+            if here is None:
+                return WireReader(self._client, follower, stream)
+            return WireReader(self._client, follower, stream, here.revealed)
 
         self._nodes = known
         self.graph.reader = read

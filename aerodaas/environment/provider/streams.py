@@ -6,6 +6,7 @@ import threading
 import time
 import warnings
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 from aerodaas.analytics.wire_items import ItemError, unpack
@@ -29,11 +30,26 @@ _LAST_SECONDS = 2.0
 class WireReader:
     """Reader of one stream until the mission is over; reconnects, and buffers the newest few."""
 
-    def __init__(self, client: ProviderClient, follower: MissionFollower, stream: str) -> None:
-        """Read `stream` of the mission that `follower` keeps up with."""
+    def __init__(
+        self,
+        client: ProviderClient,
+        follower: MissionFollower,
+        stream: str,
+        revealed: Callable[[object], object] = lambda item: item,
+    ) -> None:
+        """Read a stream of a mission.
+
+        Args:
+            client: The provider.
+            follower: Keeps up with the mission.
+            stream: Name of the stream.
+            revealed: Returns the application's own object for what stands for it on the wire, and
+                anything else as it is; raises ItemError.
+        """
         self._client = client
         self._follower = follower
         self._stream = stream
+        self._revealed = revealed
         self._arrived = threading.Condition()
         self._waiting: deque[Any] = deque(maxlen=_WAITING)
         self._newest: Any = None
@@ -97,12 +113,14 @@ class WireReader:
                     self._take(message)
 
     def _take(self, message: ReceivedItem) -> None:
-        try:
-            if message.left_out:
-                raise ItemError(message.left_out)
-            item = unpack(message.content, message.blob)
-        except ItemError as error:
-            warnings.warn(f"{self._stream}: an item is left out: {error}", stacklevel=2)
+        item, wrong = None, message.left_out
+        if not wrong:
+            try:
+                item = self._revealed(unpack(message.content, message.blob))
+            except ItemError as error:
+                wrong = str(error)
+        if wrong:
+            warnings.warn(f"{self._stream}: an item is left out: {wrong}", stacklevel=2)
             return
         if item is None:
             return

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from provider_stub import MISSION, Stub, mission
 
-from aerodaas.analytics.wire_items import pack
+from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.environment.provider import pauses as module
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
@@ -17,6 +17,7 @@ from aerodaas.environment.provider.streams import WireReader
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.types.data import Frame, Header, Odometry
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.guest_item import GuestItem
 
 SECONDS = 20.0
 
@@ -153,6 +154,22 @@ def test_an_item_that_the_provider_cannot_send_is_told(client: ProviderClient, s
     follower = following(client)
     with pytest.warns(UserWarning, match="drone/odom: an item is left out: Strange is of no class"):
         assert WireReader(client, follower, "drone/odom").next(SECONDS) == "well"
+
+
+def test_the_applications_own_items_are_its_own_again(client: ProviderClient, stub: Stub) -> None:
+    """What stands for one on the wire is taken back; one that is not kept any more is told."""
+    own = object()
+
+    def revealed(item: object) -> object:
+        if isinstance(item, GuestItem) and item.data == b"2":
+            raise ItemError("an Own that is no longer kept here")
+        return own if isinstance(item, GuestItem) else item
+
+    stub.items = heads(GuestItem("Own", 1, b"2"), GuestItem("Own", 1, b"1"), "well")
+    follower = following(client)
+    with pytest.warns(UserWarning, match="left out: an Own that is no longer kept here"):
+        found = WireReader(client, follower, "drone/own", revealed).next(SECONDS)
+    assert found is own
 
 
 def test_a_stream_is_read_on_after_a_lost_connection(client: ProviderClient, stub: Stub) -> None:
