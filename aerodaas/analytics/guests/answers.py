@@ -9,11 +9,14 @@ from aerodaas.analytics.base import Context
 from aerodaas.analytics.item_json import ItemError, decoded
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import ModelError
+from aerodaas.types.guest_item import GuestItem
 
 __all__ = ["AnswerReader", "AnsweredCondition"]
 
 _ALERTS = 100
 """Most alerts of one analysis in a flight."""
+_FIGURES = 32
+"""Most figures of one alert."""
 _TEXT = 500
 _fired: dict[tuple[str, str], frozenset[int]] = {}
 """Triggers whose condition the last result met, by author and analysis."""
@@ -65,10 +68,8 @@ class AnswerReader:
         Raises ModelError for a failure that it tells of, ItemError for a result that is malformed
         or of another class than was declared.
         """
-        for text in _texts(answer.get("alerts"))[: max(0, _ALERTS - self._alerts)]:
-            self._alerts += 1
-            header = Header(self._alerts, context.now(), self._author)
-            context.alert(Alert(header, self._kind, f"{self._author}: {text}"))
+        for text, values in _alerts(answer.get("alerts")):
+            self._tell(text, values, context)
         failed = answer.get("failed")
         if failed:
             raise ModelError(f"{self._title}: {str(failed)[:_TEXT]}")
@@ -76,17 +77,49 @@ class AnswerReader:
         if not self._is_declared(result):
             raise ItemError(
                 f"{self._title}: {self._key} declares {self._produces.__name__} and sent "
-                f"{type(result).__name__}"
+                f"{_named(result)}"
             )
         fired = answer.get("fired")
         numbers = fired if isinstance(fired, list) else []
         _fired[self._author, self._key] = frozenset(one for one in numbers if type(one) is int)
         return result
 
+    def _tell(self, text: str, values: dict[str, Any], context: Context) -> None:
+        self._alerts += 1
+        if self._alerts > _ALERTS + 1:
+            return
+        if self._alerts > _ALERTS:
+            said = f"{self._key} has told {_ALERTS} alerts, the most of one analysis"
+            text, values = f"{said}: its next ones are left out", {}
+        header = Header(self._alerts, context.now(), self._author)
+        context.alert(Alert(header, self._kind, f"{self._author}: {text}", values))
+
     def _is_declared(self, result: object) -> bool:
         wanted = (int, float) if self._produces is float else self._produces
         return result is None or isinstance(result, wanted)
 
 
-def _texts(found: object) -> list[str]:
-    return [str(one)[:_TEXT] for one in found] if isinstance(found, list) else []
+def _named(result: object) -> str:
+    if not isinstance(result, GuestItem):
+        return type(result).__name__
+    return (
+        f"{result.kind} of the application's own, or one that holds an object of a class of its "
+        "own: send those of AeroDaaS, or declare object"
+    )
+
+
+def _alerts(found: object) -> list[tuple[str, dict[str, Any]]]:
+    """Texts and figures of alerts; none of what is malformed."""
+    told = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+    return [
+        (str(one["text"])[:_TEXT], _figures(one.get("values"))) for one in told if "text" in one
+    ]
+
+
+def _figures(found: object) -> dict[str, Any]:
+    pairs = list(found.items())[:_FIGURES] if isinstance(found, dict) else []
+    return {
+        name[:_TEXT]: value[:_TEXT] if isinstance(value, str) else value
+        for name, value in pairs
+        if isinstance(name, str) and isinstance(value, bool | int | float | str)
+    }

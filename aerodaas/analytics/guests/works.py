@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
 
 from aerodaas.analytics.item_json import encoded
 from aerodaas.types.errors import failure_line
@@ -105,7 +108,7 @@ class _Context:
     kind: ComputeKind
 
     def __post_init__(self) -> None:
-        self.alerts: list[str] = []
+        self.alerts: list[dict[str, Any]] = []
 
     def now(self) -> int:
         """Mission time of the item, nanoseconds."""
@@ -116,5 +119,21 @@ class _Context:
         return self._vehicle
 
     def alert(self, alert: Alert) -> None:
-        """Send an alert's text with the result."""
-        self.alerts.append(f"{alert.kind}: {alert.text}")
+        """Send an alert's text and figures with the result."""
+        text = f"{alert.kind}: {alert.text}"
+        self.alerts.append({"text": text, "values": _figures(alert.values)})
+
+
+def _figures(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Figures as JSON has them: numbers and texts, and the words of anything else."""
+    found = {
+        name: one.item() if isinstance(one, np.generic) else one for name, one in values.items()
+    }
+    return {
+        str(name): one if type(one) in {bool, int, str} or _finite(one) else str(one)
+        for name, one in found.items()
+    }
+
+
+def _finite(value: object) -> bool:
+    return type(value) is float and math.isfinite(value)

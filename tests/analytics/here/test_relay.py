@@ -101,17 +101,35 @@ def echo(question: dict[str, Any]) -> dict[str, Any]:
 def test_a_question_goes_there_and_its_answer_comes_back(patient: HereRelay) -> None:
     """With the item, the time, and the conditions that were met."""
     user = User(patient)
-    user.say = lambda asked: {**echo(asked), "fired": [1], "alerts": ["low: too low"], "took": 0.0}
+    alerts = [{"text": "low: too low", "values": {"up": 0.5, "odd": [1], "at": "home"}}, {}, 5]
+    user.say = lambda asked: {**echo(asked), "fired": [1], "alerts": alerts, "took": 0.0}
     work, flight = stand_in(patient, Readings), Flight()
     assert work.process(READINGS, flight) == READINGS
     ((question, _),) = user.asked
     assert question["item"] == pack(READINGS)[0]
     assert (question["do"], question["key"], question["now"]) == ("process", "drone/a", 7)
     assert [AnsweredCondition(HERE, "drone/a", number)(READINGS) for number in (0, 1)] == [0, 1]
-    assert [(one.kind, one.text) for one in flight.alerts] == [("here", "here: low: too low")]
+    assert [(one.kind, one.text, one.values) for one in flight.alerts] == [
+        ("here", "here: low: too low", {"up": 0.5, "at": "home"})
+    ]
     times = patient.times()["drone/a"]
     assert (times.answers, times.missed) == (1, 0)
     assert 0 < times.newest == times.longest == times.total
+
+
+def test_alerts_beyond_the_most_are_told_of_once(patient: HereRelay) -> None:
+    """A hundred of one analysis in a flight, and then what becomes of the others."""
+    user = User(patient)
+    alerts = [{"text": f"low: {number}", "values": {}} for number in range(60)]
+    user.say = lambda asked: {**echo(asked), "alerts": alerts}
+    work, flight = stand_in(patient), Flight()
+    for number in range(4):
+        assert work.process(number, flight) == number
+    assert len(flight.alerts) == 101
+    assert flight.alerts[99].text == "here: low: 39"
+    assert flight.alerts[100].text == (
+        "here: drone/a has told 100 alerts, the most of one analysis: its next ones are left out"
+    )
 
 
 @pytest.mark.parametrize("lossless", [False, True])
@@ -219,6 +237,8 @@ def test_an_answer_of_another_connection_is_no_answer(patient: HereRelay) -> Non
         ({"item": {"is": "Waypoint", "of": {"id": 5}}}, b"", "Waypoint.id is of a wrong type"),
         ({"item": {"is": "os.system"}}, b"", "malformed item"),
         ({"item": "a text"}, b"", "declares AeroNavigation and sent str"),
+        ({"item": {"is": "GuestItem", "kind": "AeroNavigation", "value": 1, "data": ""}}, b"",
+         "and sent AeroNavigation of the application's own, or one that holds an object of"),
         ({"item": {"is": "Readings", "of": {"stamp": 1, "values": {"is": "dict", "of": {}}}}}, b"",
          "declares AeroNavigation and sent Readings"),
         ({"failed": "ValueError: boo"}, b"", "the user's side: ValueError: boo"),

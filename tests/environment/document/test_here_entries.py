@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, get_args
@@ -60,7 +61,8 @@ class Height(Analytics[float]):
         if item.height < 0:
             raise ValueError("below ground")
         if item.height < 1:
-            context.alert(Alert(Header(0, context.now(), "height"), "low", "too low"))
+            figures = {"up": item.height, "of": np.float32(1), "far": math.inf, "at": ("a", 1)}
+            context.alert(Alert(Header(0, context.now(), "height"), "low", "too low", figures))
         return item.height / 2
 
 
@@ -357,7 +359,9 @@ def test_the_users_side_answers(server: HereServer, application: Environment) ->
     """By a copy of the application's analysis; with its alerts and the conditions that are met."""
     answer, blob = server.answer(question("drone/height", at(0.5)), b"")
     assert answer.pop("took") > 0
-    assert answer == {"item": 0.25, "fired": [], "alerts": ["low: too low"], "number": 3}
+    figures = {"up": 0.5, "of": 1.0, "far": "inf", "at": "('a', 1)"}
+    alerts = [{"text": "low: too low", "values": figures}]
+    assert answer == {"item": 0.25, "fired": [], "alerts": alerts, "number": 3}
     assert blob == b""
     answer, _ = server.answer(question("drone/height", at(3.0)), b"")
     assert answer["fired"] == [0]
