@@ -8,6 +8,7 @@ alone.
 from __future__ import annotations
 
 import contextlib
+import logging
 import queue
 import socket
 import threading
@@ -33,6 +34,7 @@ from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["ControlServer", "Flown", "Reader"]
 
+_log = logging.getLogger(__name__)
 _MOST_CONNECTIONS = 64
 _MOST_WATCHING = 48
 """Connections of these that watch or answer, which a mission's users open: the service has the
@@ -140,8 +142,10 @@ class ControlServer:
                     watching[purpose](channel, first)
                 finally:
                     self._watching.release()
-        except (GuestError, KeyError, OSError):
+        except (GuestError, OSError):
             return
+        except Exception:  # noqa: BLE001 - a mistake, which is told of
+            _log.exception("what was asked for at the flight's control socket failed")
 
     def _commands(self, channel: Channel) -> None:
         while not self._closed.is_set():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -16,10 +17,12 @@ from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.trouble import TroubleLog
 from aerodaas.types.errors import ConfigError, MissionError
 
 __all__ = ["FlightLink", "FlightNews"]
 
+_log = logging.getLogger(__name__)
 _CONNECT_SECONDS = 2.0
 _ANSWER_SECONDS = 10.0
 _SILENT_SECONDS = 15.0
@@ -147,10 +150,14 @@ class FlightLink:
         return channel
 
     def _follow(self) -> None:
+        trouble = TroubleLog(_log)
         while not self._closed.is_set():
-            # Before the process listens and after its end there is nobody to connect to.
-            with contextlib.suppress(GuestError, OSError, ValidationError):
+            try:
                 self._follow_once()
+            except (GuestError, OSError):
+                pass  # Before the process listens and after its end there is nobody to connect to.
+            except Exception as error:  # noqa: BLE001 - news that are not as agreed, of any kind
+                trouble.tell(f"{self._folder.path.name}: its news cannot be read", error)
             self._closed.wait(_AGAIN_SECONDS)
 
     def _follow_once(self) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.protocol.preflight import PreflightOut
@@ -313,3 +314,49 @@ def test_readers_do_not_wait_for_each_other(flight: Flight) -> None:
     threading.Thread(target=read, daemon=True).start()
     assert done.wait(10.0)
     assert flight.commands == []
+
+
+class Garbled(StatusOut):
+    """A status of another version, which has other fields."""
+
+    def model_dump(self, **_: Any) -> dict[str, Any]:  # noqa: ANN401 - the base's
+        """Too few of them."""
+        return {"time": 1.0}
+
+
+def test_news_that_cannot_be_read_are_told_of(
+    flight: Flight, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once: a page would show the flight as it was, without a word."""
+    monkeypatch.setattr(flight, "status", lambda: ({"one": Garbled.model_construct()}, []))
+    until = time.monotonic() + 20.0
+    while not caplog.records:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    monkeypatch.undo()
+    number = flight.link.news.number
+    while flight.link.news.number < number + 2:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    (record,) = caplog.records
+    assert "its news cannot be read" in record.getMessage()
+    assert "StatusOut" in record.getMessage()
+
+
+def test_what_fails_in_the_flight_is_told_of(
+    flight: Flight, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mistake there is not taken for somebody who has gone."""
+
+    def fail(_: float) -> None:
+        raise KeyError("missing")
+
+    monkeypatch.setattr(flight.pictures, "next_packed", fail)
+    with pytest.raises(MissionError, match="ended"):
+        list(flight.link.items("one/cam"))
+    until = time.monotonic() + 20.0
+    while not caplog.records:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    assert "control socket failed" in caplog.text
+    assert "KeyError: 'missing'" in caplog.text
