@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.console.access import SUBPROTOCOL
+from aerodaas.console.jobs import end_jobs
 from aerodaas.mission.commands import ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
 from aerodaas.types.errors import AeroDaaSError
@@ -92,9 +93,7 @@ class ControlSession:
             if await self._answer(0.0, taken):
                 await asyncio.wait((reading, steering), return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for job in (reading, steering):
-                job.cancel()
-            await asyncio.gather(reading, steering, return_exceptions=True)
+            await end_jobs(f"control by hand of {self._operator}", [steering], [reading])
             if taken.accepted:
                 await self._told(ReleaseControls(self._session))
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):

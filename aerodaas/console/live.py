@@ -11,6 +11,7 @@ from fastapi import Query, WebSocket, WebSocketDisconnect
 
 from aerodaas.console.access import SUBPROTOCOL
 from aerodaas.console.hub import StreamHub, Watcher
+from aerodaas.console.jobs import end_jobs
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.types.clock import host_time_ns
 
@@ -109,14 +110,13 @@ class LiveSession:
         await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
         state = asyncio.create_task(self._state(rate, own=own))
         gone = asyncio.create_task(self._read())
-        ends = [state, gone, asyncio.create_task(until_refused(allowed))]
-        jobs = [*ends, *(asyncio.create_task(self._items(*one)) for one in streams)]
+        refused = asyncio.create_task(until_refused(allowed))
+        items = [asyncio.create_task(self._items(*one)) for one in streams]
         try:
+            ends = (state, gone, refused)
             await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for job in jobs:
-                job.cancel()
-            await asyncio.gather(*jobs, return_exceptions=True)
+            await end_jobs(f"{self._mission}: a live view", [state, refused, *items], [gone])
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await self._socket.close()
 

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, cast
 
 import pytest
-from fastapi import WebSocket
+from fastapi import WebSocket, WebSocketDisconnect
 
 from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import LiveSession
@@ -118,3 +118,46 @@ def test_a_slow_watcher_gets_the_newest_state_and_no_backlog() -> None:
         assert list(dict.fromkeys(slow.versions)) == [1, 2, 12]
 
     asyncio.run(_watched(check, 2))
+
+
+class _Failing(_Mission):
+    """A mission whose state cannot be told, by a mistake of ours."""
+
+    def text(self, mission: str) -> tuple[str, bool]:
+        raise KeyError(mission)
+
+
+def test_a_view_that_fails_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Its page connects again and again, and would show nothing without a word."""
+
+    async def view() -> None:
+        hub = StreamHub(lambda *_: iter(()))
+        session = LiveSession(cast("WebSocket", _Socket()), _Failing(), hub, "m")
+        await asyncio.wait_for(session.run(_RATE, [], own=False), 20.0)
+
+    asyncio.run(view())
+    assert "m: a live view has failed" in caplog.text
+    assert "KeyError: 'm'" in caplog.text
+
+
+class _Gone(_Socket):
+    """A watcher who goes."""
+
+    async def send_text(self, text: str) -> None:
+        del text
+        raise WebSocketDisconnect(1006)
+
+    async def receive_text(self) -> str:
+        raise KeyError("text")
+
+
+def test_a_watcher_who_goes_is_no_failure(caplog: pytest.LogCaptureFixture) -> None:
+    """Nor is one who sends what no page sends."""
+
+    async def view() -> None:
+        hub = StreamHub(lambda *_: iter(()))
+        session = LiveSession(cast("WebSocket", _Gone()), _Mission(), hub, "m")
+        await asyncio.wait_for(session.run(_RATE, [], own=False), 20.0)
+
+    asyncio.run(view())
+    assert caplog.text == ""

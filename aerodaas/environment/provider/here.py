@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -12,21 +14,28 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError, SourceError
 
 __all__ = ["HereLink"]
 
 _WORKERS = 8
 """Questions that are answered at once; each analysis is asked for one item at a time."""
+_REFUSALS = 2
+"""Refusals for the same reason after which they are told: one may come as the mission ends."""
 
 
 class HereLink:
     """Answers a flight's questions until it is over; connects again when the connection is lost."""
 
     def __init__(
-        self, client: ProviderClient, follower: MissionFollower, server: HereServer
+        self,
+        client: ProviderClient,
+        follower: MissionFollower,
+        server: HereServer,
+        say: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Answer by an open `server`, which is closed with this."""
+        """Answer by an open `server`, which is closed with this; `say` is told of refusals."""
+        self._say = say
         self._client = client
         self._follower = follower
         self._server = server
@@ -49,11 +58,17 @@ class HereLink:
         self._server.close()
 
     def _run(self) -> None:
-        waiting = pauses()
+        waiting, refusals = pauses(), Counter[str]()
         while not self._closed.is_set() and not self._follower.mission.phase.over:
-            # The follower meets and tells the same; the flight tells that it has no answers.
-            with contextlib.suppress(AeroDaaSError, RuntimeError):
+            try:
                 self._connect()
+            except (SourceError, RuntimeError):
+                # The follower meets and tells the same; the flight tells that it has no answers.
+                pass
+            except AeroDaaSError as error:
+                refusals[str(error)] += 1
+                if refusals[str(error)] == _REFUSALS:
+                    self._say(f"the analyses at this side are not asked: {error}")
             self._closed.wait(next(waiting))
 
     def _connect(self) -> None:

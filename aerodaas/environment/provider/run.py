@@ -239,7 +239,7 @@ class ProvidedRun:
 
         server = HereServer(self._environment, written.document)
         server.open()
-        self._here = HereLink(self._client, self._following, server)
+        self._here = HereLink(self._client, self._following, server, self._say)
 
     def _await_flight(self, step: Callable[[str], None]) -> None:
         """Return once the drones fly, or have flown; raises MissionError if they will not."""

@@ -14,7 +14,12 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.live import ReceivedItem
 from aerodaas.environment.provider.pauses import pauses
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.types.errors import (
+    AeroDaaSError,
+    ConfigError,
+    MissionError,
+    failure_line,
+)
 
 __all__ = ["WireReader"]
 
@@ -61,7 +66,7 @@ class WireReader:
         """Return the next item, waiting up to `timeout` seconds (None: for ever).
 
         Raises TimeoutError when none came, StopIteration once the mission has ended, ConfigError
-        if the provider refuses the stream.
+        if the provider refuses the stream, MissionError if it can be read no more.
         """
         until = time.monotonic() + (float("inf") if timeout is None else timeout)
         with self._arrived:
@@ -96,6 +101,10 @@ class WireReader:
                 except AeroDaaSError:
                     # The follower meets and tells the same.
                     time.sleep(next(waiting))
+                except Exception as error:
+                    # Not the mission's end, for which its reader would take it.
+                    self._failed = MissionError(f"{self._stream}: {failure_line(error)}")
+                    raise
                 else:
                     return
                 if self._follower.mission.phase.over:

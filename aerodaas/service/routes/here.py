@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from aerodaas.analytics.guests.channel import LARGEST_TEXT, GuestError
+from aerodaas.console.jobs import end_jobs
 from aerodaas.console.live import until_refused
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal
@@ -66,9 +67,7 @@ class HereRoutes:
         try:
             await asyncio.wait(jobs, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for job in jobs:
-                job.cancel()
-            await asyncio.gather(*jobs, return_exceptions=True)
+            await end_jobs(f"{mission}: the way to its user's side", jobs[::2], jobs[1:2])
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
 

@@ -13,10 +13,11 @@ from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.environment.provider import pauses as module
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
+from aerodaas.environment.provider.here import HereLink
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import ConfigError
+from aerodaas.types.errors import ConfigError, MissionError
 from aerodaas.types.guest_item import GuestItem
 
 SECONDS = 20.0
@@ -170,6 +171,44 @@ def test_the_applications_own_items_are_its_own_again(client: ProviderClient, st
     with pytest.warns(UserWarning, match="left out: an Own that is no longer kept here"):
         found = WireReader(client, follower, "drone/own", revealed).next(SECONDS)
     assert found is own
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_reader_that_fails_has_not_ended(client: ProviderClient, stub: Stub) -> None:
+    """A mistake is no end of the mission, after which a loop over a stream just goes on."""
+
+    def revealed(_: object) -> object:
+        raise KeyError("missing")
+
+    stub.items = heads("well")
+    reader = WireReader(client, following(client), "drone/odom", revealed)
+    with pytest.raises(MissionError, match="drone/odom: KeyError: 'missing'"):
+        reader.next(SECONDS)
+
+
+def test_refusals_of_the_users_side_are_told(client: ProviderClient) -> None:
+    """Once: its own connection needs more than that of who follows."""
+    said: list[str] = []
+    told = threading.Event()
+
+    class Refusing:
+        def here(self, _: str) -> object:
+            raise ConfigError("the scope compute is missing")
+
+    class Nobody:
+        def close(self) -> None:
+            """Nothing is open."""
+
+    def say(text: str) -> None:
+        said.append(text)
+        told.set()
+
+    arguments = Refusing(), following(client), Nobody()
+    link = HereLink(*arguments, say)  # type: ignore[arg-type]
+    assert told.wait(SECONDS)
+    time.sleep(0.2)
+    link.close()
+    assert said == ["the analyses at this side are not asked: the scope compute is missing"]
 
 
 def test_a_stream_is_read_on_after_a_lost_connection(client: ProviderClient, stub: Stub) -> None:
