@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections import deque
 from dataclasses import dataclass, replace
@@ -240,8 +239,10 @@ class Worker:
     def close(self) -> None:
         """Close analysis and streams."""
         if self.opened:
-            with contextlib.suppress(Exception):
+            try:
                 self.node.work.close()
+            except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
+                self._complain(error)
             self.subscriber.close()
 
     @property

@@ -27,6 +27,7 @@ __all__ = [
     "Jitter",
     "ProcessId",
     "Ticker",
+    "Unwritten",
     "Weave",
     "Wish",
 ]
@@ -92,6 +93,17 @@ class Above(Analytics[float]):
         """Return the height in metres, or None."""
         dawdle()
         return item.height if item.height > self._height else None
+
+
+class Unwritten(Analytics[float]):
+    """Writes what it has found when it is closed, and cannot."""
+
+    def close(self) -> None:
+        """Fail."""
+        raise OSError("the disk is full")
+
+    def process(self, item: Odometry, context: Context) -> None:
+        """Find nothing."""
 
 
 class Broken(Analytics[float]):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 import pytest
-from analyses import Above, Broken, Jitter, ProcessId, Ticker
+from analyses import Above, Broken, Jitter, ProcessId, Ticker, Unwritten
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import AeroListData, Environment, Odometry, Robot, Waypoint
@@ -194,6 +194,17 @@ def test_an_analysis_that_raises_does_not_end_the_mission(flyer: Flyer) -> None:
         flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].visited == ("wp0",)
     assert [kind for _, kind, _ in flight.alerts] == ["analysis_failed"]
+
+
+def test_an_analysis_that_cannot_be_closed_is_told_of(flyer: Flyer) -> None:
+    """What it was to write then is lost, and nobody would know."""
+
+    def build(env: Environment) -> None:
+        short(env)
+        Unwritten().analyse(odometry_of(env))
+
+    with pytest.raises(MissionError, match=r"drone/unwritten: OSError: the disk is full at analys"):
+        flyer.fly(build, lockstep=True)
 
 
 def test_a_trigger_ends_the_mission_and_wakes_an_analysis(flyer: Flyer) -> None:
