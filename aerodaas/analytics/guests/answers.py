@@ -109,11 +109,10 @@ def _named(result: object) -> str:
 
 
 def _alerts(found: object) -> list[tuple[str, dict[str, Any]]]:
-    """Texts and figures of alerts; none of what is malformed."""
-    told = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
-    return [
-        (str(one["text"])[:_TEXT], _figures(one.get("values"))) for one in told if "text" in one
-    ]
+    """Texts and figures of alerts; what is something else is told as it is."""
+    told = found if isinstance(found, list) else []
+    pairs = [one if isinstance(one, dict) else {"text": one} for one in told]
+    return [(str(one.get("text"))[:_TEXT], _figures(one.get("values"))) for one in pairs]
 
 
 def _figures(found: object) -> dict[str, Any]:

@@ -101,7 +101,10 @@ def echo(question: dict[str, Any]) -> dict[str, Any]:
 def test_a_question_goes_there_and_its_answer_comes_back(patient: HereRelay) -> None:
     """With the item, the time, and the conditions that were met."""
     user = User(patient)
-    alerts = [{"text": "low: too low", "values": {"up": 0.5, "odd": [1], "at": "home"}}, {}, 5]
+    alerts = [
+        {"text": "low: too low", "values": {"up": 0.5, "odd": [1], "at": "home"}},
+        "words alone",
+    ]
     user.say = lambda asked: {**echo(asked), "fired": [1], "alerts": alerts, "took": 0.0}
     work, flight = stand_in(patient, Readings), Flight()
     assert work.process(READINGS, flight) == READINGS
@@ -110,7 +113,8 @@ def test_a_question_goes_there_and_its_answer_comes_back(patient: HereRelay) -> 
     assert (question["do"], question["key"], question["now"]) == ("process", "drone/a", 7)
     assert [AnsweredCondition(HERE, "drone/a", number)(READINGS) for number in (0, 1)] == [0, 1]
     assert [(one.kind, one.text, one.values) for one in flight.alerts] == [
-        ("here", "here: low: too low", {"up": 0.5, "at": "home"})
+        ("here", "here: low: too low", {"up": 0.5, "at": "home"}),
+        ("here", "here: words alone", {}),
     ]
     times = patient.times()["drone/a"]
     assert (times.answers, times.missed) == (1, 0)
