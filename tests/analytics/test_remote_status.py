@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from filled import filled
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,3 +56,32 @@ def test_a_driver_that_does_not_know_says_so(
     state = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True, gps=fix)
     told = StatusOut.of(status(None), state)
     assert (told.position_sigma, told.satellites) == said
+
+
+UNTOLD = {
+    # Each visit is in what was visited, and alerts tell of pictures that were not taken.
+    MissionStatus: {"visits", "photos"},
+    # Complaints are in the mission's faults; of the rest, what people need comes as alerts and
+    # answers. The simulator's truth, further figures and addresses are nobody's business.
+    VehicleState: {
+        *("armed", "faults", "ended", "gimbal", "zoom", "below", "actuators"),
+        *("truth", "extra", "video"),
+    },
+}
+"""Fields that a status does not tell, on purpose."""
+
+
+@pytest.mark.parametrize("kind", [MissionStatus, VehicleState])
+def test_each_field_is_told_or_is_named_here(kind: Any) -> None:  # noqa: ANN401 - a dataclass
+    """One that is there makes the status another one."""
+    whole = {one: filled(one) for one in (MissionStatus, VehicleState)}
+    told = StatusOut.of(whole[MissionStatus], whole[VehicleState])
+    for field in dataclasses.fields(kind):
+        default: Any = field.default
+        if field.default_factory is not dataclasses.MISSING:
+            default = field.default_factory()
+        if default is dataclasses.MISSING:
+            continue
+        less = {**whole, kind: dataclasses.replace(whole[kind], **{field.name: default})}
+        same = StatusOut.of(less[MissionStatus], less[VehicleState]) == told
+        assert same == (field.name in UNTOLD[kind]), field.name

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import pickle
+import typing
 from typing import Any
 
 import numpy as np
 import pytest
+from filled import filled
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -219,3 +221,14 @@ def test_places_on_the_globe_are_on_it(kind: str) -> None:
         Waypoint("w", 91, 8, 1, waypoint_type=kind)
     with pytest.raises(InvalidWaypointError, match="the environment file gives no home"):
         Waypoint("w", 47, 8, 1, waypoint_type=kind).resolve(np.zeros(3), None)
+
+
+@pytest.mark.parametrize("kind", [Waypoint, VelocityCommand])
+def test_each_number_is_finite(kind: Any) -> None:  # noqa: ANN401 - a dataclass
+    """A field that holds numbers and takes one that is none would reach the autopilot."""
+    hints = typing.get_type_hints(kind)
+    numbers = [name for name, hint in hints.items() if float in {hint, *typing.get_args(hint)}]
+    assert len(numbers) > 4
+    for name in numbers:
+        with pytest.raises(InvalidWaypointError, match=f"{name} must be a finite number"):
+            filled(kind, **{name: math.nan})
