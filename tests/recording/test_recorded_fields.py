@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from filled import filled, names
+from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.recording.converters import Session, convert
+from aerodaas.recording.pictures import detections, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorded_camera import camera_of
+from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.types.data import Alert, Battery, Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.geometry import CameraModel
 from aerodaas.types.payload import Photo
 from aerodaas.types.status import Decision, Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
@@ -90,3 +99,25 @@ def test_what_is_inside_is_recorded() -> None:
     assert lost(Waypoint, found["waypoints"][0]) == set()
     assert lost(VelocityCommand, found["commands"][0]) == set()
     assert found["priority"] == 2
+
+
+def test_detections_and_cameras_are_read_as_they_were_recorded(tmp_path: Path) -> None:
+    """By who shows and exports them: each field that is recorded at all."""
+    path, found, frame = tmp_path / "flight.mcap", filled(Detections), filled(Frame)
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for seq, (stream, item) in enumerate((("drone/cam", frame), ("drone/finder", found))):
+            recorder.write(Message(stream, seq, 6, HEADER, 0, (), item))
+    with Recording.open(path) as recording:
+        ((_, back),) = detections(recording, ["/drone/finder/detections"])
+        values = {record.topic: record.value for record in recording.records()}
+        (shot,) = shots(recording, ["/drone/cam/image"])
+        depth = shot.depth()
+    known = dataclasses.replace(found[0], appearance=None)
+    assert (back.header, back.width, back.height) == (found.header, found.width, found.height)
+    assert list(back) == [known]
+    assert (shot.header, shot.odometry) == (frame.header, frame.odometry)
+    np.testing.assert_array_equal(depth, frame.depth)
+    camera = camera_of(values["/drone/cam/calibration"], values["/drone/cam/mount"])
+    assert camera is not None
+    for name in names(CameraModel):
+        assert getattr(camera, name) == pytest.approx(getattr(frame.camera, name)), name
