@@ -127,15 +127,20 @@ class _Failing(_Mission):
         raise KeyError(mission)
 
 
-def test_a_view_that_fails_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
-    """Its page connects again and again, and would show nothing without a word."""
+def _view(socket: _Socket, mission: _Mission) -> None:
+    """Show a mission until the view ends."""
 
     async def view() -> None:
         hub = StreamHub(lambda *_: iter(()))
-        session = LiveSession(cast("WebSocket", _Socket()), _Failing(), hub, "m")
+        session = LiveSession(cast("WebSocket", socket), mission, hub, "m")
         await asyncio.wait_for(session.run(_RATE, [], own=False), 20.0)
 
     asyncio.run(view())
+
+
+def test_a_view_that_fails_is_told_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Its page connects again and again, and would show nothing without a word."""
+    _view(_Socket(), _Failing())
     assert "m: a live view has failed" in caplog.text
     assert "KeyError: 'm'" in caplog.text
 
@@ -153,11 +158,5 @@ class _Gone(_Socket):
 
 def test_a_watcher_who_goes_is_no_failure(caplog: pytest.LogCaptureFixture) -> None:
     """Nor is one who sends what no page sends."""
-
-    async def view() -> None:
-        hub = StreamHub(lambda *_: iter(()))
-        session = LiveSession(cast("WebSocket", _Gone()), _Mission(), hub, "m")
-        await asyncio.wait_for(session.run(_RATE, [], own=False), 20.0)
-
-    asyncio.run(view())
+    _view(_Gone(), _Mission())
     assert caplog.text == ""
