@@ -353,6 +353,9 @@ class MissionOut(AnswerModel):
     verdict: VerdictOut | None = None
     status: dict[str, StatusOut] = Field(default_factory=dict)
     """Newest status by robot, while it flies and afterwards."""
+    told: dict[str, float] = Field(default_factory=dict)
+    """Unix seconds when that status came, by robot, while it flies: once nothing comes any more,
+    what is told here is as old as that."""
     alerts: list[str] = Field(default_factory=list)
     """The newest alerts, oldest first."""
     streams: dict[str, StreamKind] = Field(default_factory=dict)

@@ -51,7 +51,6 @@ __all__ = ["MissionDesk"]
 
 _OPEN = frozenset(phase for phase in MissionPhase if not phase.over)
 _TURN_SECONDS = 0.1
-_HEARD_SECONDS = 1.0
 _MOST_SHOWN = 100
 """Most missions of a list."""
 
@@ -83,7 +82,6 @@ class MissionDesk:
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._trouble = TroubleLog(logging.getLogger(__name__))
-        self._heard: dict[str, float] = {}
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
@@ -311,16 +309,9 @@ class MissionDesk:
 
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
-        now = time.monotonic()
         one = self._missions.get(mission)
-        if one is None or one.phase is not MissionPhase.FLYING:
-            return
-        if now - self._heard.get(mission, 0.0) >= _HEARD_SECONDS:
-            self._heard[mission] = now
-            try:
-                one.follow().ask(do="heard")
-            except MissionError:
-                return
+        if one is not None and one.phase is MissionPhase.FLYING:
+            one.follow().hear()
 
     def items(
         self, mission: str, stream: str, form: PictureForm
@@ -378,7 +369,6 @@ class MissionDesk:
                     one.close()
                     del self._missions[one.row.id]
                     self._texts.pop(one.row.id, None)
-                    self._heard.pop(one.row.id, None)
             self._have_watched()
 
     def _have_watched(self) -> None:

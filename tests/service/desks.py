@@ -80,6 +80,9 @@ class Link:
         self.asked.append(request)
         return AnswerOut(accepted=True)
 
+    def hear(self) -> None:
+        """Nothing."""
+
     def close(self) -> None:
         """Nothing."""
 

@@ -6,6 +6,7 @@ import pytest
 from provider_stub import mission, status
 
 from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.terminal import provided
 from aerodaas.terminal.provided import ProvidedView, phase_text
 from aerodaas.types.waypoints import Waypoint
 
@@ -29,6 +30,27 @@ def test_what_is_unknown_is_shown_as_such(capsys: pytest.CaptureFixture[str]) ->
     shown = capsys.readouterr().out
     assert "drone idle" in shown
     assert "other enroute" in shown
+
+
+def test_what_was_not_told_anew_is_called_old(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A provider repeats what it knows of a flight that hangs; who has landed tells no more."""
+    now = 100.0
+    monkeypatch.setattr(provided.time, "monotonic", lambda: now)
+    flying, landed = status(), status(state="landed")
+    with ProvidedView(shown=True) as view:
+        view.update(mission(status={"one": flying, "two": landed}))
+        now += 40.0
+        view.update(mission(status={"one": flying, "two": landed}))
+        old = capsys.readouterr().out.splitlines()
+        now += 40.0
+        view.update(mission(status={"one": status(time=80.0), "two": landed}))
+    new = capsys.readouterr().out.splitlines()
+    (told,) = [line for line in old if "no word" in line]
+    assert "one enroute: no word from it for 40 s: this is old" in told
+    assert not any("no word" in line for line in new)
+    assert any("one enroute" in line for line in new)
 
 
 def test_without_a_view_new_alerts_alone_are_told(capsys: pytest.CaptureFixture[str]) -> None:
