@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from aerodaas.console import meter as meter_module
 from aerodaas.console.meter import FlightMeter
 from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.status import MissionState, MissionStatus
@@ -49,7 +48,7 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
 def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who told it may hang."""
     now = 100.0
-    monkeypatch.setattr(meter_module.time, "time", lambda: now)
+    monkeypatch.setattr("aerodaas.console.meter.time.time", lambda: now)
     meter, state = FlightMeter(), flying_to(1)
     for _ in range(2):
         meter.note(state)

@@ -6,7 +6,6 @@ import pytest
 from provider_stub import mission, status
 
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.terminal import provided
 from aerodaas.terminal.provided import ProvidedView, phase_text
 from aerodaas.types.waypoints import Waypoint
 
@@ -37,7 +36,7 @@ def test_what_was_not_told_anew_is_called_old(
 ) -> None:
     """A provider repeats what it knows of a flight that hangs; who has landed tells no more."""
     now = 100.0
-    monkeypatch.setattr(provided.time, "monotonic", lambda: now)
+    monkeypatch.setattr("aerodaas.terminal.provided.time.monotonic", lambda: now)
     flying, landed = status(), status(state="landed")
     with ProvidedView(shown=True) as view:
         view.update(mission(status={"one": flying, "two": landed}))
