@@ -126,7 +126,8 @@ class MissionDesk:
             # It has used up its minutes of the quota already.
             self._bookings.require(principal, wanted.lease, robots)
         own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
-        self._bookings.require_quota(principal.tenant, own)
+        cloud = self._briefing.may_call_cloud(wanted.document)
+        self._bookings.require_quota(principal.tenant, own, cloud=cloud)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
@@ -334,8 +335,14 @@ class MissionDesk:
         one = self._seen(principal, mission)
         files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
         if not files[name].is_file() or (name == "recording" and not one.over):
-            raise RefusedError(404, f"{mission} has no {name} yet")
+            raise RefusedError(404, f"{mission} has no {name}")
         return files[name]
+
+    def delete_recording(self, principal: Principal, mission: str) -> None:
+        """Remove the recording of a mission that is over; raises RefusedError."""
+        self._require_own(principal, mission)
+        self.file(principal, mission, "recording").unlink(missing_ok=True)
+        self._store.usage.update(mission, lambda row: replace(row, kept=False))
 
     def _tell_flights(self, lease: Lease) -> None:
         """Bring home what flies under a lease that has ended; prolong what flies under a longer."""

@@ -36,7 +36,7 @@ def first_command(follow: VipFollowAnalytics, score: float, since: int = 0) -> i
     ("score", "step"), [(0.5, 4), (0.49, 20), (0.41, 20), (0.4, 20), (0.39, None)]
 )
 def test_a_vest_that_is_seen_for_long_need_not_be_as_sure(score: float, step: int | None) -> None:
-    """As from the side, where an arm hides most of it: 3 of 20 searches had passed one by."""
+    """As from the side, where an arm hides most of it: 4 of 20 searches had passed one by."""
     assert first_command(VipFollowAnalytics(), score) == step
 
 
