@@ -188,9 +188,11 @@ def test_each_frame_is_encoded_and_written_once_for_all(
 def test_a_stream_that_cannot_be_written_is_told_of_once(caplog: pytest.LogCaptureFixture) -> None:
     """Pages ask for it again and again, and would show nothing without a word."""
 
-    def items(*_: object) -> Iterator[tuple[dict[str, Any], bytes]]:
+    def packed() -> tuple[dict[str, Any], bytes]:
         raise ItemError("Strange is of no class that goes over the wire")
-        yield {}, b""
+
+    def items(*_: object) -> Iterator[tuple[dict[str, Any], bytes]]:
+        return iter(packed, ({}, b""))
 
     async def look() -> None:
         hub = StreamHub(items)
