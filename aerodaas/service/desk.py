@@ -342,7 +342,9 @@ class MissionDesk:
         """Remove the recording of a mission that is over; raises RefusedError."""
         self._require_own(principal, mission)
         self.file(principal, mission, "recording").unlink(missing_ok=True)
-        self._store.usage.update(mission, lambda row: replace(row, kept=False))
+        # A flight whose process was killed has told of no usage.
+        if self._store.usage.get(mission) is not None:
+            self._store.usage.update(mission, lambda row: replace(row, kept=False))
 
     def _tell_flights(self, lease: Lease) -> None:
         """Bring home what flies under a lease that has ended; prolong what flies under a longer."""

@@ -12,9 +12,10 @@ from desks import PILOT, Provider
 from served import Served, document, fleet, robot
 
 from aerodaas.environment.provider.logins import client_for
-from aerodaas.protocol.schemas import MissionIn, TenantChange
+from aerodaas.protocol.schemas import MissionIn, MissionPhase, TenantChange
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.mission import ActiveMission, LostFlightError
 from aerodaas.service.store import Tenant, Usage
 from aerodaas.types.errors import ConfigError
 
@@ -87,6 +88,27 @@ def test_only_what_may_call_the_cloud_needs_calls(
     else:
         with pytest.raises(RefusedError, match="cloud calls of farm are used up"):
             provider.desk.submit(PILOT, wanted)
+
+
+def test_the_recording_of_a_lost_flight_can_be_deleted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has told of no usage."""
+    provider = Provider(tmp_path, monkeypatch)
+    mission = provider.flying()
+    provider.started[-1].recording.write_bytes(b"begun")
+
+    def lost(_: ActiveMission) -> None:
+        raise LostFlightError("its processes have ended")
+
+    monkeypatch.setattr(ActiveMission, "flown", lost)
+    provider.turns()
+    assert provider.phase(mission) is MissionPhase.FAILED
+    assert provider.desk.shown(mission.id).recording
+    provider.desk.delete_recording(PILOT, mission.id)
+    assert not provider.desk.shown(mission.id).recording
+    provider.desk.close()
+    provider.store.close()
 
 
 def test_a_flight_has_the_weight_of_its_tenant(
