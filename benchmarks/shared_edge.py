@@ -18,7 +18,7 @@ from _report import Report
 from _served import served
 
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.protocol.schemas import AccountIn, AnalyticsOut, MissionIn, TokenIn
+from aerodaas.protocol.schemas import AccountIn, AnalyticsOut, MissionIn, TenantChange, TokenIn
 
 UNITS = {"in time": "per s", "late": "per s", "dropped": "per s"}
 TENANTS = {"first": 0.0, "second": 20.0}
@@ -75,10 +75,13 @@ def main(
     json_file: Annotated[Path | None, typer.Option("--json", help="Write figures here.")] = None,
 ) -> None:
     """Count what each tenant gets done."""
-    words = ["--edge-slots", str(slots), "--weight", f"first={weight}"] if slots else []
+    words = ["--edge-slots", str(slots)] if slots else []
     report = Report("shared edge", UNITS, packages=["aerodaas"])
     with served(environment(), *words) as (admin, _, _):
-        missions = {tenant: submitted(admin, tenant, milliseconds) for tenant in TENANTS}
+        weights = dict(zip(TENANTS, (weight, 1.0), strict=True))
+        missions = {
+            tenant: submitted(admin, tenant, weights[tenant], milliseconds) for tenant in TENANTS
+        }
         while not all(admin.mission(one).analytics for one in missions.values()):
             time.sleep(0.5)
         time.sleep(_SETTLE_SECONDS)
@@ -104,9 +107,10 @@ def main(
         report.write(json_file)
 
 
-def submitted(admin: ProviderClient, tenant: str, milliseconds: float) -> str:
-    """Submit a tenant's mission; returns its id."""
+def submitted(admin: ProviderClient, tenant: str, weight: float, milliseconds: float) -> str:
+    """Submit the mission of a tenant of this weight; returns its id."""
     admin.add_account(AccountIn(name=f"{tenant}_pilot", tenant=tenant))
+    admin.change_tenant(tenant, TenantChange(weight=weight))
     secret = admin.issue_token(TokenIn(account=f"{tenant}_pilot")).secret
     wanted = {"document": document(tenant, milliseconds), "minutes": 15}
     client = ProviderClient(admin.address.base, str(secret))

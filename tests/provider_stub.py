@@ -142,6 +142,7 @@ class Stub:
             ("POST", "/missions/{mission}/commands", self._command),
             ("POST", "/missions/{mission}/navigation", self._navigation),
             ("GET", "/missions/{mission}/recording", self._recording),
+            ("DELETE", "/missions/{mission}/recording", self._delete_recording),
         ):
             app.add_api_route(f"/v1{path}", answer, methods=[method])
         app.add_api_websocket_route("/v1/missions/{mission}/live", self._follow)
@@ -198,6 +199,9 @@ class Stub:
 
     def _recording(self) -> Response:
         return Response(self.recording)
+
+    def _delete_recording(self) -> Response:
+        return Response(status_code=204)
 
     async def _follow(self, socket: WebSocket, streams: str = "") -> None:
         if "/v1/missions" in self.refusals:

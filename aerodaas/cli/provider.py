@@ -234,12 +234,12 @@ def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # 
         follower.start()
         seen = -1
         while True:
-            if seen < follower.changes:
-                seen = follower.changes
-                if as_json:
-                    typer.echo(found.model_dump_json())
-                else:
-                    view.update(found)
+            if not as_json:
+                # Again without a change: it shows how old that is.
+                view.update(found)
+            elif seen < follower.changes:
+                typer.echo(found.model_dump_json())
+            seen = follower.changes
             if found.phase.over:
                 break
             found = follower.await_change(seen, _LOOK_SECONDS)
@@ -298,24 +298,31 @@ def fetch(
         Path | None,
         typer.Option("--output", "-o", help="The file. Default: MISSION.mcap."),
     ] = None,
+    delete: Annotated[  # noqa: FBT002
+        bool, typer.Option("--delete", help="Remove it at the provider once it is here.")
+    ] = False,
     at: At = None,
     as_json: Json = False,  # noqa: FBT002
 ) -> None:
     """Fetch the recording of a mission that is over.
 
     aerodaas fetch 3f1a6c0d9b2e -o flight.mcap
+    aerodaas fetch 3f1a6c0d9b2e --delete
     aerodaas report flight.mcap
     """
     from aerodaas.terminal.provided import download_view  # noqa: PLC0415 - slow to load
 
+    client = client_at(at)
     target = output or Path(f"{Path(mission).name}.mcap")
     if target.exists():
         raise ConfigError(f"{target} already exists and is not overwritten; name another file")
     try:
         with download_view(shown=not as_json, what=target.name) as progress:
-            client_at(at).recording(mission, target, progress)
+            client.recording(mission, target, progress)
     except OSError as error:
         raise ConfigError(f"cannot write {target}: {error.strerror}") from None
+    if delete:
+        client.delete_recording(mission)
     size = target.stat().st_size
     if as_json:
         typer.echo(json.dumps({"mission": mission, "file": str(target), "bytes": size}))

@@ -59,10 +59,6 @@ def serve(
             "together, shared by tenants' weights. Default: each flight as it likes.",
         ),
     ] = None,
-    weight: Annotated[
-        list[str] | None,
-        typer.Option(metavar="TENANT=W", help="A tenant's weight on the edge. Default: 1."),
-    ] = None,
     actuator: Annotated[
         list[str] | None,
         typer.Option(
@@ -123,7 +119,6 @@ def serve(
         speed="max" if lockstep else factor or 1.0,
         most_attached=most_attached,
         edge_slots=edge_slots,
-        weights=dict(map(_weight, weight or ())),
         actuators=_actuators(actuator or (), config),
         address=address,
         oidc=_oidc(
@@ -143,18 +138,6 @@ def serve(
         key=key,
         tell=typer.echo,
     )
-
-
-def _weight(text: str) -> tuple[str, float]:
-    """Tenant and weight of `TENANT=W`; raises ConfigError."""
-    tenant, _, number = text.rpartition("=")
-    try:
-        found = float(number)
-    except ValueError:
-        found = 0.0
-    if not tenant or not 0.0 < found < float("inf"):
-        raise ConfigError(f"--weight is TENANT=W with a positive number, not {text!r}")
-    return tenant, found
 
 
 def _actuators(texts: Iterable[str], config: EnvironmentConfig) -> dict[str, frozenset[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import OrderedDict, defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -32,6 +33,8 @@ class FlightMeter:
     def __init__(self) -> None:
         self.status: dict[str, StatusOut] = {}
         """By robot; replaced and never changed, because other threads read it."""
+        self.told: dict[str, float] = {}
+        """Unix seconds when each robot's newest status came; replaced as that is."""
         self.preflight: dict[str, PreflightOut] = {}
         """The list before take-off by robot; replaced as the status is."""
         self.alerts: list[str] = []
@@ -49,10 +52,15 @@ class FlightMeter:
 
     def note(self, state: FlightState) -> None:
         """Take over a state of the run."""
+        told = {}
         for name, report in state.robots.items():
             now, before = seconds(report.status.stamp), self.status.get(name)
+            # The same status again is no news: who told it may hang.
+            same = before is not None and before.time == now
+            told[name] = self.told[name] if same else time.time()
             if before is not None and report.status.state not in _GROUND:
                 self._flown[name] += max(0.0, now - before.time)
+        self.told = told
         self.status = {
             name: self._remembering(name, StatusOut.of(report.status, report.state))
             for name, report in state.robots.items()

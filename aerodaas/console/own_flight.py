@@ -111,6 +111,7 @@ class OwnFlight:
             submitted=self._began,
             started=self._began,
             status=self._meter.status,
+            told={} if self.over else self._meter.told,
             alerts=self._meter.alerts,
             analytics=self._meter.analytics,
             streams={} if self.over else drawn_streams(self._run.graph),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = ["FollowGains", "FollowLimits", "LostPolicy", "TargetChoice"]
@@ -88,6 +89,10 @@ class TargetChoice:
     detector's own threshold applies as well."""
     sure: float = 0.0
     """Least confidence of a box that starts a track; others only continue one."""
+    patience: float = math.inf
+    """Seconds in sight, with the drone high enough, after which a mean confidence of `sure` makes
+    the first target, too: from the side an arm hides most of a vest. Not once a target was given
+    up, for which another must not be taken."""
     looks: int = 2
     """Number of frames with a detection before the choice; for the first target, with the drone
     high enough."""

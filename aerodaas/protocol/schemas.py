@@ -42,6 +42,8 @@ __all__ = [
     "Scope",
     "SilencePolicy",
     "StreamKind",
+    "TenantChange",
+    "TenantOut",
     "TokenIn",
     "TokenOut",
     "UsageOut",
@@ -353,6 +355,9 @@ class MissionOut(AnswerModel):
     verdict: VerdictOut | None = None
     status: dict[str, StatusOut] = Field(default_factory=dict)
     """Newest status by robot, while it flies and afterwards."""
+    told: dict[str, float] = Field(default_factory=dict)
+    """Unix seconds when that status came, by robot, while it flies: once nothing comes any more,
+    what is told here is as old as that."""
     alerts: list[str] = Field(default_factory=list)
     """The newest alerts, oldest first."""
     streams: dict[str, StreamKind] = Field(default_factory=dict)
@@ -439,6 +444,30 @@ class AuditOut(AnswerModel):
     text: str = ""
 
 
+class TenantChange(RequestModel):
+    """What a tenant may use; what is not given stays, and null is no limit."""
+
+    weight: Positive = 1.0
+    """Share of an edge that is shared, relative to the other tenants'."""
+    flight_minutes: Annotated[Number, Field(ge=0)] | None = None
+    """Minutes in the air, of all its robots together, in a calendar month (UTC)."""
+    cloud_calls: Annotated[int, Field(ge=0)] | None = None
+    """Calls of cloud nodes and endpoints in a month."""
+    storage_bytes: Annotated[int, Field(ge=0)] | None = None
+    """Bytes of recordings kept."""
+    max_height: Positive | None = None
+    """Metres above home."""
+    max_speed: Positive | None = None
+    """m/s."""
+
+
+class TenantOut(TenantChange):
+    """A tenant, with what it may use."""
+
+    name: str
+    created: float
+
+
 class UsageOut(AnswerModel):
     """What one mission has used."""
 
@@ -454,3 +483,5 @@ class UsageOut(AnswerModel):
     """Processor's seconds of analyses, by compute resource."""
     cloud_calls: int = 0
     recorded_bytes: int = 0
+    kept: bool = True
+    """Whether the recording is here."""

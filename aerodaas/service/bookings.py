@@ -44,10 +44,14 @@ class Bookings:
         self._tell(changed)
         return self.lease(lease.id)
 
-    def require_quota(self, tenant: str, minutes: float) -> None:
-        """Raise RefusedError if a tenant may not have another `minutes`, times robots."""
+    def require_quota(self, tenant: str, minutes: float, *, cloud: bool = False) -> None:
+        """Raise RefusedError if a tenant may not have another `minutes`, times robots.
+
+        `cloud` is whether what flies may call it.
+        """
         now = time.time()
-        self._quotas.check(tenant, minutes, now, self._book.committed(tenant, now))
+        committed = self._book.committed(tenant, now)
+        self._quotas.check(tenant, minutes, now, committed, cloud=cloud)
 
     def for_mission(self, mission: Mission) -> Lease:
         """Ask for the drones of a mission that brought no lease; raises RefusedError."""

@@ -64,6 +64,15 @@ class Briefing:
         self.require_scopes(principal, document)
         return robots
 
+    def may_call_cloud(self, document: MissionDocument) -> bool:
+        """Whether an analysis may run elsewhere than on the edge; a scheduler may place any."""
+        known = self._settings.config.compute
+        if known == "auto" or document.analytics_scheduler is not None:
+            clouds = known == "auto" or any(one.kind != "edge" for one in known)
+            return clouds and bool(document.analyses)
+        kinds = {one.id: one.kind for one in known}
+        return any(kinds.get(one.compute or "", "edge") != "edge" for one in document.analyses)
+
     def require_scopes(self, principal: Principal, document: MissionDocument) -> None:
         """Raise RefusedError for a token not good for what a document senses and computes."""
         cameras = {
@@ -149,7 +158,7 @@ class Briefing:
         settings = self._settings
         if settings.edge_slots is None:
             return None
-        weight = settings.weights.get(tenant, 1.0)
+        weight = self._store.tenants.demand(tenant).weight
         return EdgeTurnsOrder(turns=settings.edge_turns, tenant=tenant, weight=weight)
 
 

@@ -51,7 +51,6 @@ __all__ = ["MissionDesk"]
 
 _OPEN = frozenset(phase for phase in MissionPhase if not phase.over)
 _TURN_SECONDS = 0.1
-_HEARD_SECONDS = 1.0
 _MOST_SHOWN = 100
 """Most missions of a list."""
 
@@ -83,7 +82,6 @@ class MissionDesk:
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._trouble = TroubleLog(logging.getLogger(__name__))
-        self._heard: dict[str, float] = {}
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
@@ -128,7 +126,8 @@ class MissionDesk:
             # It has used up its minutes of the quota already.
             self._bookings.require(principal, wanted.lease, robots)
         own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
-        self._bookings.require_quota(principal.tenant, own)
+        cloud = self._briefing.may_call_cloud(wanted.document)
+        self._bookings.require_quota(principal.tenant, own, cloud=cloud)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
@@ -311,16 +310,9 @@ class MissionDesk:
 
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
-        now = time.monotonic()
         one = self._missions.get(mission)
-        if one is None or one.phase is not MissionPhase.FLYING:
-            return
-        if now - self._heard.get(mission, 0.0) >= _HEARD_SECONDS:
-            self._heard[mission] = now
-            try:
-                one.follow().ask(do="heard")
-            except MissionError:
-                return
+        if one is not None and one.phase is MissionPhase.FLYING:
+            one.follow().hear()
 
     def items(
         self, mission: str, stream: str, form: PictureForm
@@ -343,8 +335,16 @@ class MissionDesk:
         one = self._seen(principal, mission)
         files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
         if not files[name].is_file() or (name == "recording" and not one.over):
-            raise RefusedError(404, f"{mission} has no {name} yet")
+            raise RefusedError(404, f"{mission} has no {name}")
         return files[name]
+
+    def delete_recording(self, principal: Principal, mission: str) -> None:
+        """Remove the recording of a mission that is over; raises RefusedError."""
+        self._require_own(principal, mission)
+        self.file(principal, mission, "recording").unlink(missing_ok=True)
+        # A flight whose process was killed has told of no usage.
+        if self._store.usage.get(mission) is not None:
+            self._store.usage.update(mission, lambda row: replace(row, kept=False))
 
     def _tell_flights(self, lease: Lease) -> None:
         """Bring home what flies under a lease that has ended; prolong what flies under a longer."""
@@ -378,7 +378,6 @@ class MissionDesk:
                     one.close()
                     del self._missions[one.row.id]
                     self._texts.pop(one.row.id, None)
-                    self._heard.pop(one.row.id, None)
             self._have_watched()
 
     def _have_watched(self) -> None:

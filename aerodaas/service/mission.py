@@ -170,7 +170,7 @@ class ActiveMission:
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
         document = self.document()
         folder.make(order, document.text())
-        models.lend(document, folder.models)
+        models.lend(self.row.tenant, document, folder.models)
 
     def end_flight(self) -> None:
         """End the process of an attached mission, which has no drone, and all it has started."""
@@ -224,8 +224,11 @@ class ActiveMission:
         return outcome
 
     def close(self) -> None:
-        """Leave the mission to itself: a flight goes on."""
+        """Leave the mission to itself: a flight goes on; one that is over needs no models more."""
         self.end_rehearsal()
+        if self.over:
+            for folder in (self.rehearsal, self.flight):
+                shutil.rmtree(folder.models, ignore_errors=True)
         if self.link is not None:
             self.link.close()
 

@@ -1,4 +1,8 @@
-"""Models that users have brought: files named by their SHA-256."""
+"""Models that users have brought: files named by their SHA-256, each tenant's apart.
+
+What nobody has used for long goes when its tenant has no room left: whoever needs it sends it anew,
+which applications do by themselves. One that flies has a link to it of its own.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,8 @@ import hashlib
 import os
 import re
 import shutil
+import threading
+import time
 from collections.abc import Iterator
 from http import HTTPStatus
 from pathlib import Path
@@ -24,6 +30,10 @@ LARGEST_MODEL = 64 << 20
 """Bytes."""
 _LEAST_FREE = 1 << 30
 """Bytes that stay free on the disk: flights under way are recorded there."""
+_LARGEST_SHELF = 2 << 30
+"""Bytes of one tenant's models."""
+_KEPT_SECONDS = 86400.0
+"""Seconds for which a model stays after its last use: a mission that waits may name it."""
 _HASH = re.compile(r"[0-9a-f]{64}")
 
 
@@ -43,37 +53,73 @@ class ModelShelf:
     def __init__(self, folder: Path) -> None:
         """Keep models in `folder`."""
         self._folder = folder
+        self._lock = threading.Lock()
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         self._shipped = {
             hashlib.sha256(one.read_bytes()).hexdigest() for one in DETECTOR.parent.glob("*.onnx")
         }
 
-    def has(self, sha256: str) -> bool:
-        """Whether a model is here, brought or shipped."""
-        return sha256 in self._shipped or self._path(sha256).is_file()
+    def has(self, tenant: str, sha256: str) -> bool:
+        """Whether a tenant has a model here, brought or shipped; one that is asked for is used."""
+        path = self._path(tenant, sha256)
+        if sha256 in self._shipped:
+            return True
+        try:
+            os.utime(path)
+        except FileNotFoundError:
+            return False
+        return True
 
-    def put(self, sha256: str, content: bytes) -> None:
-        """Keep a model; raises ConfigError if it is too large or not the one that it is called."""
+    def put(self, tenant: str, sha256: str, content: bytes) -> None:
+        """Keep a tenant's model, for which its longest unused ones go if need be.
+
+        Raises ConfigError if it is too large or not the one that it is called, RefusedError if
+        there is no room.
+        """
         if len(content) > LARGEST_MODEL:
             raise ConfigError(f"a model has at most {LARGEST_MODEL >> 20} MiB")
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ConfigError("the content has another SHA-256 than its name")
         require_room(self._folder)
-        write_private(self._path(sha256), content)
+        path = self._path(tenant, sha256)
+        with self._lock:
+            path.parent.mkdir(exist_ok=True, mode=0o700)
+            _make_room(path.parent, len(content), tenant)
+            write_private(path, content)
 
-    def lend(self, document: MissionDocument, folder: Path) -> None:
-        """Put the models of a document into `folder`; raises ConfigError for a missing one."""
+    def lend(self, tenant: str, document: MissionDocument, folder: Path) -> None:
+        """Put a tenant's models into `folder` as its document names them.
+
+        Raises ConfigError for a missing one.
+        """
         for sha256 in sorted(set(_named(document.model_dump()))):
-            if not self.has(sha256):
+            if not self.has(tenant, sha256):
                 raise ConfigError(f"the model {sha256[:16]}… has not been sent: PUT /v1/models/…")
             if sha256 not in self._shipped:
                 with contextlib.suppress(FileExistsError):
-                    os.link(self._path(sha256), folder / f"{sha256}.onnx")
+                    os.link(self._path(tenant, sha256), folder / f"{sha256}.onnx")
 
-    def _path(self, sha256: str) -> Path:
+    def _path(self, tenant: str, sha256: str) -> Path:
         if not _HASH.fullmatch(sha256):
             raise ConfigError("a model is called by the SHA-256 of its file, 64 hexadecimal digits")
-        return self._folder / f"{sha256}.onnx"
+        return self._folder / tenant / f"{sha256}.onnx"
+
+
+def _make_room(folder: Path, size: int, tenant: str) -> None:
+    """Remove models from a tenant's `folder` until `size` bytes more fit."""
+    known = sorted((one.stat().st_mtime, one.stat().st_size, one) for one in folder.iterdir())
+    left = _LARGEST_SHELF - size - sum(bytes_ for _, bytes_, _ in known)
+    for used, bytes_, path in known:
+        if left >= 0 or time.time() - used < _KEPT_SECONDS:
+            break
+        path.unlink()
+        left += bytes_
+    if left < 0:
+        raise RefusedError(
+            int(HTTPStatus.INSUFFICIENT_STORAGE),
+            f"the models of {tenant} fill the {_LARGEST_SHELF >> 30} GiB that it has: the next "
+            "one has room once one has been without use for a day",
+        )
 
 
 def _named(content: Any) -> Iterator[str]:  # noqa: ANN401 - a document's values

@@ -36,6 +36,7 @@ def shown(one: ActiveMission) -> MissionOut:
         ended=row.ended,
         verdict=verdict,
         status=status,
+        told=news.told if news is not None and not one.over else {},
         alerts=alerts,
         streams=news.streams if news is not None and not one.over else {},
         analytics=news.analytics if news is not None and not one.over else None,

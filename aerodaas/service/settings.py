@@ -42,8 +42,6 @@ class ServiceSettings:
     edge_slots: int | None = None
     """Analyses that flights with an analytics scheduler run at once on this machine's edge, all
     together, by their tenants' weights; None: each flight runs its own as it likes."""
-    weights: Mapping[str, float] = field(default_factory=dict)
-    """Weight of a tenant on the edge; 1 for all others."""
     actuators: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Actuators that a tenant may move, as `robot/actuator`; none for all others."""
     most_flights: int = 16

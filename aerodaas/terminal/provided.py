@@ -31,6 +31,9 @@ _WORDS = {
     MissionPhase.AWAITING_APPROVAL: "waits for an operator's approval",
     MissionPhase.QUEUED: "waits for its drones",
 }
+_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
+_OLD_SECONDS = 2.5
+"""Seconds without a new status after which what is shown of a drone in the air is called old."""
 
 
 def phase_text(mission: MissionOut) -> str:
@@ -49,6 +52,8 @@ class ProvidedView:
         self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
         self._began = time.monotonic()
         self._told: Counter[str] = Counter()
+        self._news: dict[str, tuple[float, float]] = {}
+        """Mission time of each robot's newest status, and the monotonic moment when it came."""
         self._lock = threading.Lock()
         self._notes: list[str] = []
 
@@ -95,16 +100,32 @@ class ProvidedView:
             self._errors.print(text, markup=False)
 
     def _robot(self, name: str, status: StatusOut) -> RobotSnapshot:
-        return RobotSnapshot(name, self._mission(status), _vehicle(status))
+        return RobotSnapshot(name, self._mission(name, status), _vehicle(status))
 
-    def _mission(self, status: StatusOut) -> MissionStatus:
+    def _reason(self, name: str, status: StatusOut, state: MissionState) -> str:
+        """Why it is in its state; or since when nothing is known of it.
+
+        A provider repeats what it knows of a flight whose process hangs, and of one that is out of
+        reach the newest known state is shown.
+        """
+        now = time.monotonic()
+        last = self._news.get(name)
+        if last is None or last[0] != status.time:
+            last = self._news[name] = status.time, now
+        silent = now - last[1]
+        if silent <= _OLD_SECONDS or state in _GROUND:
+            return status.reason
+        return f"no word from it for {silent:.0f} s: this is old"
+
+    def _mission(self, name: str, status: StatusOut) -> MissionStatus:
         states = {state.value: state for state in MissionState}
+        state = states.get(status.state, MissionState.IDLE)
         known = status.outlook
         ahead = [self._places[one] for one in status.pending if one in self._places]
         return MissionStatus(
             stamp=round(status.time * NANOSECONDS),
-            state=states.get(status.state, MissionState.IDLE),
-            reason=status.reason,
+            state=state,
+            reason=self._reason(name, status, state),
             target=self._places.get(status.target or ""),
             pending=tuple(ahead),
             visited=tuple(status.visited),

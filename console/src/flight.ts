@@ -91,8 +91,6 @@ export class Flight {
   /** Where what was seen stands. */
   readonly marks = new GroundMarks();
   private told: string[] = [];
-  /** Mission seconds of each robot's newest status, and when that came. */
-  private readonly news = new Map<string, { time: number; came: number }>();
   private orderCount = 0;
 
   constructor(
@@ -249,15 +247,10 @@ export class Flight {
   /** When every drone in the air had told something: a server repeats what it knows of a flight
    *  whose process hangs. */
   private newest(mission: MissionOut): number {
-    const now = Date.now();
-    let heard = now;
-    for (const [robot, { time, state }] of Object.entries(mission.status)) {
-      const last = this.news.get(robot);
-      const newest = last?.time === time ? last : { time, came: now };
-      this.news.set(robot, newest);
-      if (!GROUNDED.has(state)) heard = Math.min(heard, newest.came);
-    }
-    return heard;
+    const ages = Object.entries(mission.told)
+      .filter(([robot]) => !GROUNDED.has(mission.status[robot]?.state ?? "idle"))
+      .map(([, moment]) => this.clock.age(moment * 1e9) ?? 0);
+    return Date.now() - Math.max(0, ...ages);
   }
 
   private follow(robot: string, status: StatusOut): void {

@@ -6,6 +6,8 @@ const COLOURS = ["#ffb000", "#00c2a8", "#ff5d8f", "#6aa8ff", "#c6e03a", "#d58bff
 const SHADOW = "#10151c";
 /** Least confidence of a keypoint that is drawn, as in recordings. */
 const VISIBLE = 0.3;
+/** Pixels between the edges of two boxes that are one. */
+const SAME = 1;
 /** Points of a body, in COCO's order. */
 const BODY = 17;
 /** Pairs of a body's points that it connects: limbs, then trunk and neck. */
@@ -36,13 +38,27 @@ export function paint(canvas: HTMLCanvasElement, picture: Picture): Painted {
     pen.drawImage(picture.depth.bitmap, 0, 0, width, height);
     pen.imageSmoothingEnabled = true;
   }
-  const all = [...picture.found.values()].flat();
+  const all = once([...picture.found.values()].flat());
   // Labels lie over all bodies.
   for (const one of all) painted.points += drawBody(pen, one, width);
   for (const one of all) drawBox(pen, one, width);
   if (picture.target?.box) drawTarget(pen, picture.target, picture.target.box, width, height);
   painted.boxes = all.length;
   return painted;
+}
+
+/** Without the nameless boxes that a tracker has, too. */
+function once(found: Detection[]): Detection[] {
+  const tracked = found.filter((one) => one.track_id !== null);
+  return found.filter(
+    (one) =>
+      one.track_id !== null || one.points.length > 0 || !tracked.some((other) => same(one, other)),
+  );
+}
+
+function same(one: Detection, other: Detection): boolean {
+  const close = one.box.every((edge, side) => Math.abs(edge - (other.box[side] ?? 0)) < SAME);
+  return close && one.label === other.label;
 }
 
 const MARKS: Record<Target["state"], string> = {

@@ -148,6 +148,9 @@ export interface MissionOut {
   };
   submitted: number;
   tenant: string;
+  told: {
+    [k: string]: number;
+  };
   verdict: VerdictOut | null;
 }
 /**

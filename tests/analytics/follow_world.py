@@ -21,6 +21,12 @@ Path = Callable[[float], tuple[float, float]]
 """East and north of the target at a time in seconds."""
 
 
+def frame(step: int, *items: Detection, odometry: Odometry | None = None) -> Detections:
+    """Frame `step` of 10 a second."""
+    header = Header(step, step * NANOSECONDS // 10, "drone/cam")
+    return Detections(header, items, 1280, 720, TELLO, odometry)
+
+
 @dataclass
 class Snapshot:
     """What an analysis may ask of its actor."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from follow_world import TELLO, Path, Snapshot, World, vest_world
+from follow_world import Path, Snapshot, World, frame, vest_world
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
@@ -23,8 +23,7 @@ from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.following.relative_target import sight
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.data import Alert, Detection, Detections, Frame, Odometry
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.target import FollowedTarget, TargetState
@@ -154,12 +153,6 @@ def test_a_target_gone_for_good_is_given_up_without_a_runaway() -> None:
 def person(left: float, right: float, score: float = 0.9) -> Detection:
     """A person whose whole body is in the picture."""
     return Detection((left, 200.0, right, 600.0), "person", score)
-
-
-def frame(step: int, *items: Detection, odometry: Odometry | None = None) -> Detections:
-    """Frame `step` of 10 a second."""
-    header = Header(step, step * NANOSECONDS // 10, "drone/cam")
-    return Detections(header, items, 1280, 720, TELLO, odometry)
 
 
 def test_it_stays_with_its_target_when_a_nearer_one_comes() -> None:
@@ -469,53 +462,6 @@ def test_somebody_who_cannot_be_told_from_the_target_is_not_flown_into() -> None
         commands.append(result.commands[0].forward if result else 0.0)
     assert max(commands[20:25]) > 0.5
     assert max(commands[32:]) <= 0.0
-
-
-def test_a_wall_that_looks_like_a_vest_for_a_moment_is_not_followed() -> None:
-    """Unsure, or cut by the picture's edges: what ends a search must be seen well."""
-    wall = Detection((0.0, 40.0, 400.0, 720.0), "vest", 0.56)
-    unsure = Detection((500.0, 200.0, 600.0, 340.0), "vest", 0.38)
-    for box in (wall, unsure):
-        follow = VipFollowAnalytics()
-        for step in range(10):
-            item = frame(step, box)
-            assert follow.process(item, Snapshot(item.header.stamp, None, [])) is None
-
-
-@pytest.mark.parametrize(("passer_score", "followed"), [(0.45, "vest"), (0.7, "passer")])
-def test_a_doubtful_target_gives_way_to_a_surer_one(passer_score: float, followed: str) -> None:
-    """Only one that looks doubtful itself does, and only to one that is not just as doubtful."""
-    follow = VipFollowAnalytics()
-    passer, vest = (180.0, 200.0, 220.0, 270.0), (560.0, 200.0, 720.0, 430.0)
-    command = None
-    for step in range(60):
-        boxes = [Detection(passer, "vest", 0.6 if step < 10 else passer_score)]
-        if step > 20:
-            boxes.append(Detection(vest, "vest", 0.8))
-        item = frame(step, *boxes)
-        command = follow.process(item, Snapshot(item.header.stamp, None, []))
-    assert command is not None
-    left = command.commands[0].yaw_rate
-    assert abs(left) < 0.05 if followed == "vest" else left > 0.2
-
-
-def test_nobody_is_chosen_before_the_drone_is_up() -> None:
-    """From the ground a passer's shirt is in the picture, and the vest near by is above it."""
-    follow = VipFollowAnalytics()
-    passer, vest = (180.0, 200.0, 220.0, 270.0), (760.0, 200.0, 920.0, 430.0)
-    commands = []
-    for step in range(60):
-        height = min(1.5, max(0.0, 0.05 * (step - 20)))
-        boxes = [Detection(passer, "vest", 0.65)]
-        if height > 0.7:
-            boxes.append(Detection(vest, "vest", 0.9))
-        where = Odometry(np.array([0.0, 0.0, height]), np.zeros(3), 0.0)
-        item = replace(frame(step, *boxes), odometry=where)
-        commands.append(follow.process(item, Snapshot(item.header.stamp, where, [])))
-    turns = [one.commands[0].yaw_rate for one in commands if one is not None]
-    assert commands[:40] == [None] * 40
-    assert len(turns) > 10
-    assert max(turns) < 0.0, "to the right, where the vest is"
 
 
 @pytest.mark.parametrize("unseen", [1.6, 2.6])

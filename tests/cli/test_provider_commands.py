@@ -164,6 +164,22 @@ def test_a_recording_is_fetched_and_nothing_overwritten(
     assert (ended.code, "no recording yet" in ended.said) == (2, True)
 
 
+def test_a_recording_is_deleted_once_it_is_here(
+    aerodaas: Command, stub: Stub, tmp_path: Path
+) -> None:
+    """And not where it could not be fetched or written."""
+    (tmp_path / "there.mcap").write_bytes(b"another")
+    assert aerodaas("fetch", MISSION, "-o", "there.mcap", "--delete").code == 2
+    assert aerodaas("fetch", MISSION, "-o", "there.mcap/in.mcap", "--delete").code == 2
+    stub.refusals["/v1/missions"] = (404, {"text": "it has no recording yet"})
+    assert aerodaas("fetch", MISSION, "--delete").code == 2
+    stub.refusals.clear()
+    assert stub.sent("DELETE", "/recording") == []
+    assert aerodaas("fetch", MISSION, "--delete").code == 0
+    assert (tmp_path / f"{MISSION}.mcap").read_bytes() == b"recorded"
+    assert stub.sent("DELETE", "/recording") == [b""]
+
+
 def test_a_login_is_tried_and_stored(
     aerodaas: Command, stub: Stub, monkeypatch: pytest.MonkeyPatch
 ) -> None:

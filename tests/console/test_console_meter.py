@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
+import pytest
+
 from aerodaas.console.meter import FlightMeter
 from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.status import MissionState, MissionStatus
@@ -15,10 +17,10 @@ if TYPE_CHECKING:
     from aerodaas.actors.run.flight_state import FlightState
 
 
-def flying_to(target: int, *pending: int) -> FlightState:
+def flying_to(target: int, *pending: int, stamp: int = 10**9) -> FlightState:
     """A state of one drone on its way to the waypoint `target`, as numbers name them."""
     ahead = [Waypoint(f"wp{one}", one, 2, 3, waypoint_type="local") for one in (target, *pending)]
-    status = MissionStatus(10**9, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
+    status = MissionStatus(stamp, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
     robots = {"drone": SimpleNamespace(status=status, state=None, health=None)}
     return cast("FlightState", SimpleNamespace(robots=robots, alerts=[], reports={}))
 
@@ -41,6 +43,19 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
     meter.note(flying_to(*range(1000, 1400)))
     places = meter.status["drone"].places
     assert set(places) == {f"wp{number}" for number in range(1000, 1400)}
+
+
+def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who told it may hang."""
+    now = 100.0
+    monkeypatch.setattr("aerodaas.console.meter.time.time", lambda: now)
+    meter, state = FlightMeter(), flying_to(1)
+    for _ in range(2):
+        meter.note(state)
+        assert meter.told == {"drone": 100.0}
+        now += 5.0
+    meter.note(flying_to(1, stamp=2 * 10**9))
+    assert meter.told == {"drone": 110.0}
 
 
 def test_decisions_of_the_analytics_scheduler_are_told_once_there_are_some() -> None:

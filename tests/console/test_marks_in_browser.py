@@ -76,8 +76,9 @@ def test_a_person_is_marked_where_they_stand(browser: Browser, tmp_path: Path) -
     with Watched(write_flight(tmp_path), tmp_path) as flight:
         page = browser.open(flight.viewer)
         page.until(f"{_MARKS}.some(one => one.dataset.seen.startsWith('person #'))", 120)
-        # The tracker's mark takes the place of its detector's.
+        # The tracker's mark takes the place of its detector's, as its box does.
         page.until(f"{_MARKS}.length === 1")
+        page.until("document.querySelector('[data-testid=video]').dataset.boxes === '1'")
         require_there(drawn(page))
         assert "person #" in page.run("document.querySelector('.legend .sighted').textContent")
         assert page.complaints() == []

@@ -80,6 +80,9 @@ class Link:
         self.asked.append(request)
         return AnswerOut(accepted=True)
 
+    def hear(self) -> None:
+        """Nothing."""
+
     def close(self) -> None:
         """Nothing."""
 
@@ -93,13 +96,15 @@ class Provider:
         monkeypatch: pytest.MonkeyPatch,
         *,
         drone: dict[str, Any] | None = None,
+        compute: list[dict[str, Any]] | None = None,
         **settings: Any,  # noqa: ANN401
     ) -> None:
         path = folder / "fleet.json"
         robots = [one | (drone or {}) for one in (robot("one"), robot("two", 10))]
         for one in robots:
             one["sensors"] += [{"id": name, "type": "camera"} for name in ("cam", "belly")]
-        path.write_text(json.dumps(fleet(*robots)), encoding="utf-8")
+        content = fleet(*robots) | ({} if compute is None else {"compute": compute})
+        path.write_text(json.dumps(content), encoding="utf-8")
         self.started: list[Any] = []
         monkeypatch.setattr(missions, "start_process", self._start)
         config = EnvironmentConfig.load(path)

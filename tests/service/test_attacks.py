@@ -165,6 +165,8 @@ def test_another_tenants_lease_flies_nobody_elses_mission(
         ("viewer", "POST", "/v1/missions", {"document": document("two", (12, 0))}),
         ("pilot", "POST", "/v1/missions/MISSION/approve", None),
         ("pilot", "PATCH", "/v1/robots/one", {"enabled": False}),
+        ("operator", "PATCH", "/v1/tenants/farm", {"flight_minutes": None}),
+        ("viewer", "DELETE", "/v1/missions/MISSION/recording", None),
         ("pilot", "POST", "/v1/accounts", {"name": "mine", "tenant": "farm", "role": "admin"}),
         ("operator", "POST", "/v1/tokens", {"account": "admin"}),
         ("operator", "GET", "/v1/audit", None),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from required import needs_peer
 from served import Served, document, fleet, process_of, robot
@@ -19,7 +21,6 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
         wanted = {"document": document("one", (20.0, 0.0), (20.0, 20.0), (0.0, 20.0))}
         id_ = str(provider.ask("POST", "/v1/missions", wanted)["id"])
         provider.until(lambda: "one" in provider.mission(id_)["status"])
-        # Of one who only looks: the mission's own user is asked after by the flight.
         viewer = provider.user("vera", provider.ask("GET", "/v1/me")["tenant"], "viewer")
         page = browser.open(f"{provider.url}/#token={viewer}")
         page.until("document.querySelector('[data-testid=state]')?.innerText === 'enroute'", 60)
@@ -28,6 +29,11 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
         flight.suspend()
         try:
             page.until(f"{_BANNER}?.innerText.includes('No word from the flight')")
+            told = provider.mission(id_)["told"]["one"]
+            time.sleep(1.0)
+            # Who asks once sees how old it is.
+            assert provider.mission(id_)["told"] == {"one": told}
+            assert time.time() - told > 2.5
             # The service is there: only the flight is not.
             assert page.run("document.querySelector('[data-testid=connection]').innerText") == (
                 "no word"

@@ -72,6 +72,10 @@ class Flying:
         """Nothing to tell."""
         return {}, []
 
+    def told(self) -> dict[str, float]:
+        """Never."""
+        return {}
+
     def preflight(self) -> dict[str, Any]:
         """No list."""
         return {}

@@ -17,6 +17,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from aerodaas.environment.provider.logins import client_for
+
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 FAR = ((25.0, 0.0), (25.0, 25.0), (0.0, 25.0))
@@ -285,6 +287,7 @@ def test_the_recording_comes_back(provider: Served, tmp_path: Path) -> None:
     """Once the flight is over, and to its own tenant."""
     id_ = submitted(provider, "one", (2.0, 0.0))
     assert provider.send("GET", f"/v1/missions/{id_}/recording")[0] == 404
+    assert provider.send("DELETE", f"/v1/missions/{id_}/recording")[0] == 404
     provider.until_phase(id_)
     status, content = provider.send("GET", f"/v1/missions/{id_}/recording")
     assert status == 200
@@ -295,3 +298,13 @@ def test_the_recording_comes_back(provider: Served, tmp_path: Path) -> None:
     assert read_report(path).summary.robots["one"].waypoints_visited == 1
     other = provider.user("other", "elsewhere")
     assert provider.send("GET", f"/v1/missions/{id_}/recording", token=other)[0] == 404
+    assert provider.send("DELETE", f"/v1/missions/{id_}/recording", token=other)[0] == 404
+    client = client_for(provider.url, provider.token)
+    kept = {one.mission: one.kept for one in client.usage()}
+    assert kept[id_]
+    assert client.mission(id_).recording
+    client.delete_recording(id_)
+    assert not client.mission(id_).recording
+    assert {one.mission: one.kept for one in client.usage()} == kept | {id_: False}
+    assert provider.send("GET", f"/v1/missions/{id_}/recording")[0] == 404
+    assert provider.send("DELETE", f"/v1/missions/{id_}/recording")[0] == 404

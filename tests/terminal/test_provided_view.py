@@ -31,6 +31,27 @@ def test_what_is_unknown_is_shown_as_such(capsys: pytest.CaptureFixture[str]) ->
     assert "other enroute" in shown
 
 
+def test_what_was_not_told_anew_is_called_old(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A provider repeats what it knows of a flight that hangs; who has landed tells no more."""
+    now = 100.0
+    monkeypatch.setattr("aerodaas.terminal.provided.time.monotonic", lambda: now)
+    flying, landed = status(), status(state="landed")
+    with ProvidedView(shown=True) as view:
+        view.update(mission(status={"one": flying, "two": landed}))
+        now += 40.0
+        view.update(mission(status={"one": flying, "two": landed}))
+        old = capsys.readouterr().out.splitlines()
+        now += 40.0
+        view.update(mission(status={"one": status(time=80.0), "two": landed}))
+    new = capsys.readouterr().out.splitlines()
+    (told,) = [line for line in old if "no word" in line]
+    assert "one enroute: no word from it for 40 s: this is old" in told
+    assert not any("no word" in line for line in new)
+    assert any("one enroute" in line for line in new)
+
+
 def test_without_a_view_new_alerts_alone_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     """Each once, though the newest ones come with every state."""
     with ProvidedView(shown=False) as view:

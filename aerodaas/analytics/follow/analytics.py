@@ -23,6 +23,7 @@ from aerodaas.following.follow_controller import LYING, FollowController, Follow
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.following.relative_target import RelativeTarget, TargetSize, ends_in_picture, sight
 from aerodaas.following.target_motion import TargetMotion, place_of
+from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, Detection, Detections
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.target import FollowedTarget, TargetState
@@ -150,6 +151,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._alarm = Debounce(1, 1)
         self._aloft = 0
         """Number of frames since the drone was high enough to choose a target."""
+        self._up = 0
+        """Mission time when it was, nanoseconds."""
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
@@ -161,6 +164,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self._has_left():
             self._let_go(item, context)
         self._aloft = self._aloft + 1 if self._is_aloft(item) else 0
+        if self._aloft <= 1:
+            self._up = item.header.stamp
         phase = self.controller.phase
         tracked = self.tracker.update(self._possible(item))
         detection = self._identified(self._target_in(tracked), tracked, context)
@@ -216,11 +221,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         lost = mine is None and self._is_lost()
         if lost:
             trusted = [item for item in trusted if self._may_be_mine(item)]
+        stamp = tracked.header.stamp
         least = self.choice.score if lost or self.target is None else self._score_to_displace(mine)
         chosen = [
             item
             for item in trusted
-            if self._score(item) >= least
+            if self._is_sure(item, least, stamp)
             and self._is_inside(item, tracked)
             and (lost or self._shows_enough(item, tracked))
         ]
@@ -305,9 +311,15 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             return math.inf
         return max(self.choice.score, held.score + _SURER)
 
-    def _score(self, item: Detection) -> float:
+    def _is_sure(self, item: Detection, least: float, stamp: int) -> bool:
+        """Whether a box' track scores `least` at the frame's stamp, or as a first target may."""
         track = self.tracker.find(item.track_id)
-        return 0.0 if track is None else track.score
+        if track is None:
+            return False
+        first = self.target is None and not self._given_up
+        if first and seconds(stamp - max(track.born, self._up)) >= self.choice.patience:
+            least = min(least, self.choice.sure)
+        return track.score >= least
 
     def _has_left(self) -> bool:
         place = self.controller.motion.place

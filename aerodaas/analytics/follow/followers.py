@@ -148,7 +148,7 @@ class CarFollowAnalytics(FollowAnalytics):
         self.size = TargetSize(target_height, target_width, widest=target_length)
 
 
-_VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, looks=5, whole=True)
+_VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, patience=2.0, looks=5, whole=True)
 """Strict, because a sunlit wall close to the camera may briefly resemble a vest, which must not end
 a search."""
 _CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)

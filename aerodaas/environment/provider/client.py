@@ -35,6 +35,8 @@ from aerodaas.protocol.schemas import (
     NavigationIn,
     Role,
     Scope,
+    TenantChange,
+    TenantOut,
     TokenIn,
     TokenOut,
     UsageOut,
@@ -220,6 +222,10 @@ class ProviderClient:
         """
         self._exchange.download(f"/v1/missions/{_part(mission)}/recording", target, progress)
 
+    def delete_recording(self, mission: str) -> None:
+        """Remove the recording of a mission that is over from the provider."""
+        self._exchange.send("DELETE", f"/v1/missions/{_part(mission)}/recording")
+
     def rehearsal_picture(self, mission: str, target: Path) -> None:
         """Fetch the picture of a rehearsed flight, a PNG; raises OSError as `recording`."""
         path = f"/v1/missions/{_part(mission)}/rehearsal.png"
@@ -261,6 +267,15 @@ class ProviderClient:
         """Change an account, as an administrator; None keeps what is."""
         content = {"role": role, "scopes": scopes, "disabled": disabled}
         return self._ask(AccountOut, "PATCH", f"/v1/accounts/{_part(name)}", content)
+
+    def tenants(self) -> list[TenantOut]:
+        """One's own tenant with what it may use, or all as an administrator."""
+        return self._ask(list[TenantOut], "GET", "/v1/tenants")
+
+    def change_tenant(self, name: str, change: TenantChange) -> TenantOut:
+        """Change what a tenant may use, as an administrator; what is not given stays."""
+        content = change.model_dump(mode="json", exclude_unset=True)
+        return self._ask(TenantOut, "PATCH", f"/v1/tenants/{_part(name)}", content)
 
     def tokens(self) -> list[TokenOut]:
         """One's own tokens, or all as an administrator; without their secrets."""

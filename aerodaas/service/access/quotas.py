@@ -20,7 +20,6 @@ class QuotasLeft:
     """What a tenant may still use in a month; infinity where it has no quota."""
 
     flight_minutes: float
-    tasks: float
     cloud_calls: float
     storage_bytes: float
 
@@ -48,19 +47,26 @@ class Quotas:
             StoreError: If the database does not answer.
         """
         quotas = self._store.tenants.get(tenant) or Tenant(tenant)
-        flown, tasks, calls = self._store.usage.total(tenant, _month(now))
+        flown, calls = self._store.usage.total(tenant, _month(now))
         return QuotasLeft(
             flight_minutes=_left(quotas.flight_minutes, flown / _MINUTE + committed),
-            tasks=_left(quotas.tasks, tasks),
             cloud_calls=_left(quotas.cloud_calls, calls),
             storage_bytes=_left(quotas.storage_bytes, self._store.usage.stored_bytes(tenant)),
         )
 
-    def check(self, tenant: str, minutes: float, now: float, committed: float = 0.0) -> QuotasLeft:
+    def check(
+        self,
+        tenant: str,
+        minutes: float,
+        now: float,
+        committed: float = 0.0,
+        *,
+        cloud: bool = False,
+    ) -> QuotasLeft:
         """Check that a tenant may have another `minutes`, times robots, of flight.
 
-        Tasks and cloud calls that are used up refuse nothing: a mission may need none. They bound
-        what the mission gets.
+        Calls of the `cloud` that are used up refuse only a mission that may need it; one that has
+        begun goes on.
 
         Returns:
             What is left, without these minutes.
@@ -78,7 +84,15 @@ class Quotas:
             )
         if left.storage_bytes <= 0:
             raise RefusedError(
-                403, f"the recordings of {tenant} fill its storage: fetch and delete some"
+                403,
+                f"the recordings of {tenant} fill its storage: fetch some, and "
+                "delete them here (`aerodaas fetch MISSION --delete`)",
+            )
+        if cloud and left.cloud_calls <= 0:
+            raise RefusedError(
+                403,
+                f"the cloud calls of {tenant} are used up for this month: place all analyses at "
+                "the edge",
             )
         return left
 

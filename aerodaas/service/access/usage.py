@@ -22,9 +22,9 @@ _COLUMNS = (
     "distance",
     "battery_used",
     "compute_seconds",
-    "tasks",
     "cloud_calls",
     "recorded_bytes",
+    "kept",
 )
 
 
@@ -41,6 +41,7 @@ def usage_out(usage: Usage) -> UsageOut:
         compute_seconds=dict(usage.compute_seconds),
         cloud_calls=usage.cloud_calls,
         recorded_bytes=usage.recorded_bytes,
+        kept=usage.kept,
     )
 
 

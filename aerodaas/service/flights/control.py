@@ -81,6 +81,10 @@ class Flown(Protocol):
         """Newest status by robot, and the newest alerts."""
         ...
 
+    def told(self) -> dict[str, float]:
+        """Unix seconds when that status came, by robot."""
+        ...
+
     def preflight(self) -> dict[str, PreflightOut]:
         """The list before take-off by robot."""
         ...
@@ -204,6 +208,7 @@ class ControlServer:
             sums = self._flown.analytics()
             message = {
                 "robots": robots,
+                "told": self._flown.told(),
                 "alerts": alerts,
                 "analytics": None if sums is None else sums.model_dump(),
                 "streams": streams,

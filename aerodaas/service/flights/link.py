@@ -27,6 +27,8 @@ _CONNECT_SECONDS = 2.0
 _ANSWER_SECONDS = 10.0
 _SILENT_SECONDS = 15.0
 _AGAIN_SECONDS = 0.2
+_HEARD_SECONDS = 1.0
+"""Least seconds between two words to a flight that its user is there."""
 _MOST_ASKED = 8
 """Requests of a mission's users at once, each of which has a thread that others' may need."""
 
@@ -38,6 +40,8 @@ class FlightNews:
     number: int = 0
     """Counts the news."""
     status: dict[str, StatusOut] = field(default_factory=dict)
+    told: dict[str, float] = field(default_factory=dict)
+    """Unix seconds when that status came, by robot."""
     alerts: list[str] = field(default_factory=list)
     analytics: AnalyticsOut | None = None
     streams: dict[str, StreamKind] = field(default_factory=dict)
@@ -66,16 +70,20 @@ class FlightLink:
         """Follow the flight in `folder`; `told` is called after each news, in another thread."""
         self._folder = folder
         self._told = told
-        self._users, self._own = _Lane(), _Lane()
+        self._users, self._own, self._presence = _Lane(), _Lane(), _Lane()
+        self._heard = threading.Event()
+        """Set when the flight is to be told that its user is there."""
         self._places = threading.BoundedSemaphore(_MOST_ASKED)
         self._closed = threading.Event()
         self.news = FlightNews()
         threading.Thread(target=self._follow, name="flight", daemon=True).start()
+        threading.Thread(target=self._tell_heard, name="presence", daemon=True).start()
 
     def close(self) -> None:
         """Follow no more; the flight goes on."""
         self._closed.set()
-        for lane in (self._users, self._own):
+        self._heard.set()
+        for lane in (self._users, self._own, self._presence):
             with lane.lock:
                 lane.drop()
 
@@ -98,6 +106,17 @@ class FlightLink:
             return self._asked(self._users, request)
         finally:
             self._places.release()
+
+    def hear(self) -> None:
+        """Have the flight told that its user is there; nobody waits for that, as it may hang."""
+        self._heard.set()
+
+    def _tell_heard(self) -> None:
+        while self._heard.wait() and not self._closed.is_set():
+            self._heard.clear()
+            with contextlib.suppress(MissionError):
+                self._asked(self._presence, {"do": "heard"})
+            self._closed.wait(_HEARD_SECONDS)
 
     def _asked(self, lane: _Lane, request: dict[str, Any]) -> AnswerOut:
         with lane.lock:
@@ -173,6 +192,7 @@ class FlightLink:
         self.news = FlightNews(
             self.news.number + 1,
             robots,
+            {name: float(moment) for name, moment in message.get("told", {}).items()},
             message["alerts"],
             None if sums is None else AnalyticsOut(**sums),
             streams,

@@ -210,6 +210,10 @@ class Flying:
         """Newest status by robot, and the newest alerts."""
         return self._meter.status, self._meter.alerts
 
+    def told(self) -> dict[str, float]:
+        """Unix seconds when that status came, by robot."""
+        return self._meter.told
+
     def preflight(self) -> dict[str, PreflightOut]:
         """The list before take-off by robot."""
         return self._meter.preflight

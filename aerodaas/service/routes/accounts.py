@@ -1,7 +1,8 @@
-"""Accounts, tokens, the audit log and the accounts of use."""
+"""Accounts, tenants, tokens, the audit log and the accounts of use."""
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -13,6 +14,8 @@ from aerodaas.protocol.schemas import (
     AuditOut,
     Role,
     Scope,
+    TenantChange,
+    TenantOut,
     TokenIn,
     TokenOut,
     UsageOut,
@@ -20,7 +23,7 @@ from aerodaas.protocol.schemas import (
 from aerodaas.service.access import Accounts, Audit, usage_csv
 from aerodaas.service.access.usage import usage_out
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.store import Store
+from aerodaas.service.store import Store, Tenant
 
 __all__ = ["AccountRoutes"]
 
@@ -38,7 +41,7 @@ class AccountChange(BaseModel):
 
 
 class AccountRoutes:
-    """Routes `/v1/accounts`, `/v1/tokens`, `/v1/audit` and `/v1/usage`."""
+    """Routes `/v1/accounts`, `/v1/tenants`, `/v1/tokens`, `/v1/audit` and `/v1/usage`."""
 
     def __init__(
         self, accounts: Accounts, store: Store, admission: Admission, audit: Audit
@@ -55,6 +58,8 @@ class AccountRoutes:
         router.add_api_route("/accounts", self.accounts)
         router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
         router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])
+        router.add_api_route("/tenants", self.tenants)
+        router.add_api_route("/tenants/{name}", self.change_tenant, methods=["PATCH"])
         router.add_api_route("/tokens", self.tokens)
         router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
         router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
@@ -84,6 +89,22 @@ class AccountRoutes:
         text = body.model_dump_json(exclude_none=True)
         self._audit.write(principal, "account.change", name, text, accepted=True)
         return found
+
+    def tenants(self, request: Request) -> list[TenantOut]:
+        """One's own tenant with what it may use; all of them for an administrator."""
+        principal = self._admission.require(request, Role.VIEWER)
+        if principal.role.reaches(Role.ADMIN):
+            return [_tenant_out(one) for one in self._store.tenants.all()]
+        return [_tenant_out(self._store.tenants.demand(principal.tenant))]
+
+    def change_tenant(self, name: str, body: TenantChange, request: Request) -> TenantOut:
+        """Change what a tenant may use: of missions that begin from now on."""
+        principal = self._admission.require(request, Role.ADMIN)
+        changes = body.model_dump(exclude_unset=True)
+        found = self._store.tenants.update(name, lambda one: replace(one, **changes))
+        text = body.model_dump_json(exclude_unset=True)
+        self._audit.write(principal, "tenant.change", name, text, accepted=True)
+        return _tenant_out(found)
 
     def tokens(self, request: Request) -> list[TokenOut]:
         """One's own tokens; all of them for an administrator. Secrets are not among it."""
@@ -125,3 +146,7 @@ class AccountRoutes:
         if form == "csv":
             return Response(usage_csv(rows), media_type="text/csv")
         return [usage_out(row) for row in rows]
+
+
+def _tenant_out(tenant: Tenant) -> TenantOut:
+    return TenantOut(**asdict(tenant))

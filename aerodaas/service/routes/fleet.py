@@ -82,9 +82,9 @@ class FleetRoutes:
         return Response(status_code=204)
 
     def has_model(self, sha256: str, request: Request) -> Response:
-        """Whether a model is here."""
-        self._admission.require(request, Role.VIEWER)
-        return Response(status_code=204 if self._models.has(sha256) else 404)
+        """Whether the tenant has a model here."""
+        tenant = self._admission.require(request, Role.VIEWER).tenant
+        return Response(status_code=204 if self._models.has(tenant, sha256) else 404)
 
     async def put_model(self, sha256: str, request: Request) -> Response:
         """Bring a model, an ONNX file of at most 64 MiB, named by its SHA-256."""
@@ -95,6 +95,6 @@ class FleetRoutes:
             if len(content) > LARGEST_MODEL:
                 raise RefusedError(413, f"a model has at most {LARGEST_MODEL >> 20} MiB")
         # A large one takes a while to be hashed and written, and others do not wait for it.
-        await asyncio.to_thread(self._models.put, sha256, bytes(content))
+        await asyncio.to_thread(self._models.put, principal.tenant, sha256, bytes(content))
         self._audit.write(principal, "model.put", sha256, f"{len(content)} bytes", accepted=True)
         return Response(status_code=204)

@@ -61,6 +61,8 @@ class MissionRoutes:
         router.add_api_route(grants, self.withdraw, methods=["DELETE"])
         files: dict[str, Any] = {"response_class": FileResponse}
         router.add_api_route("/{mission}/recording", self.recording, **files)
+        gone: dict[str, Any] = {"methods": ["DELETE"], "status_code": 204}
+        router.add_api_route("/{mission}/recording", self.delete_recording, **gone)
         router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
         bare: dict[str, Any] = {"response_model": None}
         router.add_api_route("/{mission}/playback", self.playback, **bare)
@@ -166,6 +168,13 @@ class MissionRoutes:
         principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
         path = self._desk.file(principal, mission, "recording")
         return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
+
+    def delete_recording(self, mission: str, request: Request) -> None:
+        """Remove the recording of a mission that is over."""
+        principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
+        with self._admission.auditing(principal, request):
+            self._desk.delete_recording(principal, mission)
+        self._audit.write(principal, "recording.delete", mission, accepted=True)
 
     def picture(self, mission: str, request: Request) -> FileResponse:
         """Picture of the rehearsed flight."""

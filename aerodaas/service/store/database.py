@@ -19,7 +19,7 @@ from aerodaas.service.store.tables import METADATA, SCHEMA
 
 __all__ = ["VERSION", "Database"]
 
-VERSION = 2
+VERSION = 3
 """Of the tables: increased whenever they change."""
 _PATIENCE = 5.0
 """Seconds to wait for a lock, a connection or an answer."""

@@ -159,15 +159,15 @@ class Usages(Rows[Usage]):
             _is(columns.tenant, tenant), later, order=[columns.started], limit=limit
         )
 
-    def total(self, tenant: str, since: float) -> tuple[float, int, int]:
-        """Flight seconds, tasks and cloud calls of a tenant's missions that started since then."""
+    def total(self, tenant: str, since: float) -> tuple[float, int]:
+        """Flight seconds and cloud calls of a tenant's missions that started since then."""
         columns = tables.USAGE.c
-        used = (columns.flight_seconds, columns.tasks, columns.cloud_calls)
+        used = (columns.flight_seconds, columns.cloud_calls)
         chosen = (columns.tenant == tenant) & (columns.started >= since)
         statement = select(*map(func.sum, used)).where(chosen)
         with self._database.reading() as connection:
-            flown, tasks, calls = tuple(connection.execute(statement).one())
-        return float(flown or 0), int(tasks or 0), int(calls or 0)
+            flown, calls = tuple(connection.execute(statement).one())
+        return float(flown or 0), int(calls or 0)
 
     def stored_bytes(self, tenant: str) -> int:
         """Bytes of a tenant's recordings that are kept."""

@@ -35,8 +35,6 @@ class Tenant:
     """Share of edge and cloud, relative to the other tenants'; positive."""
     flight_minutes: float | None = None
     """Minutes in the air, of all its robots together, in a calendar month (UTC)."""
-    tasks: int | None = None
-    """Tasks of analyses in a month."""
     cloud_calls: int | None = None
     """Calls of cloud nodes and endpoints in a month."""
     storage_bytes: int | None = None
@@ -182,7 +180,6 @@ class Usage:
     """Sum over its robots of the share of a full charge."""
     compute_seconds: Mapping[str, float] = field(default_factory=dict)
     """Processor's seconds of analyses, by compute resource."""
-    tasks: int = 0
     cloud_calls: int = 0
     recorded_bytes: int = 0
     kept: bool = True

@@ -25,7 +25,6 @@ def fly(
     started: float,
     minutes: float,
     *,
-    tasks: int = 0,
     cloud_calls: int = 0,
     recorded_bytes: int = 0,
 ) -> None:
@@ -41,7 +40,6 @@ def fly(
             "pilot",
             started,
             flight_seconds=60 * minutes,
-            tasks=tasks,
             cloud_calls=cloud_calls,
             recorded_bytes=recorded_bytes,
         )
@@ -50,12 +48,12 @@ def fly(
 
 def test_what_was_flown_this_month_counts(store: Store) -> None:
     """From its first second on, with what is flown just now."""
-    store.tenants.put(Tenant("farm", flight_minutes=100.0, tasks=50, cloud_calls=5))
+    store.tenants.put(Tenant("farm", flight_minutes=100.0, cloud_calls=5))
     quotas = Quotas(store)
-    fly(store, moment(2026, 3, 1) - 1, 90.0, tasks=40)
-    fly(store, moment(2026, 3, 1), 30.0, tasks=7, cloud_calls=6)
+    fly(store, moment(2026, 3, 1) - 1, 90.0, cloud_calls=9)
+    fly(store, moment(2026, 3, 1), 30.0, cloud_calls=6)
     march = quotas.left("farm", moment(2026, 4, 1) - 1, committed=20.0)
-    assert (march.flight_minutes, march.tasks, march.cloud_calls) == (50.0, 43, -1)
+    assert (march.flight_minutes, march.cloud_calls) == (50.0, -1)
     assert march.storage_bytes == math.inf
     assert quotas.left("farm", moment(2026, 4, 1)).flight_minutes == 100.0
     assert quotas.check("farm", 50.0, moment(2026, 3, 31), committed=20.0) == march
@@ -64,12 +62,31 @@ def test_what_was_flown_this_month_counts(store: Store) -> None:
     assert refused.value.status == 403
 
 
+@pytest.mark.parametrize(("used", "fits"), [(4, True), (5, False)])
+def test_calls_of_the_cloud_that_are_used_up_refuse_what_may_need_them(
+    store: Store,
+    used: int,
+    fits: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    """And nothing else."""
+    store.tenants.put(Tenant("farm", cloud_calls=5))
+    quotas, now = Quotas(store), moment(2026, 3, 9)
+    fly(store, moment(2026, 3, 1), 1.0, cloud_calls=used)
+    quotas.check("farm", 1.0, now)
+    if fits:
+        quotas.check("farm", 1.0, now, cloud=True)
+    else:
+        with pytest.raises(RefusedError, match="cloud calls of farm are used up") as refused:
+            quotas.check("farm", 1.0, now, cloud=True)
+        assert refused.value.status == 403
+
+
 def test_a_full_storage_takes_no_mission(store: Store) -> None:
     """Until a recording is deleted, of whatever month it is."""
     store.tenants.put(Tenant("farm", storage_bytes=1000))
     quotas = Quotas(store)
     fly(store, moment(2025, 1, 1), 1.0, recorded_bytes=1000)
-    with pytest.raises(RefusedError, match="fetch and delete some"):
+    with pytest.raises(RefusedError, match="fetch some, and delete them here"):
         quotas.check("farm", 1.0, moment(2026, 3, 1))
     store.usage.put(
         Usage("m0", "farm", "pilot", moment(2025, 1, 1), recorded_bytes=1000, kept=False)
@@ -80,7 +97,7 @@ def test_a_full_storage_takes_no_mission(store: Store) -> None:
 def test_a_tenant_without_quotas_has_no_end(store: Store) -> None:
     """So has one that is not known."""
     for tenant in ("farm", "unknown"):
-        assert Quotas(store).check(tenant, 1e9, moment(2026, 3, 1)).tasks == math.inf
+        assert Quotas(store).check(tenant, 1e9, moment(2026, 3, 1)).cloud_calls == math.inf
 
 
 def test_the_table_has_a_row_for_each_mission_and_no_formula() -> None:

@@ -100,6 +100,10 @@ class Flight:
     def analytics(self) -> None:
         """None."""
 
+    def told(self) -> dict[str, float]:
+        """Never."""
+        return {}
+
     def preflight(self) -> dict[str, PreflightOut]:
         """A list that was gone through three seconds ago."""
         return {"one": PreflightOut.of("one", [WINDY], 3.0)}
@@ -228,6 +232,34 @@ def test_an_operators_word_waits_for_no_users(
     refused = [one for one in asked if one.exception()]
     assert len(refused) == 40 - link._MOST_ASKED
     assert "8 commands to answer" in str(refused[0].exception())
+
+
+def test_nobody_waits_for_a_flight_to_note_that_its_user_is_there(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may hang: its user still sees it, and an operator's word goes past."""
+    begun, free, heard = threading.Event(), threading.Event(), threading.Semaphore(0)
+
+    def hang() -> None:
+        begun.set()
+        assert free.wait(20)
+        heard.release()
+
+    monkeypatch.setattr(flight.lease, "hear", hang)
+    monkeypatch.setattr(link, "_ANSWER_SECONDS", 60.0)
+    monkeypatch.setattr(link, "_HEARD_SECONDS", 0.01)
+    flight.link.hear()
+    assert begun.wait(20)
+    flight.link.hear()
+    assert flight.link.ask(do="end", reason="revoked").accepted
+    assert not heard.acquire(blocking=False)
+    free.set()
+    # Whoever was heard of meanwhile is told of, too, and later ones are.
+    assert heard.acquire(timeout=20)
+    assert heard.acquire(timeout=20)
+    assert not heard.acquire(timeout=0.2)
+    flight.link.hear()
+    assert heard.acquire(timeout=20)
 
 
 class Still(Pictures):

@@ -60,13 +60,13 @@ MISSION = Mission(
     request={"minutes": 3.5, "share": ["campus"], "seed": None},
     verdict={"approved": False, "reasons": ["outside the fence"]},
 )
-USAGE = Usage("m1", "farm", "pilot", 5.0, 60.5, 100.25, 0.1, {"edge": 1.5}, 7, 8, 2**40, kept=False)
+USAGE = Usage("m1", "farm", "pilot", 5.0, 60.5, 100.25, 0.1, {"edge": 1.5}, 8, 2**40, kept=False)
 
 
 @pytest.mark.parametrize(
     ("part", "key", "row"),
     [
-        ("tenants", "t", Tenant("t", 1.0, 2.0, 3.0, 4, 5, 2**40, 6.5, 7.5)),
+        ("tenants", "t", Tenant("t", 1.0, 2.0, 3.0, 5, 2**40, 6.5, 7.5)),
         ("tenants", "u", Tenant("u")),
         ("accounts", "x", Account("x", "farm", Role.ADMIN, frozenset(), 1.0, disabled=True)),
         (
@@ -167,13 +167,13 @@ def test_threads_and_programs_change_one_row_one_after_the_other(
     """No change is lost; else a mission could begin twice."""
     store.leases.put(LEASE)
     store.missions.add(MISSION)
-    store.usage.add(replace(USAGE, tasks=0))
+    store.usage.add(replace(USAGE, cloud_calls=0))
     errors: list[Exception] = []
 
     def count(by: Store) -> None:
         try:
             for _ in range(10):
-                by.usage.update("m1", lambda row: replace(row, tasks=row.tasks + 1))
+                by.usage.update("m1", lambda row: replace(row, cloud_calls=row.cloud_calls + 1))
         except Exception as error:  # noqa: BLE001 - told below
             errors.append(error)
 
@@ -184,7 +184,7 @@ def test_threads_and_programs_change_one_row_one_after_the_other(
         for thread in threads:
             thread.join()
     assert not errors
-    assert store.usage.demand("m1").tasks == 80
+    assert store.usage.demand("m1").cloud_calls == 80
 
 
 def test_lists_have_what_is_asked_for_in_order(store: Store) -> None:
@@ -209,7 +209,7 @@ def test_lists_have_what_is_asked_for_in_order(store: Store) -> None:
 
 def test_usage_is_summed_by_tenant_and_time(store: Store) -> None:
     """Recordings that are deleted take up no storage."""
-    assert store.usage.total("farm", 0.0) == (0.0, 0, 0)
+    assert store.usage.total("farm", 0.0) == (0.0, 0)
     store.leases.put(LEASE)
     for number in range(4):
         store.missions.add(replace(MISSION, id=f"m{number}"))
@@ -220,14 +220,13 @@ def test_usage_is_summed_by_tenant_and_time(store: Store) -> None:
                 "pilot",
                 float(number),
                 flight_seconds=60.0,
-                tasks=10,
                 cloud_calls=1,
                 recorded_bytes=2**33,
                 kept=number != 2,
             )
         )
-    assert store.usage.total("farm", 1.0) == (180.0, 30, 3)
-    assert store.usage.total("campus", 0.0) == (0.0, 0, 0)
+    assert store.usage.total("farm", 1.0) == (180.0, 3)
+    assert store.usage.total("campus", 0.0) == (0.0, 0)
     assert store.usage.stored_bytes("farm") == 3 * 2**33
     assert [row.mission for row in store.usage.all("farm", since=2.0)] == ["m2", "m3"]
     assert [row.mission for row in store.usage.all(limit=1)] == ["m0"]
