@@ -152,7 +152,10 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
         raise NotImplementedError
 
     def close(self) -> None:
-        """Release the resources that `open` acquired."""
+        """Release the resources that `open` acquired.
+
+        In the cloud, processes end without it: what must be kept belongs into results.
+        """
 
     def deploy(
         self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
