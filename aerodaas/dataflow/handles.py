@@ -95,7 +95,8 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
     def poll(self, timeout: float = 1.0) -> E:
         """Return the newest item, waiting up to `timeout` seconds for the first one.
 
-        Raises GraphError before the mission has started, TimeoutError when nothing came.
+        Raises GraphError before the mission has started, TimeoutError when nothing came,
+        StopIteration if nothing has come and the mission is over.
         """
         if self._poller is None:
             self._poller = self.get_data_stream()
