@@ -11,7 +11,7 @@ from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.clock import seconds
-from aerodaas.types.status import MissionState
+from aerodaas.types.status import GROUNDED
 
 if TYPE_CHECKING:
     from aerodaas.actors.base import ActorReport
@@ -24,7 +24,6 @@ _ALERTS = 50
 """Most alerts told, the newest ones."""
 _PLACES = 200
 """Most waypoints of a robot whose places are told, unless more lie ahead."""
-_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
 
 
 class FlightMeter:
@@ -58,7 +57,7 @@ class FlightMeter:
             # The same status again is no news: who told it may hang.
             same = before is not None and before.time == now
             told[name] = self.told[name] if same else time.time()
-            if before is not None and report.status.state not in _GROUND:
+            if before is not None and report.status.state not in GROUNDED:
                 self._flown[name] += max(0.0, now - before.time)
         self.told = told
         self.status = {

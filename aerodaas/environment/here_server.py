@@ -54,7 +54,7 @@ class HereServer:
             ]
         self._kept: OrderedDict[bytes, object] = OrderedDict()
         self._keeping = threading.Lock()
-        self._works = Works(works, conditions, self._hidden, self._revealed)
+        self._works = Works(works, conditions, self._hidden, self.revealed)
         self._locks = {key: threading.Lock() for key in conditions}
 
     def open(self) -> None:
@@ -112,9 +112,8 @@ class HereServer:
 
         Raises ItemError for one that is no longer kept.
         """
-        return self._revealed(item) if isinstance(item, GuestItem) else item
-
-    def _revealed(self, item: GuestItem) -> object:
+        if not isinstance(item, GuestItem):
+            return item
         with self._keeping:
             if item.data not in self._kept:
                 raise ItemError(f"a {item.kind} that is no longer kept here")

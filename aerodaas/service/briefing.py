@@ -67,11 +67,12 @@ class Briefing:
     def may_call_cloud(self, document: MissionDocument) -> bool:
         """Whether an analysis may run elsewhere than on the edge; a scheduler may place any."""
         known = self._settings.config.compute
-        if known == "auto" or document.analytics_scheduler is not None:
-            clouds = known == "auto" or any(one.kind != "edge" for one in known)
-            return clouds and bool(document.analyses)
-        kinds = {one.id: one.kind for one in known}
-        return any(kinds.get(one.compute or "", "edge") != "edge" for one in document.analyses)
+        if known == "auto":
+            return bool(document.analyses)
+        elsewhere = {one.id for one in known if one.kind != "edge"}
+        if document.analytics_scheduler is not None:
+            return bool(elsewhere and document.analyses)
+        return any(one.compute in elsewhere for one in document.analyses)
 
     def require_scopes(self, principal: Principal, document: MissionDocument) -> None:
         """Raise RefusedError for a token not good for what a document senses and computes."""

@@ -19,7 +19,7 @@ from aerodaas.terminal.progress import download_view
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.types.status import GROUNDED, BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -31,7 +31,6 @@ _WORDS = {
     MissionPhase.AWAITING_APPROVAL: "waits for an operator's approval",
     MissionPhase.QUEUED: "waits for its drones",
 }
-_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
 _OLD_SECONDS = 2.5
 """Seconds without a new status after which what is shown of a drone in the air is called old."""
 
@@ -113,7 +112,7 @@ class ProvidedView:
         if last is None or last[0] != status.time:
             last = self._news[name] = status.time, now
         silent = now - last[1]
-        if silent <= _OLD_SECONDS or state in _GROUND:
+        if silent <= _OLD_SECONDS or state in GROUNDED:
             return status.reason
         return f"no word from it for {silent:.0f} s: this is old"
 

@@ -12,6 +12,7 @@ from aerodaas.types.vehicle import Setpoint
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = [
+    "GROUNDED",
     "RECENT",
     "BatteryOutlook",
     "Decision",
@@ -52,6 +53,12 @@ class MissionState(str, enum.Enum):
     """On the ground after a flight; the mission is over."""
     ABORTED = "aborted"
     """Over without having been completed: refused, taken over or lost, as the reason says."""
+
+
+GROUNDED = frozenset(
+    {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
+)
+"""States of a drone that is not in the air, as far as its mission knows."""
 
 
 @fast_pickle

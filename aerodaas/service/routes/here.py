@@ -62,12 +62,15 @@ class HereRoutes:
             return
         await socket.accept()
         user = _User(socket)
-        work = (self._carry(user, mission), user.answer(), until_refused(allowed))
-        jobs = [asyncio.create_task(one) for one in work]
+        asking = asyncio.create_task(self._carry(user, mission))
+        answering = asyncio.create_task(user.answer())
+        refused = asyncio.create_task(until_refused(allowed))
         try:
+            jobs = (asking, answering, refused)
             await asyncio.wait(jobs, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            await end_jobs(f"{mission}: the way to its user's side", jobs[::2], jobs[1:2])
+            what = f"{mission}: the way to its user's side"
+            await end_jobs(what, [asking, refused], [answering])
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
 

@@ -61,8 +61,9 @@ class MissionRoutes:
         router.add_api_route(grants, self.withdraw, methods=["DELETE"])
         files: dict[str, Any] = {"response_class": FileResponse}
         router.add_api_route("/{mission}/recording", self.recording, **files)
-        gone: dict[str, Any] = {"methods": ["DELETE"], "status_code": 204}
-        router.add_api_route("/{mission}/recording", self.delete_recording, **gone)
+        router.add_api_route(
+            "/{mission}/recording", self.delete_recording, methods=["DELETE"], status_code=204
+        )
         router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
         bare: dict[str, Any] = {"response_model": None}
         router.add_api_route("/{mission}/playback", self.playback, **bare)

@@ -32,7 +32,7 @@ class Tenant:
     name: str
     created: float = 0.0
     weight: float = 1.0
-    """Share of edge and cloud, relative to the other tenants'; positive."""
+    """Share of an edge that is shared, relative to the other tenants'; positive."""
     flight_minutes: float | None = None
     """Minutes in the air, of all its robots together, in a calendar month (UTC)."""
     cloud_calls: int | None = None
