@@ -80,6 +80,8 @@ class ModelShelf:
             raise ConfigError(f"a model has at most {LARGEST_MODEL >> 20} MiB")
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ConfigError("the content has another SHA-256 than its name")
+        if self.has(tenant, sha256):
+            return
         require_room(self._folder)
         path = self._path(tenant, sha256)
         with self._lock:

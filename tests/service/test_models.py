@@ -88,6 +88,13 @@ def test_what_was_used_within_a_day_stays(shelf: ModelShelf, tmp_path: Path) -> 
     bring(shelf, "farm", "d", 20)
 
 
+def test_what_is_here_needs_no_room_to_be_sent_again(shelf: ModelShelf) -> None:
+    """As by two applications at once, of which neither had found it."""
+    first = bring(shelf, "farm", "a", 60)
+    assert bring(shelf, "farm", "a", 60) == first
+    assert shelf.has("farm", first)
+
+
 def test_to_ask_for_a_model_is_to_use_it(shelf: ModelShelf, tmp_path: Path) -> None:
     """An application asks before it sends one."""
     first, second = bring(shelf, "farm", "a"), bring(shelf, "farm", "b")
