@@ -180,8 +180,10 @@ class Detection:
 
     def __post_init__(self) -> None:
         """Refuse what those who read them would stumble over."""
-        if self.keypoints is not None and self.keypoints.shape[1:] != (3,):
-            raise ValueError(f"key points of shape {self.keypoints.shape}, not K x 3")
+        points = self.keypoints
+        # Without any, the second dimension is lost where they went through JSON.
+        if points is not None and points.size and points.shape[1:] != (3,):
+            raise ValueError(f"key points of shape {points.shape}, not K x 3")
         if self.appearance is not None and len(self.appearance) != ZONES * ZONE_BYTES:
             raise ValueError(f"an appearance of {len(self.appearance)} bytes")
 

@@ -108,6 +108,10 @@ _ARRAYS = arrays.arrays(
     elements={"allow_nan": False},
 )
 _VECTORS = arrays.arrays(np.float64, 3, elements=_FLOATS)
+_POINTS = arrays.arrays(
+    np.float32, st.tuples(st.integers(0, 40), st.just(3)), elements={"allow_nan": False}
+)
+_HEADERS = st.builds(Header, st.integers(), st.integers(), st.text())
 _SCALARS = st.one_of(
     _FLOATS.map(np.float64), st.integers(-5, 5).map(np.int32), st.booleans().map(np.bool_)
 )
@@ -115,9 +119,10 @@ _ATOMS = st.one_of(
     st.none(), st.booleans(), st.integers(), _FLOATS, st.text(), st.binary(), _SCALARS, _ARRAYS
 )
 _RECORDS = st.one_of(
-    st.builds(Header, st.integers(), st.integers(), st.text()),
+    _HEADERS,
     st.builds(Odometry, _VECTORS, _VECTORS, _FLOATS),
-    st.builds(Detection, st.tuples(*[_FLOATS] * 4), st.text(), st.just(0.5), keypoints=_ARRAYS),
+    st.builds(Detection, st.tuples(*[_FLOATS] * 4), st.text(), st.just(0.5), keypoints=_POINTS),
+    st.builds(Detections, _HEADERS, st.just(()), st.just(6), st.just(4), nearest=_ARRAYS),
     st.sampled_from([*Colour, *MissionState, *NavigationType]),
 )
 _ITEMS = st.recursive(

@@ -16,7 +16,7 @@ from synthetic_flight import PROVENANCE
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.recording.converters import Session, convert
-from aerodaas.recording.pictures import detections, shots
+from aerodaas.recording.pictures import detections, detections_of, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
@@ -121,3 +121,13 @@ def test_detections_and_cameras_are_read_as_they_were_recorded(tmp_path: Path) -
     assert camera is not None
     for name in names(CameraModel):
         assert getattr(camera, name) == pytest.approx(getattr(frame.camera, name)), name
+
+
+def test_a_body_of_which_no_joint_is_told_is_read_back() -> None:
+    """JSON keeps no shape of what is empty."""
+    found = filled(Detections)
+    bare = dataclasses.replace(found[0], keypoints=np.zeros((0, 3), np.float32))
+    (value,) = recorded(dataclasses.replace(found, items=(bare,)))
+    (back,) = detections_of(value)
+    assert back.keypoints is not None
+    assert back.keypoints.size == 0
