@@ -2,32 +2,42 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SLOWEST := $(if $(CI),--durations=25 --durations-min=20)
+# One worker for each of two cores; the slowest tests are listed before one of them meets its time-out.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --durations=25 --durations-min=10
 
-.PHONY: fly test bench lint mypy pyright docs console training lock audit licences matrix clean
+.PHONY: fly test test-all test-field bench lint mypy pyright docs console training lock audit licences matrix clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
-# One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
-# continuous integration does; those that go by the wall clock afterwards. There one that met a busy
-# machine is run once more, named, and counted as a rerun. Each part ends with its slowest tests,
-# before one of them meets its time-out.
+# The gate, which continuous integration runs: linters, types, and all tests but the slow ones.
+test: lint
+	$(PYTEST) -m "not slow and not sitl"
+
+# All tests but those on real autopilots, and both type checkers; about two hours. Tests that go by the
+# wall clock come last, and one that met a busy machine runs once more, named, and counts as a rerun.
 CLOCK := slow and wall_clock
-test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not ($(CLOCK)),not slow)" $(SLOWEST)
-	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "$(CLOCK)" $(SLOWEST))
+test-all: training lint mypy
+	CI=true $(PYTEST) -m "not ($(CLOCK)) and not sitl"
+	CI=true $(PYTEST) -m "$(CLOCK) and not sitl"
+
+# Real autopilots in simulation, which AERODAAS_SITL_PX4 and AERODAAS_SITL_ARDUPILOT name, mutants of what
+# keeps a drone safe, and fuzzing.
+SECONDS_OF_FUZZING ?= 1800
+test-field: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest -m sitl
+	$(BIN)/python benchmarks/mutation.py aerodaas/mission/safety/supervisor.py --sample 40
+	$(BIN)/python benchmarks/mutation.py aerodaas/mission/safety/setpoint_filter.py --sample 40
+	$(BIN)/python -m tools.fuzz all --seconds $(SECONDS_OF_FUZZING) --jobs 2
 
 # Speed and size beside what was committed last; the machine must have nothing else to do.
 bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/all.py --json benchmarks/results.json
 
-# The two type checkers, which take minutes, side by side.
-lint: $(VENV)/.installed-dev
+lint: $(VENV)/.installed-dev pyright
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-logo
-	$(MAKE) --no-print-directory --jobs 2 --output-sync mypy pyright
 
 mypy pyright: $(VENV)/.installed-dev
 	$(BIN)/$@

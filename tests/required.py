@@ -1,15 +1,16 @@
 """What tests need beyond the project's own packages, and the few peers that may be missing in CI.
 
 What is missing skips its tests, with the remedy as the reason; where the variable `CI` is set, such
-a skip is a failure. Two kinds may stay out there, too: tests of a peer that the environment does
-not name, and tests for a newer Python. This module is a plugin of pytest, which `conftest.py`
-registers.
+a skip is a failure. Three kinds may stay out there, too: tests of a peer that the environment does
+not name, tests for a newer Python, and tests of training without PyTorch, which `make test-all`
+installs. This module is a plugin of pytest, which `conftest.py` registers.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import sys
 from collections.abc import Generator
@@ -24,8 +25,6 @@ from tools.browser import BROWSERS
 __all__ = ["PEERS", "needs", "needs_peer", "needs_python", "needs_root", "peer"]
 
 _Report = TypeVar("_Report", pytest.TestReport, pytest.CollectReport)
-_TRAINING = ("test_data_parallel", "test_training_run", "test_pose_training")
-"""Modules that import PyTorch, which flying does not."""
 
 
 @dataclass(frozen=True)
@@ -132,16 +131,20 @@ def pytest_runtest_makereport(
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """In continuous integration, no module is skipped."""
-    return _refuse_skip((yield))
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """In continuous integration, no module is skipped but those of training."""
+    report = yield
+    return report if isinstance(collector, _WithoutTorch) else _refuse_skip(report)
 
 
 def pytest_pycollect_makemodule(
     module_path: Path, parent: pytest.Collector
 ) -> pytest.Module | None:
     """Skip what trains models where PyTorch is missing."""
-    if module_path.stem in _TRAINING and importlib.util.find_spec("torch") is None:
+    training = re.search(r"^(import|from) torch\b", module_path.read_text(), re.MULTILINE)
+    if training and importlib.util.find_spec("torch") is None:
         return _WithoutTorch.from_parent(parent, path=module_path)
     return None
 
