@@ -6,6 +6,12 @@ from collections.abc import Iterator
 from itertools import count
 from typing import Any
 
+from aerodaas.dataflow.plans.commands import (
+    FRAME_ABOVE_GROUND,
+    FRAMES_ABOVE_GROUND,
+    FRAMES_ABOVE_SEA,
+    FRAMES_RELATIVE,
+)
 from aerodaas.dataflow.plans.numbers import finite, finite_or_none, place, whole
 from aerodaas.dataflow.plans.plan import (
     MOST_ITEMS,
@@ -29,6 +35,18 @@ _VERSION = 2
 _CORNERS = 3
 _SAVE_AGAIN = "open it in a current QGroundControl and save it again"
 _LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
+_ABOVE_TERRAIN = 3
+_FRAMES_BY_MODE = {
+    0: FRAMES_RELATIVE,
+    1: FRAMES_RELATIVE,
+    2: FRAMES_ABOVE_SEA,
+    _ABOVE_TERRAIN: FRAMES_ABOVE_SEA,
+    4: FRAMES_ABOVE_GROUND,
+}
+"""MAV_FRAMEs by AltitudeMode; 0 is that of QGroundControl 3. Mode 3 counts from the ground, and has
+the sum above the sea in param 7, once QGroundControl knows the terrain."""
+_SAME_HEIGHT = 0.01
+"""Metres within which two numbers say one height."""
 
 
 def parse_qgroundcontrol(content: object) -> Plan:
@@ -102,16 +120,42 @@ def _simple(item: dict[str, Any], number: int) -> PlanItem:
     first, second, third, fourth, x, y, z = (
         finite_or_none(value, f"{where}: param {next(numbers)}") for value in given
     )
+    frame, z = _height(item, whole(item.get("frame"), f"{where}: frame"), z, where)
     return PlanItem(
         number,
         whole(item.get("command"), f"{where}: command"),
-        whole(item.get("frame"), f"{where}: frame"),
+        frame,
         (first, second, third, fourth),
         x,
         y,
         z,
         _truth(item.get("autoContinue", True), f"{where}: autoContinue"),
     )
+
+
+def _height(
+    item: dict[str, Any], frame: int, z: float | None, where: str
+) -> tuple[int, float | None]:
+    """Frame and param 7 of an item, which its altitude mode must not contradict."""
+    mode = item.get("AltitudeMode")
+    if mode is None or all(frame not in frames for frames in _FRAMES_BY_MODE.values()):
+        return frame, z
+    mode = whole(mode, f"{where}: AltitudeMode")
+    if frame not in _FRAMES_BY_MODE.get(mode, ()):
+        raise ConfigError(
+            f"{where}: AltitudeMode {mode} and frame {frame} contradict each other; set its "
+            "altitude's mode in QGroundControl again and save the plan"
+        )
+    named = "Altitude" if mode != _ABOVE_TERRAIN else "AMSLAltAboveTerrain"
+    height = finite_or_none(item.get(named), f"{where}: {named}")
+    if mode == _ABOVE_TERRAIN and height is None:
+        return FRAME_ABOVE_GROUND, finite(item.get("Altitude"), f"{where}: Altitude")
+    if height is not None and z is not None and abs(height - z) > _SAME_HEIGHT:
+        raise ConfigError(
+            f"{where}: {named} is {height:g} m and param 7 is {z:g} m; enter its altitude in "
+            "QGroundControl again and save the plan"
+        )
+    return frame, z
 
 
 def _home(value: object) -> PlanHome | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from aerodaas.dataflow.plans.commands import FRAME_ABOVE_SEA, NAV_WAYPOINT, command_name
 from aerodaas.dataflow.plans.numbers import finite
 from aerodaas.dataflow.plans.plan import MOST_ITEMS, Plan, PlanHome, PlanItem
 from aerodaas.types.errors import ConfigError
@@ -17,19 +18,26 @@ _LONGEST = 40
 
 
 def parse_waypoint_file(text: str) -> Plan:
-    """Read the text of a `.waypoints` file; its line 0 is home.
+    """Read the text of a `.waypoints` file; its item 0 is home.
 
     Raises:
-        ConfigError: If it is none, or a line does not hold what it should.
+        ConfigError: If it is none, it has no home, or a line does not hold what it should.
     """
     first, *lines = text.lstrip("\ufeff").splitlines() or [""]
     if first.strip() != HEADER:
         raise ConfigError(f"its first line is not {HEADER!r}: save it again as that")
     items = list(_items(lines))
-    if items and items[0].number == 0:
-        home = PlanHome.given(items[0].x, items[0].y, items[0].z)
-        return Plan(tuple(items[1:]), home=home, ardupilot=True)
-    raise ConfigError("its first item is not number 0, which is home: save it again")
+    if not items:
+        raise ConfigError("it holds no items, not even number 0, which is home: save it again")
+    first_item = items[0]
+    if (first_item.command, first_item.frame) != (NAV_WAYPOINT, FRAME_ABOVE_SEA):
+        raise ConfigError(
+            f"its item 0 must be home, command {NAV_WAYPOINT} in frame {FRAME_ABOVE_SEA}, but is "
+            f"{command_name(first_item.command)} in frame {first_item.frame}: put a line for home "
+            "before it, and number the others from 1"
+        )
+    home = PlanHome.given(first_item.x, first_item.y, first_item.z)
+    return Plan(tuple(items[1:]), home=home, ardupilot=True)
 
 
 def _items(lines: list[str]) -> Iterator[PlanItem]:

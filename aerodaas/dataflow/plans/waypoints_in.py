@@ -251,9 +251,14 @@ class _Flown:
             self.waypoints[-1] = replace(last, actuate={**last.moves, name: position})
 
     def _change_speed(self, item: PlanItem) -> None:
-        kind, speed = item.values[0] or 0.0, item.values[1]
+        kind, speed, throttle, relative = item.values
+        kind = kind or 0.0
+        if throttle is not None and throttle > 0.0:
+            self._say(item, f"its throttle of {throttle:g} % is not set")
         if kind not in _SPEED_TYPES:
             self._say(item, "climb and descent keep within limits.max_climb")
+        elif relative:
+            self._say(item, "a speed relative to the one before is not done; that one is kept")
         elif speed == _DEFAULT_SPEED:
             self._speed = None
         elif speed is not None and speed > 0.0:

@@ -101,8 +101,8 @@ def test_no_item_vanishes() -> None:
         done = PlanItem(1, command, 2, (9.0, 1.0, 1.0, 1.0), 1.0, 1.0, 1.0)
         waypoints, notices = waypoints_of(Plan((done,)))
         assert not waypoints
-        stops = [command_name(command)] * (command != IMAGE_STOP_CAPTURE)
-        assert [one.command for one in notices] == stops
+        named = {command_name(command)} - {command_name(IMAGE_STOP_CAPTURE)}
+        assert {one.command for one in notices} == named
 
 
 @pytest.mark.parametrize(
@@ -117,10 +117,15 @@ def test_no_item_vanishes() -> None:
         ([1, 0, -1, 0], 2.0, True),
         ([2, 4, -1, 0], 2.0, True),
         ([3, 4, -1, 0], 2.0, True),
+        ([1, 4, 60, 0], 4.0, True),
+        ([1, -1, 60, 0], 2.0, True),
+        ([1, 4, -2, 0], 4.0, False),
+        ([1, 4, 0, 0], 4.0, False),
+        ([1, 4, -1, 1], 2.0, True),
     ],
 )
 def test_speeds(tmp_path: Path, params: list[Any], speed: float | None, said: bool) -> None:  # noqa: FBT001
-    """Those through the air and over ground count; of climb and descent, none does."""
+    """Those through the air and over ground count; others, and a throttle, are told."""
     before = item(178, [1, 2, -1, 0, 0, 0, 0], 2)
     change = item(178, [*params, 0, 0, 0], 2)
     path = plan(tmp_path / "a.plan", before, change, waypoint(0.001))
@@ -237,6 +242,65 @@ def test_heights_above_ground(tmp_path: Path, frame: int) -> None:
     assert asked == [(47.001, 8.0)]
     with pytest.raises(ConfigError, match="height of the ground must be a finite number"):
         flown_plan(path, ground=lambda *_: math.nan)
+
+
+def test_heights_above_a_terrain_that_was_not_known(tmp_path: Path) -> None:
+    """They are above the ground, as their author meant, and not above the sea."""
+    mode = {"AltitudeMode": 3, "Altitude": 76.0}
+    for z in (76.0, None):
+        params = [0, 0, 0, None, 47.001, 8.0, z]
+        path = plan(tmp_path / "a.plan", item(16, params, 0, AMSLAltAboveTerrain=None, **mode))
+        (one,) = flown_plan(path)[0]
+        assert (one.z, one.above) == (76.0, HeightReference.GROUND)
+        (one,) = flown_plan(path, home_altitude=20.0, ground=lambda *_: 25.0)[0]
+        assert (one.z, one.above) == (81.0, None)
+    known = item(16, [0, 0, 0, None, 47.001, 8.0, 536.0], 0, AMSLAltAboveTerrain=536.0, **mode)
+    (one,) = flown_plan(plan(tmp_path / "b.plan", known), home_altitude=460.0)[0]
+    assert one.z == pytest.approx(76.0)
+
+
+@pytest.mark.parametrize(
+    ("frame", "mode", "more", "flown"),
+    [
+        (3, 1, {}, True),
+        (3, 0, {}, True),
+        (6, 1, {}, True),
+        (0, 2, {}, True),
+        (10, 4, {}, True),
+        (0, 3, {"AMSLAltAboveTerrain": 20.0}, True),
+        (3, 2, {}, False),
+        (3, 3, {"AMSLAltAboveTerrain": None}, False),
+        (3, 4, {}, False),
+        (0, 0, {}, False),
+        (0, 1, {}, False),
+        (0, 4, {}, False),
+        (10, 1, {}, False),
+        (10, 3, {}, False),
+        (3, 5, {}, False),
+        (3, 99, {}, False),
+        (3, 1, {"Altitude": 50.0}, False),
+        (0, 2, {"Altitude": 50.0}, False),
+        (0, 3, {"AMSLAltAboveTerrain": 50.0}, False),
+        (0, 3, {"AMSLAltAboveTerrain": None, "Altitude": None}, False),
+    ],
+)
+def test_an_altitude_mode_agrees_with_its_item(
+    tmp_path: Path,
+    frame: int,
+    mode: int,
+    more: dict[str, Any],
+    flown: bool,  # noqa: FBT001
+) -> None:
+    """Frame and number say what the mode says, or the plan is refused, by item."""
+    params = [0, 0, 0, None, 47.001, 8.0, 20.0]
+    entry = item(16, params, frame, **{"AltitudeMode": mode, "Altitude": 20.0} | more)
+    for entries in ((entry,), (survey(entry),)):
+        path = plan(tmp_path / "a.plan", *entries)
+        if flown:
+            assert len(read_plan(path).items) == 1
+        else:
+            with pytest.raises(ConfigError, match="item 1"):
+                read_plan(path)
 
 
 @pytest.mark.parametrize("frame", [1, 2, 4, 7, 12, 99])
@@ -384,7 +448,12 @@ def test_a_home_of_zeros_is_none(tmp_path: Path, home: str) -> None:
     ("text", "why"),
     [
         ("QGC WPL 120\n", "its first line is not 'QGC WPL 110'"),
-        ("QGC WPL 110\n", "its first item is not number 0"),
+        ("QGC WPL 110\n", "it holds no items"),
+        # A take-off, a waypoint above home, and one above ground, each where home is to stand.
+        ("QGC WPL 110\n0 1 3 22 0 0 0 0 47 8 10 1\n", "item 0 must be home.*NAV_TAKEOFF"),
+        ("QGC WPL 110\n0 1 3 16 0 0 0 0 47 8 10 1\n", "item 0 must be home.*in frame 3"),
+        ("QGC WPL 110\n0 1 10 16 0 0 0 0 47 8 10 1\n", "item 0 must be home.*in frame 10"),
+        ("QGC WPL 110\n0 1 0 22 0 0 0 0 47 8 10 1\n", "item 0 must be home.*NAV_TAKEOFF"),
         ("QGC WPL 110\n1 0 3 16 0 0 0 0 47 8 9 1\n", "line 2 is item 1, not 0"),
         ("QGC WPL 110\n0 0 3 16 0 0 0 0 47 8 9\n", "line 2 has 11 fields, not 12"),
         ("QGC WPL 110\n0 0 3 16 0 0 nan 0 47 8 9 1\n", "field 7 must be a finite number, not nan"),
@@ -393,7 +462,7 @@ def test_a_home_of_zeros_is_none(tmp_path: Path, home: str) -> None:
         ("QGC WPL 110\n0 0 3 16 0 0 x 0 47 8 9 1\n", "field 7 must be a number, not 'x'"),
         ("QGC WPL 110\n0 0 -3 16 0 0 0 0 47 8 9 1\n", "frame must be a whole number, not '-3'"),
         ("QGC WPL 110\n0 0 3 1\u0666 0 0 0 0 47 8 9 1\n", "command must be a whole number"),
-        ("QGC WPL 110\n0 0 3 16 0 0 0 0 470 8 9 1\n", "home: .* is no latitude"),
+        ("QGC WPL 110\n0 0 0 16 0 0 0 0 470 8 9 1\n", "home: .* is no latitude"),
     ],
 )
 def test_lines_that_are_no_items(tmp_path: Path, text: str, why: str) -> None:
