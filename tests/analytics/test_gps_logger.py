@@ -106,6 +106,13 @@ def test_a_malformed_row_is_counted_or_empty(row: str) -> None:
     assert len(track.rows) + track.malformed == (2 if not row else 3) or row == '"1'
 
 
+def test_decimal_commas_are_malformed_and_not_other_places() -> None:
+    """47,376,8,541 under lat,lon would be 47 N, 376 E, or with smaller numbers a place far off."""
+    track = parse_track("lat,lon\n47,37,8,54\n47.37,8.54,\n", "log")
+    assert [(row.fix.latitude, row.fix.longitude) for row in track.rows] == [(47.37, 8.54)]
+    assert track.malformed == 1
+
+
 def test_an_endless_field_costs_itself_only() -> None:
     """A quote that is never closed, and more behind it than a field may hold."""
     endless = "\n".join(['"', *["7,8,9"] * 40_000])

@@ -147,7 +147,9 @@ def _csv(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
             # A quote that is never closed would take in the rest; reading goes on after it.
             yield None
         else:
-            yield dict(zip(names, cells, strict=False)) if len(cells) >= len(names) - 1 else None
+            # Cells without a name may be halves of numbers with decimal commas.
+            fits = len(cells) >= len(names) - 1 and not any(cells[len(names) :])
+            yield dict(zip(names, cells, strict=False)) if fits else None
 
 
 def _canonical(column: str) -> str:

@@ -10,7 +10,6 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["parse_geojson"]
 
 _WGS84 = ("CRS84", "EPSG::4326", "EPSG:4326")
-_PAIR = 2
 
 
 def parse_geojson(content: object, reader: AreaReader) -> None:
@@ -73,6 +72,6 @@ def _list(value: dict[str, Any], key: str) -> list[Any]:
 def _rings(value: object) -> list[list[list[Any]]]:
     if not isinstance(value, list) or not all(isinstance(ring, list) for ring in value):
         raise ConfigError("it is no GeoJSON: a polygon must be a list of rings")
-    if not all(isinstance(at, list) and len(at) >= _PAIR for ring in value for at in ring):
+    if not all(isinstance(at, list) for ring in value for at in ring):
         raise ConfigError("it is no GeoJSON: a corner must be longitude and latitude")
     return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
@@ -16,7 +17,8 @@ _OTHERS = ("Point", "LineString", "Model", "Track", "NetworkLink", "GroundOverla
 _BOUNDARIES = {"outerBoundaryIs": 0, "innerBoundaryIs": 1}
 _LONGEST = 40
 """Most characters of a number."""
-_PAIR = 2
+_WHOLE_DEGREES = re.compile(r"[+-]?\d{1,40},\d{1,40}")
+"""A corner without a decimal point; as well a number with a decimal comma."""
 
 
 def parse_kml(text: str, reader: AreaReader) -> None:
@@ -53,11 +55,14 @@ def _rings(polygon: ET.Element) -> list[list[list[float]]]:
 
 def _corners(boundary: ET.Element) -> Iterator[list[float]]:
     for coordinates in _all(boundary, "coordinates"):
-        for corner in (coordinates.text or "").split():
-            fields = corner.split(",")
-            if len(fields) < _PAIR:
-                raise ConfigError(f"a corner is {corner[:_LONGEST]!r}, not longitude,latitude")
-            yield [_number(fields[0]), _number(fields[1])]
+        corners = (coordinates.text or "").split()
+        if corners and all(map(_WHOLE_DEGREES.fullmatch, corners)):
+            raise ConfigError(
+                f"a corner is {corners[0][:_LONGEST]!r}: write decimals with a point, not a comma, "
+                "and whole degrees with .0"
+            )
+        for corner in corners:
+            yield [_number(field) for field in corner.split(",")]
 
 
 def _number(text: str) -> float:

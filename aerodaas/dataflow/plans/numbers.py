@@ -38,8 +38,10 @@ def place(latitude: object, longitude: object, what: str) -> LatLon:
     """Return latitude and longitude; raises ConfigError for what is no place on the globe."""
     north, east = finite(latitude, f"{what}: latitude"), finite(longitude, f"{what}: longitude")
     if abs(north) > _POLE or abs(east) > _DATE_LINE:
+        remedy = "give -90 to 90 and -180 to 180"
+        if abs(east) <= _POLE and abs(north) <= _DATE_LINE:
+            remedy = "are the two exchanged?"
         raise ConfigError(
-            f"{what}: ({north:g}, {east:g}) is no latitude and longitude in degrees; "
-            "are the two exchanged?"
+            f"{what}: ({north:.10g}, {east:.10g}) is no latitude and longitude in degrees; {remedy}"
         )
     return north, east

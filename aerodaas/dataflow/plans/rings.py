@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from aerodaas.dataflow.plans.numbers import LatLon, place
+from aerodaas.dataflow.plans.numbers import LatLon, finite, place
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["AreaReader"]
@@ -14,6 +14,9 @@ _MOST_AREAS = 1000
 _MOST_CORNERS = 20_000
 """Of all areas of a file together."""
 _CORNERS = 3
+_PAIR = 2
+_WITH_HEIGHT = 3
+_SHOWN = 60
 _NAME = 80
 
 
@@ -27,10 +30,11 @@ class AreaReader:
         self._corners = 0
 
     def add(self, name: object, rings: Sequence[Sequence[Sequence[object]]]) -> None:
-        """Take a polygon: its outline, then its holes; of longitudes and latitudes.
+        """Take a polygon: its outline, then its holes; of longitudes, latitudes and heights.
 
         Raises:
-            ConfigError: If a ring has too few corners, a corner is no place, or a bound is passed.
+            ConfigError: If a ring has too few corners, a corner is no place or has more numbers, or
+                a bound is passed.
         """
         number = len(self.found) + 1
         where = f"polygon {number}"
@@ -46,9 +50,22 @@ class AreaReader:
         self._corners += len(ring)
         if self._corners > _MOST_CORNERS:
             raise ConfigError(f"it has more than {_MOST_CORNERS} corners: simplify its outlines")
-        corners = [place(corner[1], corner[0], where) for corner in ring]
+        corners = [_corner(corner, where) for corner in ring]
         if corners[:1] == corners[1:][-1:]:
             corners.pop()
         if len(set(corners)) < _CORNERS:
             raise ConfigError(f"{where} has less than three corners")
         return tuple(corners)
+
+
+def _corner(corner: Sequence[object], where: str) -> LatLon:
+    if not _PAIR <= len(corner) <= _WITH_HEIGHT:
+        # More may be the next corner, or halves of numbers with decimal commas.
+        listed = ",".join(map(str, corner))[:_SHOWN]
+        raise ConfigError(
+            f"{where}: a corner is {listed!r}, not longitude, latitude and at most a height; "
+            "write decimals with a point and each corner by itself"
+        )
+    for height in corner[_PAIR:]:
+        finite(height, f"{where}: height")
+    return place(corner[1], corner[0], where)

@@ -120,11 +120,17 @@ def test_what_is_no_area_is_said(tmp_path: Path) -> None:
         (polygon(), "polygon 1 has no outline"),
         (polygon(RING[:2]), "polygon 1 has less than three corners"),
         (polygon([RING[0]] * 5), "polygon 1 has less than three corners"),
-        (polygon([[8.0], [8.1], [8.2]]), "a corner must be longitude and latitude"),
+        (polygon([[8.0], [8.1], [8.2]]), "a corner is '8.0', not longitude, latitude"),
+        # Two corners in one, and numbers with decimal commas: [8,541, 47,376], [8,541, 47,376, 9].
+        (polygon([*RING[:3], [8.01, 47.0, 0, 8.01, 47.01, 0]]), "8.01,47.0,0,8.01,47.01,0"),
+        (polygon(RING, [*HOLE, [8, 541, 47, 376]]), "a corner is '8,541,47,376'"),
+        (polygon([*RING, [8, 541, 47, 376, 9]]), "a corner is '8,541,47,376,9'"),
+        (polygon([*RING, [8.0, 47.0, "9"]]), "height must be a finite number, not '9'"),
         (polygon(8.0, 47.0), "a polygon must be a list of rings"),
         (polygon([[True, 47], [8, 47], [8, 46]]), "longitude must be a finite number, not True"),
         (polygon([["8", 47], [8, 47], [8, 46]]), "longitude must be a finite number, not '8'"),
-        (polygon([[8, 470], [8, 47], [8, 46]]), "are the two exchanged"),
+        (polygon([[8, 170], [8, 47], [8, 46]]), "are the two exchanged"),
+        (polygon([[180.001, 47], [8, 47], [8, 46]]), r"\(47, 180.001\) .*-180 to 180"),
         (polygon(RING) | {"crs": {"properties": {"name": "EPSG:2056"}}}, "export them as WGS84"),
         (polygon(RING) | {"crs": 7}, "export them as WGS84"),
         (polygon([[8 + i / 1e5, 47] for i in range(20_001)]), "more than 20000 corners"),
@@ -145,6 +151,13 @@ def test_coordinates_that_are_named_as_they_are(tmp_path: Path) -> None:
 
 
 OUTER = kml_ring(RING, "outer")
+
+
+def written(coordinates: str) -> str:
+    """KML whose outline has these coordinates, as they stand."""
+    ring = f"<LinearRing><coordinates>{coordinates}</coordinates></LinearRing>"
+    polygon = f"<Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon>"
+    return f"<kml><Placemark>{polygon}</Placemark></kml>"
 
 
 @pytest.mark.parametrize(
@@ -171,8 +184,14 @@ OUTER = kml_ring(RING, "outer")
         ),
         (
             f"<kml><Placemark><Polygon>{OUTER}</Polygon></Placemark></kml>".replace(",", ";"),
-            "a corner is '8.0;47.0;12.5', not longitude,latitude",
+            "a coordinate must be a number, not '8.0;47.0;12.5'",
         ),
+        (written("8,000 47,000 8,002 47,000 8,002 47,001"), "a corner is '8,000': write"),
+        (written("8,5417 47,3769 8,5418 47,3769 8,5418 47,3770"), "a corner is '8,5417'"),
+        (written("8,541,47,376 8,542,47,376 8,542,47,377"), "'8.0,541.0,47.0,376.0', not"),
+        (written("8,541,47,376,9 8,542,47,376,9 8,542,47,377,9"), "a corner is '8.0,541.0"),
+        (written("8.0,47.0,0,8.0,47.1,0 8.1,47.1,0 8.1,47.0,0"), "'8.0,47.0,0.0,8.0,47.1"),
+        (written("8.0,47.0,x 8.0,47.1 8.1,47.1"), "a coordinate must be a number, not 'x'"),
     ],
     ids=lambda one: one[:30],
 )
