@@ -1,21 +1,23 @@
 """Live video source: frames are decoded in a separate thread, and only the newest is kept.
 
 For a reader slower than the frame rate, frames would otherwise queue in the decoder and age by
-seconds, as users of Wi-Fi drones report.
+seconds, as users of Wi-Fi drones report. Pictures that a loss has smeared are left out: whoever
+follows a person by them would fly somewhere else.
 """
 
 from __future__ import annotations
 
 import logging
-import os
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 
+import av
 import cv2
 import numpy as np
+from av.codec.context import Flags
+from av.error import FFmpegError
 from numpy.typing import NDArray
 
+from aerodaas.cameras.h264 import FrameDecoder, bgr_image
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.errors import SourceError
@@ -24,13 +26,14 @@ __all__ = ["LiveSource"]
 
 _log = logging.getLogger(__name__)
 _FIRST_FRAME_TIMEOUT = 10.0
-_READ_TIMEOUT_MS = 3000
+_READ_TIMEOUT = 3.0
 _SHORTEST_WAIT = 0.5
 _LONGEST_WAIT = 8.0
-_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+_OPTIONS = {"rtsp_transport": "tcp", "fpsprobesize": "0"}
+"""FFmpeg's. The rate of frames is not measured first, which takes a second; `nobuffer` would drop
+the first key frame."""
 _MOST_PIXELS = 4096 * 4096
 """Pixels of the largest picture that is handed on: a stream may claim any size."""
-_OPENING = threading.Lock()
 
 
 class LiveSource:
@@ -63,6 +66,7 @@ class LiveSource:
         self.finished = False
         """Always False: a source that times out is reconnected."""
         self.skipped = 0
+        """Frames that were left out: damaged, or waiting for a key frame after a loss."""
         self.reconnections = 0
         self._frames = 0
         """Frames decoded so far."""
@@ -101,74 +105,77 @@ class LiveSource:
         """Stop decoding."""
         self._closing.set()
         if self._thread is not None:
-            self._thread.join(timeout=_READ_TIMEOUT_MS / 1000)
+            self._thread.join(timeout=_READ_TIMEOUT)
 
     def _decode(self) -> None:
         wait = _SHORTEST_WAIT
+        address = self._address.get_secret_value()
+        device = address.removeprefix("/dev/video")
         while not self._closing.is_set():
-            capture = _connect(self._address.get_secret_value(), self._protocols)
             before = self._frames
             try:
-                self._drain(capture)
+                if device != address and device.isdigit():
+                    self._read_device(int(device))
+                else:
+                    self._read_stream(address)
             except (cv2.error, MemoryError):
                 # No memory for what the stream says it sends.
                 self.skipped += 1
+            except FFmpegError as error:
+                _log.debug("%s: %s", self._address, error)
             if self._frames > before:
                 wait = _SHORTEST_WAIT
-            capture.release()
             if self._closing.wait(wait):
                 return
             self.reconnections += 1
             _log.warning("%s is silent; connecting again", self._address)
             wait = min(2 * wait, _LONGEST_WAIT)
 
-    def _drain(self, capture: cv2.VideoCapture) -> None:
-        """Read frames until the source ends or times out."""
-        while not self._closing.is_set() and capture.grab():
-            grabbed = host_time_ns()
-            width, height = map(capture.get, (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
-            readable, image = (
-                capture.retrieve() if width * height <= _MOST_PIXELS else (False, None)
-            )
-            if not readable:
-                self.skipped += 1
-                continue
-            with self._lock:
-                self._frame = (np.asarray(image, np.uint8), grabbed)
-            self._frames += 1
-            self._arrived.set()
-
-
-def _connect(address: str, protocols: str | None) -> cv2.VideoCapture:
-    device = address.removeprefix("/dev/video")
-    if device != address and device.isdigit():
-        return cv2.VideoCapture(int(device), cv2.CAP_V4L2)
-    timeouts: Sequence[int] = [
-        cv2.CAP_PROP_OPEN_TIMEOUT_MSEC,
-        _READ_TIMEOUT_MS,
-        cv2.CAP_PROP_READ_TIMEOUT_MSEC,
-        _READ_TIMEOUT_MS,
-    ]
-    with _low_latency(protocols):
-        return cv2.VideoCapture(address, cv2.CAP_FFMPEG, timeouts)
-
-
-@contextmanager
-def _low_latency(protocols: str | None) -> Iterator[None]:
-    """Disable FFmpeg's buffering for captures opened within this context.
-
-    `protocols` are the only ones that it may use, whatever else the environment says.
-
-    OpenCV takes FFmpeg's options from the environment only, where they would also affect files
-    that are opened later.
-    """
-    with _OPENING:
-        before = os.environ.get(_OPTIONS)
-        os.environ.setdefault(_OPTIONS, "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay")
-        if protocols is not None:
-            os.environ[_OPTIONS] += f"|protocol_whitelist;{protocols}"
+    def _read_device(self, number: int) -> None:
+        """Read pictures until the device ends."""
+        capture = cv2.VideoCapture(number, cv2.CAP_V4L2)
         try:
-            yield
+            while not self._closing.is_set() and capture.grab():
+                grabbed = host_time_ns()
+                readable, image = capture.retrieve()
+                if readable:
+                    self._show(np.asarray(image, np.uint8), grabbed)
+                else:
+                    self.skipped += 1
         finally:
-            if before is None:
-                del os.environ[_OPTIONS]
+            capture.release()
+
+    def _read_stream(self, address: str) -> None:
+        """Read pictures until the stream ends; raises FFmpegError for all that goes wrong."""
+        options = {**_OPTIONS, "max_pixels": str(_MOST_PIXELS)}
+        if self._protocols is not None:
+            options["protocol_whitelist"] = self._protocols
+        with av.open(
+            address,
+            options=options,
+            timeout=(_READ_TIMEOUT, _READ_TIMEOUT),
+            metadata_errors="replace",
+        ) as container:
+            stream = next(iter(container.streams.video), None)
+            if stream is None:
+                return
+            codec = stream.codec_context
+            # Frame threading would delay frames.
+            codec.thread_type = "SLICE"
+            codec.flags |= Flags.low_delay
+            decoder = FrameDecoder(codec, most_pixels=_MOST_PIXELS)
+            left_out = self.skipped
+            for packet in container.demux(stream):
+                if self._closing.is_set() or not packet.size:
+                    return
+                arrived = host_time_ns()
+                pictures = decoder.decode(packet)
+                self.skipped = left_out + decoder.broken + decoder.waiting
+                if pictures:
+                    self._show(bgr_image(pictures[-1]), arrived)
+
+    def _show(self, image: NDArray[np.uint8], taken: int) -> None:
+        with self._lock:
+            self._frame = (image, taken)
+        self._frames += 1
+        self._arrived.set()

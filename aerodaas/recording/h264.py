@@ -134,13 +134,16 @@ class H264Decoder:
 
         Returns None for a frame that is broken or depends on a broken one.
         """
-        from aerodaas.cameras.h264 import FrameDecoder, WholeFrame  # noqa: PLC0415 - loads PyAV
+        from av.packet import Packet  # noqa: PLC0415 - as above
+
+        from aerodaas.cameras.h264 import FrameDecoder  # noqa: PLC0415 - loads PyAV
 
         if group is not self._group or place < self._done - 1:
             self._group, self._done = group, 0
-            self._decoder = FrameDecoder(only_whole=True)
+            self._decoder = FrameDecoder()
         for data in group[self._done : place + 1]:
-            self._picture = self._decoder.decode(WholeFrame(data, 0))
+            pictures = self._decoder.decode(Packet(data))
+            self._picture = pictures[-1] if pictures else None
             self._done += 1
         if self._picture is None:
             return None

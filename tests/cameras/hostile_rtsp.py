@@ -94,32 +94,32 @@ def body(client: socket.socket) -> None:
 
 def no_video(client: socket.socket) -> None:
     """Play, and send reports only."""
-    _play(client)
+    play(client)
     while not threading.Event().wait(0.1):
         client.sendall(b"$\1\0\x08\x80\xc9\0\1\0\0\0\7")
 
 
 def fragments(client: socket.socket) -> None:
     """Send one picture, and then fragments of the next one without an end."""
-    _play(client)
+    play(client)
     packets = count()
     for unit in _picture(64, 48):
-        client.sendall(_packet(unit, next(packets)))
+        client.sendall(rtp_packet(unit, next(packets)))
     first = 0x80
     while True:
         head = bytes([_FRAGMENT[0], first | 5])
-        client.sendall(_packet(head + b"\x55" * 60000, next(packets)))
+        client.sendall(rtp_packet(head + b"\x55" * 60000, next(packets)))
         first = 0
 
 
 def huge(client: socket.socket) -> None:
     """Send pictures of 134 million pixels, each of 100 kB."""
-    _play(client)
+    play(client)
     packets = count()
     while True:
         for unit in huge_picture():
-            for packet in _fragmented(unit):
-                client.sendall(_packet(packet, next(packets)))
+            for packet in fragmented(unit):
+                client.sendall(rtp_packet(packet, next(packets)))
 
 
 KINDS = (silent, headers, body, no_video, fragments, huge)
@@ -136,7 +136,7 @@ def _request(client: socket.socket) -> tuple[bytes, bytes]:
     return data.split(b" ")[0], data.partition(b"CSeq: ")[2].split(b"\r\n")[0]
 
 
-def _play(client: socket.socket) -> None:
+def play(client: socket.socket) -> None:
     """Answer as a camera does, until it is to play."""
     verb = b""
     while verb != b"PLAY":
@@ -150,12 +150,18 @@ def _play(client: socket.socket) -> None:
         client.sendall(_OK % number + more.get(verb, b"\r\n"))
 
 
-def _packet(payload: bytes, number: int) -> bytes:
-    head = struct.pack(">BBHII", 0x80, 96, number & 0xFFFF, 3000 * number & 0xFFFFFFFF, 7)
+def rtp_packet(
+    payload: bytes, number: int, time: int | None = None, *, last: bool = False
+) -> bytes:
+    """An interleaved RTP packet, the `last` one of its picture or not, at `time` in 1/90,000 s."""
+    time = 3000 * number if time is None else time
+    kind = 96 | last << 7
+    head = struct.pack(">BBHII", 0x80, kind, number & 0xFFFF, time & 0xFFFFFFFF, 7)
     return b"$\0" + struct.pack(">H", len(head) + len(payload)) + head + payload
 
 
-def _fragmented(unit: bytes) -> list[bytes]:
+def fragmented(unit: bytes) -> list[bytes]:
+    """Payloads by which a NAL unit travels."""
     if len(unit) <= _TAKEN:
         return [unit]
     head, rest = unit[0], unit[1:]

@@ -34,6 +34,8 @@ def test_no_server_takes_all_memory_or_keeps_its_reader() -> None:
         check=True,
     )
     found = json.loads(done.stdout.splitlines()[-1])
+    # One of them sends a whole picture first, which may be seen.
+    assert found["errors"].pop("fragments") in {"", "SourceError"}
     assert set(found["errors"].values()) == {"SourceError"}
     assert found["bytes"] < 1.2 * _MEMORY
 
@@ -57,9 +59,6 @@ class _Full:
     def grab(self) -> bool:
         return True
 
-    def get(self, _: int) -> float:
-        return 8.0
-
     def retrieve(self) -> tuple[bool, Any]:
         raise (cv2.error("no memory"), MemoryError())[type(self).asked % 2]
 
@@ -71,10 +70,10 @@ def test_a_frame_without_memory_is_skipped_and_asked_for_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The reading thread outlives it."""
-    monkeypatch.setattr(live, "_connect", lambda *_: _Full())
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: _Full())
     monkeypatch.setattr(live, "_SHORTEST_WAIT", 0.001)
     monkeypatch.setattr(live, "_LONGEST_WAIT", 0.001)
-    source = LiveSource(SecretUrl("rtsp://cam/live"), timeout=1.0)
+    source = LiveSource(SecretUrl("/dev/video7"), timeout=1.0)
     with pytest.raises(SourceError, match="no picture from"):
         source.open()
     assert source.skipped > 1

@@ -74,9 +74,9 @@ class TelloCameraSettings(CameraConfig):
     """Metres forward, left and up of the body's centre (the same source)."""
     video_port: Port = VIDEO_PORT
     """This host's port for video. Another than 11111 needs SDK 3.0."""
-    only_whole: bool = False
-    """Also leave out the frames between a damaged one and the next key frame, which look smeared
-    but come."""
+    only_whole: bool = True
+    """Leave out the frames between a damaged or lost one and the next key frame: they look smeared.
+    False only for people who watch; nothing should fly by such pictures."""
 
 
 def tello_settings(robot: RobotConfig) -> TelloSettings:
