@@ -254,6 +254,48 @@ def test_places_of_the_local_frame_are_found_on_the_globe(
     assert across * abs(found[1][0] - exact[1]) < 0.2
 
 
+@pytest.mark.parametrize("home", [-179.9995, 179.9995, 180.0, -180.0])
+def test_ground_on_both_sides_of_the_180th_meridian_is_known(tmp_path: Path, home: float) -> None:
+    """West of -179.9995 lies 179.9999; a slope to the east has no seam there."""
+
+    def slope(latitudes: Array, longitudes: Array) -> Array:
+        return 500.0 + 12_000.0 * (longitudes % 360.0 - 180.0) + 0.0 * latitudes
+
+    tiles = [hgt(tmp_path, "S17E179", slope), hgt(tmp_path, "S17W180", slope)]
+    origin = GeodeticOrigin(-16.5, home)
+    for order in (tiles, tiles[::-1]):
+        terrain = Terrain.open(order)
+        ground = Ground(terrain, origin, np.zeros(3), 1000.0)
+        assert ground.unknown() is None
+        for east in (-900.0, -150.0, 0.0, 150.0, 900.0):
+            rise = 12_000.0 * east / (111_320.0 * math.cos(math.radians(16.5)))
+            assert ground.height(east, 20.0) == pytest.approx(rise, abs=2.0)
+            _, longitude, _ = origin.to_geodetic(np.array([east, 20.0, 0.0]))
+            assert terrain.height(-16.5, longitude) == pytest.approx(
+                ground.sea_level + rise, abs=2.0
+            )
+
+
+def test_ground_beyond_the_180th_meridian_that_no_file_has_is_told_by_its_longitude(
+    tmp_path: Path,
+) -> None:
+    """As maps write it."""
+    terrain = Terrain.open([hgt(tmp_path, "S17W180", lambda y, x: 50.0 + 0 * y * x)])
+    ground = Ground(terrain, GeodeticOrigin(-16.5, -179.9995), np.zeros(3), 1000.0)
+    assert math.isnan(ground.height(-150.0, 0.0))
+    assert "-16.50000, 179.99910 is not known" in ground.why_unknown(-150.0, 0.0)
+
+
+def test_a_file_of_the_whole_globe_has_no_edge(tmp_path: Path) -> None:
+    """Its first and last columns are neighbours."""
+    samples = np.tile(np.arange(360.0, dtype=np.float32)[None], (180, 1))
+    terrain = Terrain.open([write_geotiff(tmp_path / "globe.tif", samples, 90.0, -180.0, 1.0)])
+    assert terrain.height(0.0, -179.5) == pytest.approx(0.0)
+    assert terrain.height(0.0, 179.5) == pytest.approx(359.0)
+    assert terrain.height(0.0, 180.0) == pytest.approx(179.5)
+    assert terrain.height(0.0, -180.0) == pytest.approx(179.5)
+
+
 def test_heights_are_differences_from_the_ground_of_the_take_off(tmp_path: Path) -> None:
     """So that a terrain that is too high everywhere, or on another datum, does no harm."""
     raised = hgt(tmp_path, "N47E008", lambda y, x: hilly(y, x) + 47.0)
