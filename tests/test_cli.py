@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -257,17 +258,61 @@ def test_a_plug_in_that_there_is_not(aerodaas: Commands, case: str) -> None:
         ("x = (\n", "app.py:1: '(' was never closed"),
         ("import nonsense_module\n", "No module named 'nonsense_module'\n  at app.py:1: import"),
         (HOP + "{}['far']\n", "KeyError: 'far'\n  at app.py:11: {}['far']"),
-        (HOP, ""),
     ],
-    ids=["syntax", "import", "exception", "nothing flown"],
+    ids=["syntax", "import", "exception"],
 )
 def test_an_application_of_its_own_mistakes(aerodaas: Commands, app: str, message: str) -> None:
-    """A failure of the application is told by its own line and ends with 1."""
-    if app is HOP:
-        app += "import sys\nsys.exit(1)\n"
+    """A failure of the application is told by its own line."""
     ended = aerodaas.run(app)
     assert message in ended.said
+    assert ended.code
+
+
+def test_a_mission_that_was_not_completed_has_failed(aerodaas: Commands) -> None:
+    """However safely the drone came home; the reason and what is left are told."""
+    app = HOP.replace("2, 0, 2)", "2, 0, 2, 120)")
+    ended = aerodaas.run(app + FLY, "--set", "drone.battery=0.28")
+    assert "drone: the mission was not completed: " in ended.said
+    assert "battery" in ended.said
     assert ended.code == 1
+    assert (aerodaas.folder / "out" / "summary.txt").exists()
+
+
+@pytest.mark.parametrize("command", ["run", "check", "graph", "compile"])
+@pytest.mark.parametrize("app", [HOP, HOP.replace("\nenv", "\ndef build():\n  return 1\nenv")])
+def test_a_mission_that_is_never_started_is_told(
+    aerodaas: Commands, command: str, app: str
+) -> None:
+    """With the line of the environment that was to fly."""
+    aerodaas.write("app.py", app)
+    ended = aerodaas(command, "app.py")
+    assert "start_mission()" in ended.said
+    assert re.search(r"at app.py:\d+: env = Environment", ended.said)
+    assert ended.code == 2
+
+
+def test_an_application_may_read_an_environment_and_fly_another(aerodaas: Commands) -> None:
+    """One that starts is enough, and a file that flies nothing by intention makes none."""
+    aerodaas.write(
+        "app.py", 'from aerodaas import *\nEnvironment("environment.json")\n' + HOP + FLY
+    )
+    assert aerodaas("graph", "app.py").code == 0
+    aerodaas.write("app.py", "print('hello')")
+    assert aerodaas("run", "app.py").code == 0
+
+
+def test_an_analysis_that_analyses_nothing_is_told(aerodaas: Commands) -> None:
+    """With the line that deploys it: by the check, which it fails, and in flight."""
+    forgotten = "watch = MonitoringAnalytics(['height']).deploy(edge)\n"
+    aerodaas.write("app.py", HOP + forgotten + FLY)
+    ended = aerodaas("check", "app.py")
+    assert ended.code == 1
+    told = " ".join(ended.out.split())
+    assert "analyse()" in told
+    assert f"app.py:11: {forgotten.strip()}" in told
+    aerodaas.write("app.py", HOP + forgotten + "watch.analyse(odometry)\n" + FLY)
+    ended = aerodaas("check", "app.py")
+    assert ended.code == 0, ended.out
 
 
 def test_nothing_navigates(aerodaas: Commands) -> None:
@@ -309,7 +354,7 @@ def test_a_recording_is_not_overwritten(aerodaas: Commands) -> None:
     not_overwritten(aerodaas)
     ended = aerodaas.run(HOP + FLY)
     assert "already exists and is not overwritten; give --record another path" in ended.said
-    assert ended.code == 1
+    assert ended.code == 2
     assert (aerodaas.folder / "out" / "flight.mcap").read_text() == "precious"
 
 

@@ -123,6 +123,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     _graph: Graph | None = None
     _compute: str | None = None
     _here: bool = False
+    _took_item: bool = False
     _runtime_env: RuntimeEnvConfig | None = None
     _triggers: tuple[Trigger, ...] = ()
 
@@ -179,6 +180,8 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
         self._here = isinstance(compute, Here)
         self._compute = None if self._here else compute.get_compute_id()
         self._graph = getattr(compute, "graph", None)
+        if self._graph is not None:
+            self._graph.note_deployed(self)
         if runtime_env is not None:
             self._runtime_env = as_runtime_env(runtime_env, f"{type(self).__name__}.deploy")
         if self.node is not None:
@@ -226,6 +229,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             raise GraphError(message)
         item = data.get_data()
         self._prepare_for(type(item))
+        self._took_item = True
         return AeroData(process_item(self, item))
 
     def _prepare_for(self, item: type) -> None:
@@ -311,6 +315,11 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             self.node.triggers.append(trigger)
         self._triggers = (*self._triggers, trigger)
         return self
+
+    @property
+    def analyses(self) -> bool:
+        """Whether it was given a stream or an item, or instantiated."""
+        return self.node is not None or self._took_item
 
     @property
     def deployed_here(self) -> bool:

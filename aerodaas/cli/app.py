@@ -28,6 +28,7 @@ from aerodaas.cli.serve import serve
 from aerodaas.cli.shipped import find_application
 from aerodaas.cli.view import view
 from aerodaas.config.options import RunOptions
+from aerodaas.environment.signals import heed_interrupts
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["app", "main", "run_typer"]
@@ -333,6 +334,7 @@ app.command(
 
 def main() -> None:
     """Run the command line."""
+    heed_interrupts()
     run_typer(app)
 
 

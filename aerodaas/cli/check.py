@@ -116,6 +116,8 @@ def examine_application(
     analyses = [node for node in graph.nodes.values() if node.kind != "sensor"]
     yield Finding("graph", f"analyses: {len(analyses)}; navigated: {flying}")
     yield _portable(environment, name)
+    for text in graph.unused:
+        yield Finding("graph", text, ok=False)
     for node in analyses:
         yield _tried(node.id, partial(_analysis, node))
     if connect and not provided:

@@ -24,6 +24,11 @@ class Failure:
     """Exit code: 2 where the user's input is wrong, 1 otherwise."""
 
 
+_WRONG_INPUT = 2
+_INPUT_ERRORS = (ImportError, FileNotFoundError, NotADirectoryError, IsADirectoryError)
+"""Of an application that cannot work, whatever happens in flight."""
+
+
 def failure_of(error: Exception) -> Failure:
     """Describe an exception, with the application's own line where it helps."""
     if isinstance(error, AeroDaaSError):
@@ -34,9 +39,10 @@ def failure_of(error: Exception) -> Failure:
         )
     if isinstance(error, SyntaxError):
         place = f"{error.filename}:{error.lineno}"
-        return Failure(f"{place}: {error.msg}: {(error.text or '').strip()}", 1)
+        return Failure(f"{place}: {error.msg}: {(error.text or '').strip()}", _WRONG_INPUT)
     line = _application_line(error)
-    return Failure(f"{type(error).__name__}: {error}" + (f"\n  at {line}" if line else ""), 1)
+    code = _WRONG_INPUT if isinstance(error, _INPUT_ERRORS) else 1
+    return Failure(f"{type(error).__name__}: {error}" + (f"\n  at {line}" if line else ""), code)
 
 
 def show_failure(failure: Failure) -> None:

@@ -145,8 +145,6 @@ def _simulate(family: Family, options: dict[str, object], run: Path | None, robo
         raise ConfigError(f"there is no application {run}")
     simulator = SitlProcess(family, SitlOptions(**options))  # type: ignore[arg-type]
     signal.signal(signal.SIGTERM, _interrupt)
-    # A shell starts what runs in its background with Ctrl-C ignored.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     code = 0
     with contextlib.suppress(KeyboardInterrupt), simulator:
         _tell(simulator, robot)

@@ -141,6 +141,7 @@ class Graph:
         self.navigation: list[NavigationEdge] = []
         self.calls: list[AnalysisCall] = []
         """What the application itself asked of analyses, in order."""
+        self._deployed: list[tuple[Any, str]] = []
         self._calling = False
         self.reader: Callable[[str], StreamReader[Any]] | None = None
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
@@ -168,6 +169,21 @@ class Graph:
             self._calling = outer
         if not outer:
             self.calls.append(AnalysisCall(work, stream))
+
+    def note_deployed(self, work: Any) -> None:  # noqa: ANN401 - an analysis
+        """Record that an analysis is deployed, with the application's line."""
+        self._deployed.append((work, application_line()))
+
+    @property
+    def unused(self) -> list[str]:
+        """A text with the line for each analysis that is deployed and analyses nothing."""
+        texts = [
+            f"{type(work).__name__} is deployed and analyses nothing: call analyse() or "
+            f"instantiate()\n  at {line}"
+            for work, line in self._deployed
+            if not work.analyses
+        ]
+        return list(dict.fromkeys(texts))
 
     @property
     def flying(self) -> bool:

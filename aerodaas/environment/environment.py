@@ -11,13 +11,13 @@ from aerodaas.actors.run.checks import check_environment, sensor_properties
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import load_plugin
-from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
+from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line, refusal
 from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.environment.actuators import require_actuators
 from aerodaas.environment.mission_run import MissionRun
-from aerodaas.environment.offering import Unflown, offer
+from aerodaas.environment.offering import Unflown, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
@@ -57,6 +57,8 @@ class Environment(PaperNames, IEnvironment):
     ) -> None:
         source = EnvironmentSource.find(path, overrides, token, current_options.get())
         self.path, self.provider = source.path, source.client
+        self.line = application_line()
+        """The application's line that made it, as `file:line: code`."""
         self.config: EnvironmentConfig = source.config
         self.guest_notes: list[GuestNote] = []
         """What the owner is to be told of guests once a recording is open."""
@@ -78,6 +80,7 @@ class Environment(PaperNames, IEnvironment):
         """The analytics scheduler as the application named it, if it did."""
         self._dispatch_with: AnalyticsScheduler | None = None
         self._compute: list[ComputeConfig] | None = None
+        note_built(self)
 
     def _repr_mimebundle_(self, **_: object) -> dict[str, str]:
         """The graph as JupyterLab draws it, after the last line of a cell."""
@@ -94,6 +97,11 @@ class Environment(PaperNames, IEnvironment):
         if self.unflown is not None:
             self.unflown.refuse()
         return self._mission if isinstance(self._mission, Run) else None
+
+    @property
+    def started(self) -> bool:
+        """Whether `start_mission()` was called, of an application that is only built as well."""
+        return self._flights > 0 or self.unflown is not None
 
     @property
     def unflown(self) -> Unflown | None:

@@ -7,9 +7,12 @@ starts, and what stands after that call does not run either.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import atexit
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from aerodaas.environment.mission_run import MissionRun
@@ -20,10 +23,22 @@ if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
-__all__ = ["BuildEndedError", "Unflown", "offer", "offered", "require_no_more", "the_only"]
+__all__ = [
+    "BuildEndedError",
+    "Unflown",
+    "note_built",
+    "offer",
+    "offered",
+    "require_no_more",
+    "require_started",
+    "the_only",
+]
 
 _offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=None)
 """Receiver of the environments that are ready; None where an application flies."""
+
+_built: ContextVar[list[Environment] | None] = ContextVar("built", default=None)
+"""Environments that the application's file has built; None in a process without one."""
 
 
 class BuildEndedError(BaseException):
@@ -47,6 +62,45 @@ def offered() -> Iterator[list[Environment]]:
             yield found
     finally:
         _offered.reset(token)
+
+
+def note_built(environment: Environment) -> None:
+    """Note an environment of the application's file; of a script, tell at its end if none flew."""
+    found = _built.get()
+    if found is None:
+        script = getattr(sys.modules["__main__"], "__file__", None)
+        if script is None or not environment.line.startswith(f"{Path(script).name}:"):
+            return
+        found = []
+        _built.set(found)
+        atexit.register(_tell_unstarted, found)
+    found.append(environment)
+
+
+@contextmanager
+def require_started() -> Iterator[None]:
+    """Raise GraphError, with the line, if an application builds environments and starts none."""
+    found: list[Environment] = []
+    token = _built.set(found)
+    try:
+        yield
+    finally:
+        _built.reset(token)
+    if text := _unstarted(found):
+        raise GraphError(text)
+
+
+def _unstarted(found: Sequence[Environment]) -> str:
+    if not found or any(environment.started for environment in found):
+        return ""
+    return f"it never called start_mission(), so nothing flies\n  at {found[0].line}"
+
+
+def _tell_unstarted(found: Sequence[Environment]) -> None:
+    text = _unstarted(found)
+    # A script that has raised an exception has told why it did not come so far.
+    if text and not hasattr(sys, "last_value"):
+        print(f"error: {text}", file=sys.stderr)  # noqa: T201 - a script has no other voice
 
 
 def offer(environment: Environment) -> Unflown | None:

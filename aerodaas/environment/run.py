@@ -29,6 +29,7 @@ from aerodaas.types.errors import (
     AeroDaaSError,
     ConfigError,
     GraphError,
+    IncompleteError,
     MissionError,
     RecordingError,
 )
@@ -148,6 +149,8 @@ class Run:
 
         for note in self._environment.guest_notes:
             flight.note(note.kind, note.text)
+        for text in self.graph.unused:
+            flight.note("unused", text)
         self.graph.reader = read
         self.graph.on_growth = self.grow
         for callback in self.graph.on_launch:
@@ -494,8 +497,14 @@ class Run:
             for name, robot in robots.items()
             if robot.status.state is MissionState.ABORTED
         ]
-        if problems:
-            raise MissionError("; ".join(dict.fromkeys(problems)))
+        unfinished = [
+            f"{name}: the mission was not completed: {robot.status.unfinished}"
+            for name, robot in robots.items()
+            if robot.status.state is MissionState.LANDED and robot.status.unfinished
+        ]
+        if problems or unfinished:
+            error = MissionError if problems else IncompleteError
+            raise error("; ".join(dict.fromkeys([*problems, *unfinished])))
 
 
 def _is_stepped(driver: str) -> bool:

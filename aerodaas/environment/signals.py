@@ -9,7 +9,13 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-__all__ = ["INTERRUPTED", "TerminatedError", "end_of_application", "raise_on_signals"]
+__all__ = [
+    "INTERRUPTED",
+    "TerminatedError",
+    "end_of_application",
+    "heed_interrupts",
+    "raise_on_signals",
+]
 
 INTERRUPTED = "interrupted from the keyboard"
 
@@ -27,17 +33,29 @@ class TerminatedError(SystemExit):
         self.reason = f"received {signal.Signals(number).name}"
 
 
+def heed_interrupts() -> None:
+    """Raise KeyboardInterrupt on SIGINT also where a shell started this process in a script.
+
+    A shell has what a script runs by `&` ignore SIGINT, and a drone is to land all the same.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def raise_on_signals() -> None:
     """Raise TerminatedError or KeyboardInterrupt in the main thread from now on.
 
-    Called elsewhere, it changes nothing; an application's own handler of Ctrl-C is kept. To be
-    called once Ray has started, for its own handlers end the process at once.
+    Called elsewhere, it changes nothing; an application's own handler of Ctrl-C is kept, and so is
+    nohup's order to outlive the terminal. To be called once Ray has started, for its own handlers
+    end the process at once.
     """
     global _reason  # noqa: PLW0603 - a signal is sent to the whole process
     _reason = ""
     if threading.current_thread() is threading.main_thread():
+        heed_interrupts()
         for number in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, _terminate)
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, _terminate)
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, _interrupt)
 

@@ -145,6 +145,7 @@ class Mission:
         self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)
         self._manual = ManualControl()
         self._paused = False
+        self._unfinished = ""
         self._last: VehicleState | None = None
         self._now = 0
         self._turned_at = 0
@@ -192,6 +193,7 @@ class Mission:
             self._manual.operator(self._now),
             self._forecast.outlook(self._now),
             (len(self.photographer.photos), self.photographer.lost),
+            self._unfinished,
         )
 
     def handle(self, command: Command, now: int) -> Answer:
@@ -309,7 +311,7 @@ class Mission:
             asked = state is MissionState.LANDING
             return Answer(accepted=asked, text="the drone is already landing")
         else:
-            self._to(state, reason)
+            self._to(state, reason, commanded=True)
         return DONE
 
     def update(self, state: VehicleState, now: int, objections: Sequence[str] = ()) -> Action:
@@ -522,7 +524,9 @@ class Mission:
         if phase is LegPhase.DONE:
             self._log.visit(stop.id)
         else:
-            self._log.give_up(self._now, stop.id, unreachable(stop, phase, self._last, self.limits))
+            why = unreachable(stop, phase, self._last, self.limits)
+            self._log.give_up(self._now, stop.id, why)
+            self._unfinished = self._unfinished or why
         self._navigator.finish(stop)
 
     def _follow(self, live: LiveCommand, state: VehicleState) -> Action:
@@ -591,10 +595,21 @@ class Mission:
         grounded = self.state is MissionState.PREFLIGHT
         self._forecast.update(self._now, state, self._navigator.queue, grounded=grounded)
 
-    def _to(self, state: MissionState, reason: str = "") -> None:
+    def _to(self, state: MissionState, reason: str = "", *, commanded: bool = False) -> None:
         if state not in HANDED_OVER:
             self.take_back(reason or state.value)
+        if state in _LEAVING and self.state not in _LEAVING and not commanded:
+            self._note_unfinished(reason)
         self._machine.to(state, self._now, reason)
         self.actuation.turn(self._now, home=self.finished or state in _LEAVING)
         if self.finished:
             self.photographer.end(self._now)
+
+    def _note_unfinished(self, reason: str) -> None:
+        """Record why the drone leaves, if it does so with waypoints ahead or in its take-off."""
+        ahead = len(self._navigator.queue)
+        if ahead:
+            waypoints = "1 waypoint" if ahead == 1 else f"{ahead} waypoints"
+            self._unfinished = f"{reason}, with {waypoints} left"
+        elif self.state is MissionState.TAKING_OFF:
+            self._unfinished = reason

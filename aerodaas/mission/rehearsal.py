@@ -19,7 +19,7 @@ from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import ConfigError, MissionError
+from aerodaas.types.errors import ConfigError, InvalidWaypointError
 from aerodaas.types.geometry import Vector
 from aerodaas.types.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 
@@ -30,11 +30,16 @@ _ENDLESS = 1e6
 
 
 def give(robot: str, commands: Iterable[Command], handle: Callable[[Command], Answer]) -> None:
-    """Hand `commands` to a robot's mission; raises MissionError for the first one refused."""
+    """Hand `commands` to a robot's mission.
+
+    Raises InvalidWaypointError for the first one refused.
+    """
     for command in commands:
         answer = handle(command)
         if not answer.accepted or answer.refused:
-            raise MissionError(f"{robot}: {answer.text or '; '.join(answer.refused.values())}")
+            raise InvalidWaypointError(
+                f"{robot}: {answer.text or '; '.join(answer.refused.values())}"
+            )
 
 
 def rehearse(
@@ -43,10 +48,11 @@ def rehearse(
     environment: EnvironmentConfig,
     scheduler: TrajectoryScheduler,
 ) -> None:
-    """Raise MissionError for navigation that the mission would refuse or the battery cannot cover.
+    """Refuse navigation that the mission would refuse, or that the battery cannot cover.
 
     A real vehicle may stand elsewhere than the environment says: whether waypoints relative to it
-    lie within the fence is checked by its actor. Raises ConfigError for an invalid fence.
+    lie within the fence is checked by its actor. Raises InvalidWaypointError, and ConfigError for
+    an invalid fence.
     """
     commands = list(commands)
     home = environment.home
@@ -83,7 +89,8 @@ def rehearse(
         back = min(limits.cruise_speed, limits.max_speed)
         needed = model.leg(takeoff, place, speed) + model.way_home(place, takeoff, back)
         if needed > 1.0 - limits.battery_land:
-            raise MissionError(f"{robot.id}: waypoint {waypoint.id!r}: {_too_far(needed, limits)}")
+            text = _too_far(needed, limits)
+            raise InvalidWaypointError(f"{robot.id}: waypoint {waypoint.id!r}: {text}")
 
 
 def _too_far(needed: float, limits: LimitsConfig) -> str:

@@ -18,6 +18,7 @@ __all__ = [
     "EndpointError",
     "GoesOnError",
     "GraphError",
+    "IncompleteError",
     "InvalidWaypointError",
     "MissionError",
     "ModelError",
@@ -25,6 +26,7 @@ __all__ = [
     "SchedulerError",
     "SourceError",
     "UnknownIdError",
+    "UnreachableError",
     "VehicleError",
     "failure_line",
 ]
@@ -112,6 +114,12 @@ class SourceError(AeroDaaSError):
     exit_code = 2
 
 
+class UnreachableError(SourceError):
+    """A service does not answer."""
+
+    exit_code = 1
+
+
 class ClockError(AeroDaaSError):
     """Simulated time stopped advancing because a participant no longer answers."""
 
@@ -124,12 +132,18 @@ class MissionError(AeroDaaSError):
     """A mission failed in flight; the drone was held, returned or landed before this was raised."""
 
 
+class IncompleteError(MissionError):
+    """A mission ended safely before its plan was flown."""
+
+
 class EndpointError(AeroDaaSError):
     """An inference endpoint did not answer in time, or not as agreed."""
 
 
 class RecordingError(AeroDaaSError):
     """A recording cannot be written or read."""
+
+    exit_code = 2
 
 
 def failure_line(error: BaseException) -> str:

@@ -109,6 +109,8 @@ class MissionStatus:
     and where charge or place is not known."""
     photos: tuple[int, int] = (0, 0)
     """How many pictures were taken, and how many that waypoints asked for were not."""
+    unfinished: str = ""
+    """What ended the mission before its plan was flown; empty if nothing did, or a command."""
 
     @property
     def progress(self) -> float:

@@ -23,11 +23,11 @@ from aerodaas.recording.report.flight import RecordedFlight
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 _ROOT = Path(__file__).resolve().parents[2]
-# A shell starts what runs in its background with Ctrl-C ignored.
+# A shell starts what a script runs in its background with Ctrl-C ignored.
 _MAIN = """
 import signal
 from aerodaas.cli.app import main
-signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGINT, signal.SIG_IGN)
 main()
 """
 _APP = """

@@ -122,7 +122,8 @@ def test_a_person_who_never_comes_is_waited_for_in_vain(flyer: Flyer) -> None:
 def test_a_battery_too_small_for_the_mission_brings_it_home(flyer: Flyer) -> None:
     """It says beforehand that the plan is too long, flies what it can, and returns in time."""
     battery = {"quadrotor_base.battery": 0.3, "quadrotor_base.limits.battery_return": 0.27}
-    fly(flyer, "farm_survey", battery)
+    with pytest.raises(MissionError, match="not completed: the battery is low"):
+        fly(flyer, "farm_survey", battery)
     robot, report = outcome(flyer)
     assert 0 < len(robot.visited) < 4
     assert "battery" in robot.outcome

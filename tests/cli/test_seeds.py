@@ -24,11 +24,11 @@ from aerodaas.cli.seeds.runs import SeededRun
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
-# A shell starts what runs in its background with Ctrl-C ignored.
+# A shell starts what a script runs in its background with Ctrl-C ignored.
 _MAIN = """
 import signal
 from aerodaas.cli.app import main
-signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGINT, signal.SIG_IGN)
 main()
 """
 HOP = """

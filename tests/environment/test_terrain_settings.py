@@ -16,7 +16,7 @@ from aerodaas.environment.fleet import shared_waypoints
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.mission.rehearsal import rehearse
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.errors import ConfigError, InvalidWaypointError, MissionError
+from aerodaas.types.errors import ConfigError, InvalidWaypointError
 
 HOME = {"latitude": 47.5, "longitude": 8.5, "altitude": 590.0}
 HIGH: dict[str, Any] = {"limits": {"takeoff_height": 10.0}}
@@ -73,13 +73,13 @@ def test_heights_that_cannot_be_flown_are_told_before_anything_starts(
     plain_file: Path, waypoint: Waypoint, why: str
 ) -> None:
     """With waypoint, reason and remedy."""
-    with pytest.raises(MissionError, match=why):
+    with pytest.raises(InvalidWaypointError, match=why):
         _rehearsed(_environment(plain_file), waypoint)
 
 
 def test_a_height_above_ground_needs_a_terrain() -> None:
     """None is guessed to be flat."""
-    with pytest.raises(MissionError, match="the environment file names no terrain"):
+    with pytest.raises(InvalidWaypointError, match="the environment file names no terrain"):
         _rehearsed(_environment(None), Waypoint("a", 9, 0, 30, above="ground"))
 
 
@@ -103,7 +103,7 @@ def test_what_only_the_vehicle_or_its_node_knows_is_left_to_them() -> None:
         Waypoint("a", 9, 0, 560, above="sea", waypoint_type="local"),
         Waypoint("b", 9, 0, 12, above="ground", waypoint_type="local"),
     )
-    with pytest.raises(MissionError, match="beyond the range"):
+    with pytest.raises(InvalidWaypointError, match="beyond the range"):
         _rehearsed(
             environment,
             Waypoint("a", 9, 0, 560, above="sea", waypoint_type="local"),

@@ -9,7 +9,7 @@ import pytest
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import AeroNavigation, Environment, VelocityCommand, Waypoint
-from aerodaas.types.errors import MissionError
+from aerodaas.types.errors import InvalidWaypointError, MissionError
 
 
 def test_two_drones_keep_their_distance(flyer: Flyer) -> None:
@@ -89,5 +89,5 @@ def test_bad_plans_are_refused_before_the_start(
     def build(env: Environment) -> None:
         env.get_robot_by_id("drone").navigate(waypoints)
 
-    with pytest.raises(MissionError, match=reason):
+    with pytest.raises(InvalidWaypointError, match=reason):
         flyer.fly(build, {**FLAT, "robots": [drone]})

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aerodaas.config.extras import require_extra
-from aerodaas.types.errors import ConfigError, MissionError, SourceError
+from aerodaas.types.errors import ConfigError, MissionError, SourceError, UnreachableError
 
 __all__ = ["TOKEN_VARIABLE", "RemoteClient"]
 
@@ -85,7 +85,7 @@ class RemoteClient:
                 for text in socket:
                     yield json.loads(text)
         except ConnectionClosed as error:
-            raise SourceError(f"the remote control broke off: {error}") from None
+            raise UnreachableError(f"the remote control broke off: {error}") from None
         except InvalidHandshake as error:
             raise SourceError(f"the remote control refuses: {error}; is the token right?") from None
         except OSError as error:
@@ -112,8 +112,8 @@ class RemoteClient:
         finally:
             connection.close()
 
-    def _unreachable(self, error: Exception) -> SourceError:
-        return SourceError(
+    def _unreachable(self, error: Exception) -> UnreachableError:
+        return UnreachableError(
             f"no remote control answers at {self._host}:{self._port} "
             f"({error or type(error).__name__}): "
             "is the mission flying, and does it use RemoteAnalytics?"

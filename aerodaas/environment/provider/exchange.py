@@ -14,7 +14,7 @@ from urllib3.exceptions import HTTPError, MaxRetryError
 
 from aerodaas.config.printable import printable
 from aerodaas.environment.provider.address import ServiceAddress
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, SourceError
+from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
 
 __all__ = ["Exchange", "Method", "printed"]
 
@@ -74,7 +74,7 @@ class Exchange:
             ConfigError: With the service's text, for a request that it refuses as such.
             MissionError: With the service's text, for one that it cannot fulfil now, and for an
                 answer that is no JSON.
-            SourceError: If the service cannot be reached, or does not answer in time.
+            UnreachableError: If the service cannot be reached, or does not answer in time.
         """
         data = None if content is None else json.dumps(content).encode()
         own = {"Content-Type": "application/json", **(headers or {})}
@@ -121,7 +121,7 @@ class Exchange:
             progress: Called with the bytes that are there, and all of them if that is known.
 
         Raises:
-            AeroDaaSError: As `ask`; SourceError also if the answer breaks off.
+            AeroDaaSError: As `ask`; UnreachableError also if the answer breaks off.
             OSError: If the file cannot be written.
         """
         with self._answer("GET", path, None, self.headers) as response:
@@ -141,11 +141,11 @@ class Exchange:
             finally:
                 part.unlink(missing_ok=True)
 
-    def unreachable(self, error: Exception) -> SourceError:
+    def unreachable(self, error: Exception) -> UnreachableError:
         """The error of a service that does not answer."""
         inner = error.reason if isinstance(error, MaxRetryError) and error.reason else error
         text = printable(str(inner))[:_MOST_TEXT] or type(inner).__name__
-        return SourceError(f"the provider at {self.address.base} does not answer: {text}")
+        return UnreachableError(f"the provider at {self.address.base} does not answer: {text}")
 
     def strange(self, why: str) -> MissionError:
         """The error of a service that answers otherwise than agreed."""

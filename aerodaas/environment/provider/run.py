@@ -102,6 +102,8 @@ class ProvidedRun:
 
         self._require_possible()
         written = self._written()
+        for text in self.graph.unused:
+            self._say(text)
         raise_on_signals()
         with StartupView(self.options) as starting:
             mission = submit(

@@ -10,7 +10,7 @@ from aerodaas.config.options import RunOptions
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.protocol.schemas import MissionIn, MissionOut
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.types.errors import ConfigError, UnreachableError
 
 __all__ = ["submit"]
 
@@ -34,7 +34,7 @@ def submit(
     Raises:
         ConfigError: For a model that cannot be read, and for what the provider refuses.
         MissionError: For what it cannot fulfil now.
-        SourceError: If it does not answer.
+        UnreachableError: If it does not answer.
     """
     for sha256, path in models.items():
         if not client.has_model(sha256):
@@ -43,8 +43,8 @@ def submit(
     step("submitting")
     try:
         return client.submit(_order(document, options))
-    except SourceError as error:
-        raise SourceError(
+    except UnreachableError as error:
+        raise UnreachableError(
             f"{error}; the mission may have been taken in all the same: `aerodaas missions` tells"
         ) from None
 

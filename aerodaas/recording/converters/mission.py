@@ -34,6 +34,7 @@ MISSION = json_schema(
     outlook={},
     photos="array",
     pilot="string",
+    unfinished="string",
 )
 NAVIGATION = json_schema(
     "Navigation",
@@ -76,6 +77,7 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
         "outlook": item.outlook,
         "photos": item.photos,
         "pilot": item.pilot,
+        "unfinished": item.unfinished,
     }
     yield Entry(topic(stream, "mission"), MISSION, json_bytes(value), item.stamp)
     if session.changed("state", stream, item.state):

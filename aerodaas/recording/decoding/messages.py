@@ -145,6 +145,7 @@ class _MissionStatus(TypedDict):
     distance: Number
     outlook: NotRequired[_Outlook | None]
     pilot: NotRequired[Word]
+    unfinished: NotRequired[Text]
 
 
 @with_config(_OPEN)

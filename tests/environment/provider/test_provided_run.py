@@ -27,6 +27,7 @@ from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 from aerodaas.types.errors import (
     ConfigError,
     GraphError,
+    InvalidWaypointError,
     MissionError,
     RecordingError,
     SourceError,
@@ -83,7 +84,7 @@ def test_the_catalogue_is_the_environment(stub: Stub) -> None:
         environment.get_robot_by_id("dron")
     far = environment.get_robot_by_id("drone")
     far.navigate(hop((500, 0)))
-    with pytest.raises(MissionError, match="fence"):
+    with pytest.raises(InvalidWaypointError, match="fence"):
         far.start_mission()
     assert stub.sent("POST", "/v1/missions") == []
 
