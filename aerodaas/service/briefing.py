@@ -142,6 +142,7 @@ class Briefing:
             lease=lease,
             fleet=self._settings.fleet,
             robots=list(mission.robots),
+            locks=self._settings.locks,
             ends=time.time() + 60.0 * minutes if ends is None else ends,
             minutes=minutes if granted is None else granted.minutes,
             limits=TenantLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import secrets
 import threading
@@ -33,6 +32,7 @@ from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.garage import OUT_OF_SERVICE, Garage
 from aerodaas.service.idempotency import fingerprint
@@ -49,10 +49,9 @@ from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["MissionDesk"]
 
-_OPEN = frozenset(phase for phase in MissionPhase if not phase.over)
 _TURN_SECONDS = 0.1
 _MOST_SHOWN = 100
-"""Most missions of a list."""
+"""Most missions of a list that are over: of one's own, and of those that others share."""
 
 
 class MissionDesk:
@@ -82,6 +81,8 @@ class MissionDesk:
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._trouble = TroubleLog(logging.getLogger(__name__))
+        self._robot_locks = RobotLocks(settings.locks)
+        self._robots = [robot.id for robot in settings.config.robots]
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
@@ -89,8 +90,12 @@ class MissionDesk:
         bookings.flying = self._busy
         bookings.on_end.append(self._tell_flights)
         bookings.on_extension.append(self._tell_flights)
-        for row in store.missions.all(phases=_OPEN):
+        self._in_flight: dict[str, ActiveMission] = {}
+        """Those of them that fly."""
+        for row in store.missions.open():
             self._missions[row.id] = self._active(row)
+            if row.phase is MissionPhase.FLYING:
+                self._in_flight[row.id] = self._missions[row.id]
 
     def start(self) -> None:
         """Move missions on from now on, in a thread of its own."""
@@ -115,6 +120,7 @@ class MissionDesk:
         known = self._submitted(principal, wanted, key)
         if known is not None:
             return known
+        self._require_open(principal.tenant)
         require_room(self._settings.state)
         attached = wanted.attach is not None
         robots = self._briefing.check(principal, wanted.document, attached=attached)
@@ -147,13 +153,24 @@ class MissionDesk:
         mission.write(wanted.document)
         with self._lock:
             # The same submission may have been sent twice at once.
-            known = self._submitted(principal, wanted, key)
-            if known is not None:
-                mission.discard()
-                return known
-            self._store.missions.add(row)
-            self._missions[row.id] = mission
-        return shown(mission)
+            try:
+                known = self._submitted(principal, wanted, key)
+                if known is None:
+                    self._require_open(principal.tenant)
+                    self._store.missions.add(row)
+                    self._missions[row.id] = mission
+            finally:
+                if row.id not in self._missions:
+                    mission.discard()
+        return known or shown(mission)
+
+    def _require_open(self, tenant: str) -> None:
+        """Raise RefusedError for a tenant with as many missions that are not over as it may."""
+        most = self._settings.most_open
+        if sum(one.row.tenant == tenant for one in list(self._missions.values())) >= most:
+            raise RefusedError(
+                429, f"{tenant} has {most} missions that are not over: wait for one, or cancel some"
+            )
 
     def _submitted(
         self, principal: Principal, wanted: MissionIn, key: str | None
@@ -189,7 +206,8 @@ class MissionDesk:
                 one.end_rehearsal()
                 self._end(one, MissionPhase.CANCELLED, reason)
                 return shown(one)
-        one.follow().ask(do="end", reason=reason)
+            one.wait_for(reason)
+        one.cancel_flight(reason)
         return shown(one)
 
     def command(self, principal: Principal, mission: str, command: CommandIn) -> AnswerOut:
@@ -265,10 +283,21 @@ class MissionDesk:
         return SceneryOut.of(self._settings.config, seed)
 
     def missions(self, principal: Principal) -> list[MissionOut]:
-        """The newest missions that this account may see, newest first."""
-        rows = self._store.missions.all()
-        seen = (row for row in rows if sees(principal, row.tenant, row.request.get("share", ())))
-        return [self._with_news(row) for row in itertools.islice(seen, _MOST_SHOWN)]
+        """Missions that this account may see, newest first: all that go on, and the newest."""
+        table = self._store.missions
+        if principal.role.reaches(Role.OPERATOR):
+            rows = table.newest(_MOST_SHOWN)
+        else:
+            rows = table.newest(_MOST_SHOWN, principal.tenant)
+            rows += table.newest_shared(_MOST_SHOWN, principal.tenant)
+        found = {
+            row.id: row for row in (*rows, *(one.row for one in list(self._missions.values())))
+        }
+        return [
+            self._with_news(row)
+            for row in sorted(found.values(), key=lambda row: row.submitted, reverse=True)
+            if sees(principal, row.tenant, row.request.get("share", ()))
+        ]
 
     def shown(self, mission: str) -> MissionOut:
         """A mission, whoever asks."""
@@ -377,6 +406,7 @@ class MissionDesk:
                 if one.over:
                     one.close()
                     del self._missions[one.row.id]
+                    self._in_flight.pop(one.row.id, None)
                     self._texts.pop(one.row.id, None)
             self._have_watched()
 
@@ -460,6 +490,7 @@ class MissionDesk:
     def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
         one.brief(order, self._models)
         one.to(MissionPhase.FLYING, started=time.time())
+        self._in_flight[one.row.id] = one
         self._garage.hand(one.row.robots, LinkState.MISSION)
         one.take_off()
 
@@ -483,20 +514,29 @@ class MissionDesk:
 
     def _has_place(self, wanted: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
-        free = self._busy().isdisjoint(wanted.row.robots)
-        return len(self._flying()) < self._settings.most_flights and free
+        busy = self._flown_robots() | self._robot_locks.held(wanted.row.robots)
+        full = len(self._flying()) >= self._settings.most_flights
+        if taken := sorted(busy.intersection(wanted.row.robots)):
+            wanted.wait_for(f"waits for {', '.join(taken)}: in another flight")
+        elif full:
+            wanted.wait_for(f"waits for the end of one of {self._settings.most_flights} flights")
+        return not (taken or full)
 
     def _busy(self) -> set[str]:
-        """Robots in flight."""
+        """Robots in flight, also by a process of which the database says nothing."""
+        return self._flown_robots() | self._robot_locks.held(self._robots)
+
+    def _flown_robots(self) -> set[str]:
         return {robot for one in self._flying() for robot in one.row.robots}
 
     def _flying(self) -> list[ActiveMission]:
-        missions = list(self._missions.values())
+        missions = list(self._in_flight.values())
         return [one for one in missions if one.phase is MissionPhase.FLYING]
 
     def _watch(self, one: ActiveMission) -> None:
         # After a restart: a flight whose order was written may not have begun.
         one.take_off()
+        one.wait_for(one.flight.cancelled)
         link = one.follow()
         self._garage.note(link.news.status, link.news.preflight)
         if one.attached_to is not None:
@@ -520,7 +560,8 @@ class MissionDesk:
         self._garage.hand(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
-        if outcome.landed and outcome.reason.startswith(CANCELLED_BY):
+        # One that was called home before its take-off has been aborted by that.
+        if CANCELLED_BY in outcome.reason:
             phase = MissionPhase.CANCELLED
         reason = outcome.reason
         if up := [name for name, last in outcome.status.items() if _may_fly(last)]:
@@ -544,7 +585,8 @@ class MissionDesk:
 
     def _one(self, mission: str) -> ActiveMission:
         one = self._missions.get(mission)
-        if one is None:
+        # One that is over stays among them until the next turn.
+        if one is None or one.over:
             phase = self.shown(mission).phase.value
             raise RefusedError(409, f"{mission} is over: {phase}")
         return one

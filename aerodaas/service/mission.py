@@ -57,6 +57,8 @@ class ActiveMission:
         self._linking = threading.Lock()
         self.version = 0
         """Counts the changes."""
+        self.waits_for = ""
+        """What it waits for in its phase, in words; empty if that is the reason of its row."""
         self.handing_over = False
         """Whether the monitor is to let go of its drones, for it flies next."""
         self._save = save
@@ -102,12 +104,14 @@ class ActiveMission:
         row = replace(self.row, **changes)  # type: ignore[arg-type]
         self._save(row)
         self.row = row
+        self.waits_for = ""
         self.version += 1
 
     def wait_for(self, what: str) -> None:
-        """Tell what a queued mission waits for, if that is news."""
-        if what != self.row.reason:
-            self.change(reason=what)
+        """Tell what a mission in this phase waits for; the database need not know."""
+        if what != self.waits_for:
+            self.waits_for = what
+            self.version += 1
 
     @property
     def attached_to(self) -> str | None:
@@ -166,6 +170,22 @@ class ActiveMission:
         if self._flying is None and not self.flight.begun:
             own = self.attached_to is None
             self._flying = start_process(self.flight, tied=False, vehicles=own)
+
+    def cancel_flight(self, reason: str) -> None:
+        """Have the flight's process bring the drones home, also one that does not listen yet.
+
+        Raises AeroDaaSError if this could neither be told nor kept.
+        """
+        kept = False
+        # With the disk full there is still the socket.
+        with contextlib.suppress(OSError):
+            self.flight.cancel(reason)
+            kept = True
+        try:
+            self.follow().ask(do="end", reason=reason)
+        except MissionError:
+            if not kept:
+                raise
 
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
         document = self.document()

@@ -25,7 +25,7 @@ def shown(one: ActiveMission) -> MissionOut:
         tenant=row.tenant,
         account=row.account,
         phase=row.phase,
-        reason=row.reason,
+        reason=one.waits_for or row.reason,
         robots=list(row.robots),
         lease=row.lease,
         share=list(row.request.get("share", ())),

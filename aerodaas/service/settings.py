@@ -46,6 +46,8 @@ class ServiceSettings:
     """Actuators that a tenant may move, as `robot/actuator`; none for all others."""
     most_flights: int = 16
     """Most flights at once."""
+    most_open: int = 50
+    """Most missions of one tenant that are not over."""
 
     @property
     def models(self) -> Path:
@@ -56,6 +58,11 @@ class ServiceSettings:
     def edge_turns(self) -> Path:
         """Socket at which flights take turns on the edge."""
         return self.state / "edge"
+
+    @property
+    def locks(self) -> Path:
+        """Folder of the drones' locks."""
+        return self.state / "locks"
 
     @property
     def missions(self) -> Path:

@@ -31,12 +31,14 @@ from aerodaas.service.access import Principal, Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightNews
 from aerodaas.service.flights.order import Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
+from aerodaas.types.errors import MissionError
 
 PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
 
@@ -59,6 +61,7 @@ class Desk:
         path = folder / "fleet.json"
         path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
         self.started: list[Path] = []
+        self.processes: list[Process] = []
         monkeypatch.setattr(missions, "start_process", self._start)
         config = EnvironmentConfig.load(path)
         self.settings = ServiceSettings(path, config, folder / "s", **settings)
@@ -72,7 +75,8 @@ class Desk:
         assert vehicles is not tied, "a rehearsal is connected with no vehicle"
         assert tied == (folder.path.name == "r"), "a flight outlives the service, no rehearsal does"
         self.started.append(folder.path)
-        return Process()
+        self.processes.append(Process())
+        return self.processes[-1]
 
     def open(self) -> None:
         """Open the desk, as a service does when it starts."""
@@ -85,6 +89,12 @@ class Desk:
             garage=garage,
             models=ModelShelf(self.settings.models),
         )
+
+    def close(self) -> None:
+        """Leave flights to themselves: the stand-in of a rehearsal has no id to be killed by."""
+        if not self.settings.rehearse:
+            self.desk.close()
+        self.store.close()
 
     def submit(self, robot: str, key: str | None = None, **more: object) -> MissionOut:
         """Submit a mission for one drone."""
@@ -106,8 +116,7 @@ def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     """A desk that rehearses nothing."""
     made = Desk(tmp_path, monkeypatch, rehearse=False)
     yield made
-    made.desk.close()
-    made.store.close()
+    made.close()
 
 
 def test_what_one_mission_meets_is_its_own(one: Desk) -> None:
@@ -162,7 +171,7 @@ def test_one_key_is_one_mission_however_many_send_it_at_once(one: Desk) -> None:
     with ThreadPoolExecutor(8) as pool:
         ids = {found.id for found in pool.map(lambda _: one.submit("one", "k"), range(8))}
     assert len(ids) == 1
-    assert [row.id for row in one.store.missions.all()] == list(ids)
+    assert [row.id for row in one.store.missions.open()] == list(ids)
     assert {path.name for path in one.settings.missions.iterdir()} == ids
 
 
@@ -324,7 +333,7 @@ def test_so_is_a_flight_that_cannot_be_heard(
     assert said == [f"{mission.id}: unreadable", f"{mission.id}: goes on"]
 
 
-def _unreadable() -> None:
+def _unreadable(*_: object) -> None:
     raise OSError("unreadable")
 
 
@@ -365,3 +374,71 @@ def test_trees_stand_where_the_missions_own_seed_has_them(
     own, other = desk.submit("one", seed=3), desk.submit("two")
     assert desk.desk.scenery(PILOT, own.id) == SceneryOut.of(wooded, 3) != known
     assert desk.desk.scenery(PILOT, other.id) == known
+
+
+def test_a_cancellation_during_launch_is_kept(one: Desk) -> None:
+    """The flight's process does not listen yet: it finds it in its folder, whoever serves then."""
+    mission = one.submit("one")
+    one.turns()
+    assert one.phase(mission) is MissionPhase.FLYING
+    answer = one.desk.cancel(PILOT, mission.id)
+    assert (answer.phase, answer.reason) == (MissionPhase.FLYING, "cancelled by pilot")
+    one.desk.close()
+    one.open()
+    one.turns(1)
+    assert one.desk.shown(mission.id).reason == "cancelled by pilot"
+    flight = FlightFolder(one.started[-1])
+    assert flight.cancelled == "cancelled by pilot"
+    aborted = "one: aborted: cancelled by pilot before take-off"
+    flight.end(Outcome(landed=False, reason=aborted, began=0.0, ended=1.0))
+    one.processes[-1].ended = 0
+    one.turns(1)
+    assert one.phase(mission) is MissionPhase.CANCELLED
+
+
+@pytest.mark.parametrize("phase", [phase for phase in MissionPhase if not phase.over])
+def test_a_mission_is_cancelled_once_in_each_phase(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, phase: MissionPhase
+) -> None:
+    """The second time it is told as over, before and after the desk has moved on."""
+    early = {MissionPhase.SUBMITTED, MissionPhase.REHEARSING}
+    made = Desk(
+        tmp_path,
+        monkeypatch,
+        rehearse=phase in early,
+        approval=phase is MissionPhase.AWAITING_APPROVAL,
+        most_flights=0 if phase is MissionPhase.QUEUED else 1,
+    )
+    monkeypatch.setattr(missions.ActiveMission, "end_rehearsal", lambda _: None)
+    mission = made.submit("one")
+    made.turns(0 if phase is MissionPhase.SUBMITTED else 4)
+    assert made.phase(mission) is phase
+    found = made.desk.cancel(PILOT, mission.id)
+    assert found.reason == "cancelled by pilot"
+    if phase is MissionPhase.FLYING:
+        assert made.desk.cancel(PILOT, mission.id).phase is phase
+        FlightFolder(made.started[-1]).end(
+            Outcome(landed=True, reason=found.reason, began=0.0, ended=1.0)
+        )
+        made.processes[-1].ended = 0
+        made.turns(1)
+    assert made.phase(mission) is MissionPhase.CANCELLED
+    for _ in range(2):
+        with pytest.raises(RefusedError, match="over") as refused:
+            made.desk.cancel(PILOT, mission.id)
+        assert refused.value.status == 409
+        made.turns(1)
+    made.close()
+
+
+def test_a_cancellation_that_is_neither_kept_nor_heard_is_refused(
+    one: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a full disk, of a flight that does not listen: nobody may believe that it comes home."""
+    mission = one.submit("one")
+    one.turns()
+    monkeypatch.setattr(FlightFolder, "cancel", _unreadable)
+    with pytest.raises(MissionError, match="does not answer"):
+        one.desk.cancel(PILOT, mission.id)
+    one.turns(1)
+    assert one.desk.shown(mission.id).reason == ""

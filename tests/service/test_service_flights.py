@@ -170,6 +170,17 @@ def climb(controls: ClientConnection, until: float = 0.0) -> None:
         asked = True
 
 
+def test_a_flight_that_is_cancelled_while_it_is_launched_does_not_fly(provider: Served) -> None:
+    """Its process takes seconds to listen, and its drones more to take off."""
+    id_ = submitted(provider, "one", *FAR)
+    provider.until_phase(id_, "flying")
+    answer = provider.ask("DELETE", f"/v1/missions/{id_}")
+    assert answer["phase"] == "flying", answer
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "cancelled", ended["reason"]
+    assert ended["status"].get("one", {}).get("visited", []) == []
+
+
 def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> None:
     """They fly on meanwhile, and none is begun twice."""
     id_ = submitted(provider, "one", *FAR)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from aerodaas.config.private_file import write_private
+from aerodaas.service.flights.locks import exclusive, is_locked
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.unix_server import fits_a_socket
 from aerodaas.types.errors import MissionError
@@ -31,6 +31,7 @@ class FlightFolder:
         self.log = self.path / "log"
         self._begun = self.path / "begun"
         self._lock = self.path / "lock"
+        self._cancelled = self.path / "cancelled"
         self._outcome = self.path / "outcome.json"
 
     @property
@@ -61,27 +62,31 @@ class FlightFolder:
 
         Raises MissionError if it has been begun before, by this or any other process.
         """
-        with self._lock.open("w") as lock:
-            # The lock first: a flight that has begun and holds no lock was killed.
+        text = f"the flight in {self.path} has been begun before"
+        # The lock first: a flight that has begun and holds no lock was killed.
+        with exclusive(self._lock, text):
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._begun.touch(exist_ok=False, mode=0o600)
-            except (BlockingIOError, FileExistsError):
-                text = f"the flight in {self.path} has been begun before"
+            except FileExistsError:
                 raise MissionError(text) from None
             yield
 
     @property
     def flying(self) -> bool:
         """Whether a living process holds the flight's lock; a killed one holds none."""
+        return is_locked(self._lock)
+
+    def cancel(self, reason: str) -> None:
+        """Keep a cancellation for the flight's process, which may not listen yet."""
+        write_private(self._cancelled, reason)
+
+    @property
+    def cancelled(self) -> str:
+        """Why the flight is cancelled; empty if it is not."""
         try:
-            with self._lock.open("r") as lock:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except FileNotFoundError:
-            return False
-        except BlockingIOError:
-            return True
-        return False
+            return self._cancelled.read_text(encoding="utf-8")
+        except OSError:
+            return ""
 
     def end(self, outcome: Outcome) -> None:
         """Write how the flight ended."""

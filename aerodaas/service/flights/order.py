@@ -55,6 +55,8 @@ class FlightOrder(_Record):
     fleet: Path
     """The provider's environment file."""
     robots: list[str]
+    locks: Path
+    """Folder of the drones' locks, see `RobotLocks`."""
     ends: float
     """End of the lease, Unix seconds; after it the drones come home, whatever becomes of the
     service."""

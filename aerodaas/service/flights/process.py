@@ -35,6 +35,7 @@ from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.terrain.ground import Ground
@@ -53,14 +54,15 @@ _LOOK_SECONDS = 0.1
 def fly(path: Path) -> None:
     """Fly the order in the folder `path`; returns when it is over and its outcome is written.
 
-    Raises MissionError if this flight has been begun before.
+    Raises MissionError if this flight has been begun before, or another process flies a drone of
+    its order.
     """
     folder = FlightFolder(path)
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
     if order.attached is not None:
         os.nice(_NICENESS)
-    with folder.claim():
+    with RobotLocks(order.locks).hold(order.robots), folder.claim():
         folder.end(Flying(folder, order).outcome())
 
 
@@ -81,7 +83,7 @@ class Flying:
         self._folder = folder
         self._order = order
         self._began = time.time()
-        self._lease = LeaseWatch(order, self._come_home)
+        self._lease = LeaseWatch(order, self._come_home, lambda: folder.cancelled)
         self._relay = HereRelay(folder.path / "here")
         self._run: Run | None = None
         self.config: EnvironmentConfig | None = None
@@ -145,10 +147,12 @@ class Flying:
             # The sockets answer from the first moment on: a launch takes seconds.
             self._relay.start()
             server.start()
-            self._await_user(document)
-            self._run = environment.launch()
             if not order.rehearsal:
                 self._lease.start()
+            self._await_user(document)
+            if self._lease.reason:
+                return
+            self._run = environment.launch()
             threading.Thread(target=self._look, args=(self._run,), daemon=True).start()
             self._run.wait()
         finally:
@@ -160,11 +164,16 @@ class Flying:
         """Wait for the user's side, if the document needs it; a rehearsal goes without."""
         if self._order.rehearsal:
             attach_absent_user(self._relay)
-        elif document.here and not self._relay.wait_attached(_USER_SECONDS):
-            raise MissionError(
-                f"{', '.join(document.here)} run at the user's side, which did not connect within "
-                f"{_USER_SECONDS:g} s"
-            )
+            return
+        until = time.monotonic() + _USER_SECONDS
+        while document.here and not self._relay.wait_attached(_LOOK_SECONDS):
+            if self._lease.reason:
+                return
+            if time.monotonic() > until:
+                raise MissionError(
+                    f"{', '.join(document.here)} run at the user's side, which did not connect "
+                    f"within {_USER_SECONDS:g} s"
+                )
 
     def _look(self, run: Run) -> None:
         """Keep the status up to date while the run goes on."""

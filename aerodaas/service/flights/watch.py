@@ -1,4 +1,4 @@
-"""End of a lease and silence of a user, kept by the flight's own process."""
+"""End of a lease, cancellation and silence of a user, kept by the flight's own process."""
 
 from __future__ import annotations
 
@@ -16,15 +16,27 @@ _PERIOD = 0.2
 
 
 class LeaseWatch:
-    """Brings the drones home when their lease ends or their user is silent.
+    """Brings the drones home when their lease ends, their mission is cancelled or its user silent.
 
     It runs beside the drones, so that neither needs the service. Time is monotonic from the start
     on: a clock that is set in flight neither prolongs a lease nor ends it.
     """
 
-    def __init__(self, order: FlightOrder, come_home: Callable[[str], None]) -> None:
-        """Watch over a flight; `come_home` is called once, with the reason, in another thread."""
+    def __init__(
+        self,
+        order: FlightOrder,
+        come_home: Callable[[str], None],
+        cancelled: Callable[[], str] = lambda: "",
+    ) -> None:
+        """Watch over a flight.
+
+        Args:
+            order: Of the flight.
+            come_home: Called once, with the reason, in another thread.
+            cancelled: Tells why the mission is cancelled; empty while it is not.
+        """
         self._come_home = come_home
+        self._cancelled = cancelled
         self._silence = order.silence
         self._patience = order.silence_seconds
         self._lock = threading.Lock()
@@ -39,7 +51,10 @@ class LeaseWatch:
         return time.monotonic() + moment - time.time()
 
     def start(self) -> None:
-        """Start watching."""
+        """Start watching; what is due already is told before this returns."""
+        if reason := self._due():
+            self.end(reason)
+            return
         threading.Thread(target=self._watch, name="lease", daemon=True).start()
 
     def stop(self) -> None:
@@ -74,6 +89,8 @@ class LeaseWatch:
                 return
 
     def _due(self) -> str:
+        if cancelled := self._cancelled():
+            return cancelled
         with self._lock:
             now = time.monotonic()
             if now >= self._ends:

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+import json
 from typing import Any
 
-from sqlalchemy import ColumnElement, bindparam, delete, func, insert, select, true
+from sqlalchemy import (
+    ColumnElement,
+    Text,
+    bindparam,
+    delete,
+    func,
+    insert,
+    select,
+    true,
+    type_coerce,
+)
 
 from aerodaas.protocol.schemas import LeaseState, MissionPhase
 from aerodaas.service.store import tables
@@ -34,8 +44,6 @@ __all__ = [
     "Usages",
 ]
 
-_PAGE = 1000
-"""Rows that a list has, where nobody asks for another number."""
 _OWNED = (
     select(tables.TOKENS, tables.ACCOUNTS)
     .join(tables.ACCOUNTS, tables.TOKENS.c.account == tables.ACCOUNTS.c.name)
@@ -98,7 +106,7 @@ class Leases(Rows[Lease]):
         columns = tables.LEASES.c
         return self._select(columns.state != LeaseState.ENDED, order=[columns.number])
 
-    def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[Lease]:
+    def all(self, tenant: str | None = None, limit: int | None = None) -> list[Lease]:
         """The newest of a tenant, or of all, newest first."""
         columns = tables.LEASES.c
         return self._select(_is(columns.tenant, tenant), order=[columns.number.desc()], limit=limit)
@@ -114,18 +122,24 @@ class Missions(Rows[Mission]):
 
     _table, _kind, _what = tables.MISSIONS, Mission, "mission"
 
-    def all(
-        self,
-        tenant: str | None = None,
-        phases: Collection[MissionPhase] | None = None,
-        limit: int = _PAGE,
-    ) -> list[Mission]:
-        """The newest of a tenant, or of all, in these phases, or any; newest first."""
+    def open(self) -> list[Mission]:
+        """All that are not over, oldest first."""
         columns = tables.MISSIONS.c
-        among = true() if phases is None else columns.phase.in_(phases)
-        return self._select(
-            _is(columns.tenant, tenant), among, order=[columns.submitted.desc()], limit=limit
-        )
+        still = [phase for phase in MissionPhase if not phase.over]
+        return self._select(columns.phase.in_(still), order=[columns.submitted])
+
+    def newest(self, limit: int, tenant: str | None = None) -> list[Mission]:
+        """The newest of a tenant, or of all, newest first."""
+        columns = tables.MISSIONS.c
+        order = [columns.submitted.desc()]
+        return self._select(_is(columns.tenant, tenant), order=order, limit=limit)
+
+    def newest_shared(self, limit: int, tenant: str) -> list[Mission]:
+        """The newest of other tenants that name `tenant` in their requests, newest first."""
+        columns = tables.MISSIONS.c
+        named = type_coerce(columns.request, Text).contains(json.dumps(tenant), autoescape=True)
+        order = [columns.submitted.desc()]
+        return self._select(columns.tenant != tenant, named, order=order, limit=limit)
 
     def of_key(self, tenant: str, key: str) -> Mission | None:
         """A tenant's mission by the idempotency key of its submission; None if there is none."""
@@ -200,7 +214,7 @@ class AuditLog:
                 (number,) = done.inserted_primary_key or (0,)
         return number
 
-    def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[AuditEntry]:
+    def all(self, tenant: str | None = None, limit: int | None = None) -> list[AuditEntry]:
         """The newest of a tenant, or of all, newest first."""
         columns = tables.AUDIT.c
         statement = (

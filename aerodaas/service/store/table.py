@@ -48,13 +48,11 @@ class Rows(Generic[Row]):
         Raises:
             StoreError: If the database does not take them; then none of them is kept.
         """
+        new = self._database.insert(self._table)
+        statement = new.on_conflict_do_update(index_elements=[self._key], set_=dict(new.excluded))
         with self._database.writing() as connection:
-            for row in rows:
-                values = self._values(row)
-                statement = self._database.insert(self._table).values(values)
-                connection.execute(
-                    statement.on_conflict_do_update(index_elements=[self._key], set_=values)
-                )
+            if rows:
+                connection.execute(statement, [self._values(row) for row in rows])
 
     def get(self, key: str) -> Row | None:
         """The row of a key; None if there is none."""

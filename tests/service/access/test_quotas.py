@@ -29,7 +29,7 @@ def fly(
     recorded_bytes: int = 0,
 ) -> None:
     """Keep what a mission has used."""
-    id_ = f"m{len(store.missions.all())}"
+    id_ = f"m{len(store.usage.all())}"
     store.missions.add(
         Mission(id_, "survey", "farm", "pilot", MissionPhase.LANDED, ("a",), started, "")
     )

@@ -29,7 +29,13 @@ def order(folder: Path) -> FlightOrder:
     """An order for one drone."""
     fleet = folder / "fleet.json"
     return FlightOrder(
-        mission="m", lease="l", fleet=fleet, robots=["one"], ends=time.time() + 60, minutes=1
+        mission="m",
+        lease="l",
+        fleet=fleet,
+        robots=["one"],
+        locks=folder / "locks",
+        ends=time.time() + 60,
+        minutes=1,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -28,18 +29,21 @@ class Drones:
         self.called.set()
 
 
-def watch(drones: Drones, ends: float, **changes: object) -> LeaseWatch:
+def watch(
+    drones: Drones, ends: float, cancelled: Callable[[], str] = str, **changes: object
+) -> LeaseWatch:
     """A watch over a lease that ends `ends` seconds from now."""
     content = {
         "mission": "m",
         "lease": "l",
         "fleet": Path("fleet.json"),
         "robots": ["one"],
+        "locks": Path("locks"),
         "ends": time.time() + ends,
         "minutes": 1,
         **changes,
     }
-    return LeaseWatch(FlightOrder.model_validate(content), drones)
+    return LeaseWatch(FlightOrder.model_validate(content), drones, cancelled)
 
 
 def test_the_end_of_a_lease_brings_the_drones_home() -> None:
@@ -97,3 +101,18 @@ def test_a_user_who_is_heard_is_not_silent() -> None:
         lease.hear()
         assert not drones.called.wait(0.25)
     assert drones.called.wait(10)
+
+
+def test_a_cancellation_brings_the_drones_home_at_once_or_later() -> None:
+    """One that came before the watch is told before it starts: the flight does not begin then."""
+    drones, cancelled = Drones(), ["cancelled by pilot"]
+    lease = watch(drones, LONG, cancelled=lambda: cancelled[0])
+    lease.start()
+    assert drones.reasons == cancelled == [lease.reason]
+    drones, cancelled[0] = Drones(), ""
+    lease = watch(drones, LONG, cancelled=lambda: cancelled[0])
+    lease.start()
+    assert lease.reason == ""
+    cancelled[0] = "cancelled by operator"
+    assert drones.called.wait(10)
+    assert drones.reasons == cancelled

@@ -77,7 +77,13 @@ class Flight:
     def __init__(self, path: Path) -> None:
         self.folder = FlightFolder(path)
         order = FlightOrder(
-            mission="m", lease="l", fleet=path, robots=["one"], ends=time.time() + 60, minutes=1
+            mission="m",
+            lease="l",
+            fleet=path,
+            robots=["one"],
+            locks=path,
+            ends=time.time() + 60,
+            minutes=1,
         )
         self.lease = LeaseWatch(order, lambda _: None)
         self.over = False

@@ -188,7 +188,7 @@ def test_threads_and_programs_change_one_row_one_after_the_other(
 
 
 def test_lists_have_what_is_asked_for_in_order(store: Store) -> None:
-    """By tenant and phase; missions newest first, leases in the queue's order."""
+    """Missions newest first, those that go on oldest first, leases in the queue's order."""
     store.tenants.add(Tenant("campus"))
     queued = replace(LEASE, state=LeaseState.QUEUED)
     store.leases.put(LEASE, replace(queued, id="l3", number=3), replace(queued, id="l2", number=2))
@@ -200,11 +200,15 @@ def test_lists_have_what_is_asked_for_in_order(store: Store) -> None:
         replace(MISSION, id="m2", submitted=6.0, phase=MissionPhase.FLYING),
         replace(MISSION, id="m3", submitted=7.0, tenant="campus"),
     )
-    assert [one.id for one in store.missions.all()] == ["m3", "m2", "m1"]
-    assert [one.id for one in store.missions.all("farm")] == ["m2", "m1"]
-    assert [one.id for one in store.missions.all(phases=[MissionPhase.FLYING])] == ["m2"]
-    assert [one.id for one in store.missions.all(phases=[])] == []
-    assert [one.id for one in store.missions.all(limit=1)] == ["m3"]
+    assert [one.id for one in store.missions.newest(9)] == ["m3", "m2", "m1"]
+    assert [one.id for one in store.missions.newest(9, "farm")] == ["m2", "m1"]
+    assert [one.id for one in store.missions.newest(1)] == ["m3"]
+    store.missions.update("m2", lambda row: replace(row, phase=MissionPhase.LANDED))
+    assert [one.id for one in store.missions.open()] == ["m1", "m3"]
+    store.missions.update("m3", lambda row: replace(row, request={"share": ["farm", "x_y"]}))
+    assert [one.id for one in store.missions.newest_shared(9, "farm")] == ["m3"]
+    assert [one.id for one in store.missions.newest_shared(9, "campus")] == ["m2", "m1"]
+    assert [one.id for one in store.missions.newest_shared(9, "xxy")] == []
 
 
 def test_usage_is_summed_by_tenant_and_time(store: Store) -> None:
