@@ -116,6 +116,8 @@ class Briefing:
         return order.model_copy(
             update={
                 "rehearsal": True,
+                "rehearsal_seconds": self._settings.rehearsal_seconds,
+                "rehearsal_bytes": self._settings.rehearsal_bytes,
                 "edge": None,
                 "speed": "max",
                 "battery": battery,

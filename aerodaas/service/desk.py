@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import secrets
 import threading
@@ -40,6 +41,7 @@ from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightErro
 from aerodaas.service.models import ModelShelf, require_room
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.records import shown
+from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 from aerodaas.service.trouble import TroubleLog
@@ -50,6 +52,8 @@ from aerodaas.types.vehicle import VehicleMode
 __all__ = ["MissionDesk"]
 
 _TURN_SECONDS = 0.1
+_REHEARSAL_SHARE = 4.0
+"""Wall seconds for each second of a processor that a rehearsal may use."""
 _MOST_SHOWN = 100
 """Most missions of a list that are over: of one's own, and of those that others share."""
 
@@ -90,6 +94,10 @@ class MissionDesk:
         bookings.flying = self._busy
         bookings.on_end.append(self._tell_flights)
         bookings.on_extension.append(self._tell_flights)
+        self._rehearsals = itertools.count(1)
+        self._last_rehearsed: dict[str, int] = {}
+        """Number of each tenant's last rehearsal."""
+        self._rehearsal_places: dict[str, int] = {}
         self._in_flight: dict[str, ActiveMission] = {}
         """Those of them that fly."""
         for row in store.missions.open():
@@ -401,6 +409,7 @@ class MissionDesk:
         # First: leases end also while the database fails.
         self._bookings.tick()
         with self._lock:
+            self._rehearsal_places = self._places()
             for one in list(self._missions.values()):
                 self._move(one)
                 if one.over:
@@ -450,13 +459,36 @@ class MissionDesk:
         if not self._settings.rehearse or one.attached_to is not None:
             self._admit(one)
             return
+        self._rehearse(one)
+
+    def _rehearse(self, one: ActiveMission) -> None:
+        """Begin a mission's rehearsal, once it is its turn."""
+        if place := self._rehearsal_places.get(one.row.id, 1):
+            one.wait_for(f"waits for its rehearsal: number {place} of those that wait")
+            return
         one.rehearse(self._briefing.rehearsal(one.row), self._models)
-        one.to(MissionPhase.REHEARSING)
+        self._last_rehearsed[one.row.tenant] = next(self._rehearsals)
+        if one.phase is not MissionPhase.REHEARSING:
+            one.to(MissionPhase.REHEARSING)
+
+    def _places(self) -> dict[str, int]:
+        """The place in the queue of each mission that waits for a rehearsal; 0 for its turn."""
+        waiting, running = [], []
+        for one in self._missions.values():
+            lost = one.phase is MissionPhase.REHEARSING and one.rehearsal_lost
+            if lost or one.phase is MissionPhase.SUBMITTED:
+                waiting.append((one.row.id, one.row.tenant))
+            elif one.phase is MissionPhase.REHEARSING:
+                running.append(one.row.tenant)
+        free = max(0, self._settings.most_rehearsals - len(running))
+        order = in_turn(waiting, running, self._last_rehearsed)
+        return {id_: max(0, number - free) for number, id_ in enumerate(order, 1)}
 
     def _judge(self, one: ActiveMission) -> None:
         if one.rehearsal_lost:
-            one.rehearse(self._briefing.rehearsal(one.row), self._models)
-        verdict = one.verdict(self._settings.rehearsal_seconds)
+            self._rehearse(one)
+            return
+        verdict = one.verdict(_REHEARSAL_SHARE * self._settings.rehearsal_seconds)
         if verdict is None:
             return
         one.row = replace(one.row, verdict=verdict.model_dump(mode="json"))

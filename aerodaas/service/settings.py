@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,7 +37,11 @@ class ServiceSettings:
     oidc: OidcSettings | None = None
     """OpenID Connect issuer whose tokens are good, too."""
     rehearsal_seconds: float = 300.0
-    """Most wall seconds of a rehearsal."""
+    """Most seconds of a processor that a rehearsal uses, in all its processes together."""
+    rehearsal_bytes: int = 2 << 30
+    """Most memory of the same."""
+    most_rehearsals: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))
+    """Most rehearsals at once; all others wait for their tenant's turn."""
     most_attached: int = 0
     """Most missions that sense by the cameras of one flight; 0: cameras are not shared."""
     edge_slots: int | None = None

@@ -33,7 +33,7 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightNews
-from aerodaas.service.flights.order import Outcome
+from aerodaas.service.flights.order import Outcome, Progress
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.settings import ServiceSettings
@@ -148,14 +148,59 @@ def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     slow = made.submit("one")
     made.turns(2)
     assert made.phase(slow) is MissionPhase.REHEARSING
+    FlightFolder(made.started[-1]).advance(Progress(flown=12.4, processor=7.0))
+    made.turns(1)
+    assert "12 s flown" in made.desk.shown(slow.id).reason
     began = time.monotonic()
     with monkeypatch.context() as later:
-        later.setattr("aerodaas.service.mission.time.monotonic", lambda: began + 61.0)
+        later.setattr("aerodaas.service.mission.time.monotonic", lambda: began + 241.0)
         made.turns(1)
     assert made.phase(slow) is MissionPhase.REFUSED
-    assert "not over after 60 s" in made.desk.shown(slow.id).reason
+    reason = made.desk.shown(slow.id).reason
+    assert "the provider is busy: of 240 s, its rehearsal had 7 s of a processor" in reason
     assert ended
     made.store.close()
+
+
+def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many at once as the provider has cores; nobody waits for all that others have sent."""
+    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
+    made.store.tenants.add(Tenant("city"))
+    made.store.accounts.add(Account("guest", "city", Role.PILOT, frozenset(Scope), 0.0))
+    farm = [made.submit("one") for _ in range(3)]
+    made.turns(1)
+    city = made.desk.submit(
+        replace(PILOT, account="guest", tenant="city"),
+        MissionIn.model_validate({"document": document("two", (5, 0))}),
+    )
+    made.turns()
+    assert [made.phase(one).value for one in farm] == ["rehearsing", "submitted", "submitted"]
+    assert made.phase(city) is MissionPhase.SUBMITTED
+    assert "number 1 " in made.desk.shown(city.id).reason
+    approved = Outcome(landed=True, began=0.0, ended=1.0, verdict=VerdictOut(approved=True))
+    for count, begun in enumerate((city, farm[1], farm[2]), 1):
+        FlightFolder(made.started[-1]).end(approved)
+        made.processes[-1].ended = 0
+        made.turns(2)
+        assert len(made.started) == count + 1
+        assert made.started[-1].parent.name == begun.id
+    made.close()
+
+
+def test_rehearsals_of_a_former_service_take_turns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many it had under way."""
+    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=3)
+    for _ in range(3):
+        made.submit("one")
+    made.turns()
+    made.started.clear()
+    made.settings = replace(made.settings, most_rehearsals=1)
+    made.open()
+    made.turns()
+    assert len(made.started) == 1
+    made.close()
 
 
 def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -253,7 +298,7 @@ def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the next one; one that has a result is judged by that, and not flown twice."""
-    made = Desk(tmp_path, monkeypatch, rehearse=True)
+    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=2)
     lost, judged = made.submit("one"), made.submit("two")
     made.turns(1)
     assert len(made.started) == 2

@@ -1,13 +1,19 @@
-"""Rehearsals of a service that is killed: none goes on, and the next service begins them anew."""
+"""Ends of rehearsals: by the end of their service, after which they begin anew, or by bounds."""
 
 from __future__ import annotations
 
+import json
 import signal
 import time
+from pathlib import Path
 
 import psutil
 import pytest
 from served import Served, document, fleet, robot
+
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.starter import start_process
 
 pytestmark = pytest.mark.slow
 
@@ -49,3 +55,55 @@ def test_a_rehearsal_ends_with_the_service_that_is_killed() -> None:
         assert provider.mission(id_)["phase"] in {"rehearsing", "awaiting_approval"}
         found = provider.until_phase(id_, "awaiting_approval")
         assert found["phase"] == "awaiting_approval", found["reason"]
+
+
+def rehearse(folder: Path, **bounds: float) -> tuple[FlightFolder, int]:
+    """Run the process of a rehearsal to its end; returns its folder and exit code."""
+    path = folder / "fleet.json"
+    path.write_text(json.dumps(fleet(robot("one", endurance=3600))), encoding="utf-8")
+    order = FlightOrder(
+        mission="m",
+        lease="rehearsal",
+        fleet=path,
+        robots=["one"],
+        locks=folder / "locks",
+        ends=time.time() + 1800,
+        minutes=30,
+        speed="max",
+        rehearsal=True,
+        **bounds,  # type: ignore[arg-type]
+    )
+    made = FlightFolder(folder / "r")
+    made.make(order, json.dumps(document("one", *FAR)))
+    with start_process(made, tied=True, vehicles=False) as process:
+        return made, process.wait(3 * SECONDS)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "told"),
+    [({"rehearsal_seconds": 3.0}, "processor"), ({"rehearsal_bytes": 32 << 20}, "memory")],
+)
+def test_a_rehearsal_that_uses_too_much_is_ended(
+    bounds: dict[str, float], told: str, tmp_path: Path
+) -> None:
+    """With all that it has started; its verdict says what it used too much of."""
+    made, code = rehearse(tmp_path, **bounds)
+    assert code == -signal.SIGKILL
+    outcome = made.outcome()
+    assert outcome is not None
+    assert outcome.verdict is not None
+    assert not outcome.verdict.approved
+    assert told in outcome.verdict.reasons[0]
+    assert made.progress().processor > 0.0
+
+
+def test_a_rehearsal_within_its_bounds_tells_how_far_it_has_come(tmp_path: Path) -> None:
+    """Its verdict is that of the flight."""
+    made, code = rehearse(tmp_path)
+    outcome = made.outcome()
+    assert code == 0
+    assert outcome is not None
+    assert outcome.verdict is not None
+    assert outcome.verdict.approved, outcome.verdict.reasons
+    assert made.progress().flown > 0.0
+    assert 0.0 < made.progress().processor < 300.0

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from aerodaas.config.private_file import write_private
 from aerodaas.service.flights.locks import exclusive, is_locked
-from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
 from aerodaas.service.unix_server import fits_a_socket
 from aerodaas.types.errors import MissionError
 
@@ -32,6 +32,7 @@ class FlightFolder:
         self._begun = self.path / "begun"
         self._lock = self.path / "lock"
         self._cancelled = self.path / "cancelled"
+        self._progress = self.path / "progress.json"
         self._outcome = self.path / "outcome.json"
 
     @property
@@ -87,6 +88,17 @@ class FlightFolder:
             return self._cancelled.read_text(encoding="utf-8")
         except OSError:
             return ""
+
+    def advance(self, progress: Progress) -> None:
+        """Write how far the rehearsal has come."""
+        write_private(self._progress, progress.model_dump_json())
+
+    def progress(self) -> Progress:
+        """How far the rehearsal has come."""
+        try:
+            return Progress.model_validate_json(self._progress.read_bytes())
+        except (OSError, ValidationError):
+            return Progress()
 
     def end(self, outcome: Outcome) -> None:
         """Write how the flight ended."""

@@ -13,7 +13,7 @@ from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
 
-__all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome"]
+__all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome", "Progress"]
 
 
 class _Record(BaseModel):
@@ -79,6 +79,10 @@ class FlightOrder(_Record):
     """For a mission that senses only, which has no robots."""
     rehearsal: bool = False
     """Fly in simulation, and judge the recording."""
+    rehearsal_seconds: float = 300.0
+    """Most seconds of a processor that the rehearsal uses, in all its processes together."""
+    rehearsal_bytes: int = 2 << 30
+    """Most memory of the same."""
     battery: dict[str, float] = Field(default_factory=dict)
     """Charge by robot, 0 to 1, with which the rehearsal begins."""
     others: list[OtherLease] = Field(default_factory=list)
@@ -87,6 +91,15 @@ class FlightOrder(_Record):
     def read(cls, path: Path) -> FlightOrder:
         """Read an order; raises ConfigError for one that is malformed."""
         return checked(cls, read_json(path, "the flight's order"), str(path))
+
+
+class Progress(_Record):
+    """How far a rehearsal has come."""
+
+    flown: float = 0.0
+    """Mission seconds."""
+    processor: float = 0.0
+    """Seconds of a processor that it has used."""
 
 
 class Outcome(_Record):

@@ -231,6 +231,11 @@ class Flying:
         """What the analytics scheduler has done so far; None without one."""
         return self._meter.analytics
 
+    @property
+    def flown_seconds(self) -> float:
+        """Mission time of the newest status, seconds."""
+        return self._meter.time
+
     def streams(self) -> dict[str, StreamKind]:
         """The streams that can be drawn, by name, once they can be read."""
         environment = self._environment

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
+import threading
+import time
 from pathlib import Path
+
+import psutil
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
 from aerodaas.service.flights.process import Flying
 from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
@@ -20,6 +25,8 @@ __all__ = ["rehearse"]
 
 _NICENESS = 10
 """So that flights under way have the processor first."""
+_LOOK_SECONDS = 1.0
+"""Between two looks at what it uses."""
 
 
 def rehearse(path: Path) -> None:
@@ -30,11 +37,53 @@ def rehearse(path: Path) -> None:
     os.chdir(folder.path)
     with folder.claim():
         flying = Flying(folder, order)
+        threading.Thread(target=_watch, args=(folder, order, flying), daemon=True).start()
         outcome = flying.outcome()
         verdict = _verdict(folder, order, flying.config, outcome)
         # The verdict and its picture are all that is kept of it.
         folder.recording.unlink(missing_ok=True)
         folder.end(outcome.model_copy(update={"verdict": verdict}))
+
+
+def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
+    """Tell how far the rehearsal has come, and end all its processes where it uses too much."""
+    while True:
+        time.sleep(_LOOK_SECONDS)
+        processor, memory = _used()
+        # A full disk ends a rehearsal elsewhere; its bounds hold all the same.
+        with contextlib.suppress(OSError):
+            folder.advance(Progress(flown=flying.flown_seconds, processor=processor))
+        reason = ""
+        if processor > order.rehearsal_seconds:
+            reason = (
+                f"its rehearsal used more than {order.rehearsal_seconds:g} s of a processor: "
+                "submit a shorter mission"
+            )
+        elif memory > order.rehearsal_bytes:
+            reason = (
+                f"its rehearsal used more than {order.rehearsal_bytes >> 20} MiB of memory: submit "
+                "one with fewer drones or waypoints"
+            )
+        if reason:
+            verdict = VerdictOut(approved=False, reasons=[reason])
+            ended = time.time()
+            folder.end(
+                Outcome(landed=False, reason=reason, began=ended, ended=ended, verdict=verdict)
+            )
+            os.killpg(os.getpgrp(), signal.SIGKILL)
+
+
+def _used() -> tuple[float, int]:
+    """Seconds of a processor and bytes of memory that this process and its children use."""
+    own = psutil.Process()
+    processor, memory = 0.0, 0
+    for one in (own, *own.children(recursive=True)):
+        with contextlib.suppress(psutil.Error):
+            times, pages = one.cpu_times(), one.memory_info()
+            # Of those that have ended, their parent knows.
+            processor += times.user + times.system + times.children_user + times.children_system
+            memory += pages.rss - pages.shared
+    return processor, memory
 
 
 def _verdict(
