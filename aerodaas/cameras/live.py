@@ -29,9 +29,9 @@ _FIRST_FRAME_TIMEOUT = 10.0
 _READ_TIMEOUT = 3.0
 _SHORTEST_WAIT = 0.5
 _LONGEST_WAIT = 8.0
-_OPTIONS = {"rtsp_transport": "tcp", "fpsprobesize": "0"}
-"""FFmpeg's. The rate of frames is not measured first, which takes a second; `nobuffer` would drop
-the first key frame."""
+_OPTIONS = {"rtsp_flags": "prefer_tcp", "fpsprobesize": "0"}
+"""FFmpeg's: RTSP by TCP, which loses nothing, or by UDP where a camera has only that. The rate of
+frames is not measured first, which takes a second; `nobuffer` would drop the first key frame."""
 _MOST_PIXELS = 4096 * 4096
 """Pixels of the largest picture that is handed on: a stream may claim any size."""
 

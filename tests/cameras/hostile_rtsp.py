@@ -82,9 +82,9 @@ def headers(client: socket.socket) -> None:
 
 def body(client: socket.socket) -> None:
     """Announce a description of 2 GB, and send it."""
-    _, number = _request(client)
+    _, number, _ = request(client)
     client.sendall(_OK % number + b"Public: DESCRIBE, SETUP, PLAY\r\n\r\n")
-    _, number = _request(client)
+    _, number, _ = request(client)
     client.sendall(
         _OK % number + b"Content-Type: application/sdp\r\nContent-Length: 2000000000\r\n\r\n"
     )
@@ -125,22 +125,25 @@ def huge(client: socket.socket) -> None:
 KINDS = (silent, headers, body, no_video, fragments, huge)
 
 
-def _request(client: socket.socket) -> tuple[bytes, bytes]:
-    """The next request's verb and number."""
+def request(client: socket.socket) -> tuple[bytes, bytes, bytes]:
+    """The next request's verb and number, and all of it."""
     data = b""
     while b"\r\n\r\n" not in data:
         more = client.recv(4096)
         if not more:
             raise OSError("the client has hung up")
         data += more
-    return data.split(b" ")[0], data.partition(b"CSeq: ")[2].split(b"\r\n")[0]
+    return data.split(b" ")[0], data.partition(b"CSeq: ")[2].split(b"\r\n")[0], data
 
 
-def play(client: socket.socket) -> None:
-    """Answer as a camera does, until it is to play."""
+def play(client: socket.socket, accepts: Callable[[bytes], bool] = bool) -> None:
+    """Answer as a camera does that `accepts` a transport or not, until it is to play."""
     verb = b""
     while verb != b"PLAY":
-        verb, number = _request(client)
+        verb, number, whole = request(client)
+        if verb == b"SETUP" and not accepts(whole):
+            client.sendall(b"RTSP/1.0 461 Unsupported transport\r\nCSeq: %s\r\n\r\n" % number)
+            continue
         more = {
             b"OPTIONS": b"Public: DESCRIBE, SETUP, PLAY\r\n\r\n",
             b"DESCRIBE": b"Content-Type: application/sdp\r\nContent-Length: %d\r\n\r\n" % len(_SDP)

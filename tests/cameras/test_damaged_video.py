@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import random
 import socket
 import threading
@@ -199,4 +200,20 @@ def test_a_live_source_hands_on_no_smeared_picture_and_counts_what_it_left_out()
         assert errors[last] < SMEARED
         assert last < 70 or last >= 3 * PERIOD
     assert source.skipped >= 20 + PERIOD - 1
+    source.close()
+
+
+@pytest.mark.wall_clock
+def test_rtsp_is_asked_for_by_udp_where_a_camera_refuses_tcp() -> None:
+    """TCP first: it loses nothing."""
+    asked: queue.SimpleQueue[bool] = queue.SimpleQueue()
+
+    def accepts(request: bytes) -> bool:
+        by_tcp = b"RTP/AVP/TCP" in request
+        asked.put(by_tcp)
+        return not by_tcp
+
+    source = LiveSource(SecretUrl(Server(lambda client: play(client, accepts)).url))
+    source.start()
+    assert [asked.get(timeout=20.0) for _ in range(2)] == [True, False]
     source.close()
