@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 
 import cv2
 import numpy as np
@@ -16,22 +15,31 @@ from aerodaas.types.errors import SourceError
 __all__ = ["VideoFile"]
 
 _log = logging.getLogger(__name__)
-# The timestamp of frame k in nanoseconds lies up to one nanosecond below k / rate.
-_ROUNDING = 1e-4
+_HIGHEST_RATE = 500.0
+"""Hz above which a file's rate, or its frames' stamps, are the ticks of its clock at best."""
+_ROUNDING = 1e-6
+"""Seconds by which a stamp may be rounded."""
 
 
 class VideoFile:
-    """Plays a video at its own frame rate, by mission time."""
+    """Plays a video by mission time: each frame at its own stamp, whatever the file's rate."""
 
     def __init__(self, path: SecretUrl, fallback_rate: float, *, loop: bool) -> None:
         """Play `path`; `fallback_rate` in Hz is for files without a frame rate."""
         self._path = path
-        self._rate = fallback_rate
         self._loop = loop
         self._capture: cv2.VideoCapture | None = None
         self._start: int | None = None
-        self._position = -1
-        self._first: NDArray[np.uint8] | None = None
+        self._image: NDArray[np.uint8] | None = None
+        """The next frame, if `open` has read it."""
+        self._due: float | None = 0.0
+        """Seconds of playback at which the next frame is due; None behind the last."""
+        self._begun = 0.0
+        """Seconds of playback at which the frame before was due."""
+        self._period = 1.0 / fallback_rate
+        """Seconds that a frame lasts behind which no stamp follows."""
+        self._offset = 0.0
+        """Seconds of playback less a frame's stamp."""
         self.finished = False
         self.skipped = 0
 
@@ -46,53 +54,69 @@ class VideoFile:
                 "OpenCV lacks; convert it with `ffmpeg -i IN -c:v libx264 OUT.mp4`"
             )
             raise SourceError(message)
-        if math.isfinite(rate) and rate > 0:
-            self._rate = rate
+        if 0.0 < rate <= _HIGHEST_RATE:
+            self._period = 1.0 / rate
         else:
-            _log.warning("%s states no rate; played at %g Hz", self._path, self._rate)
-        self._first = np.asarray(image, np.uint8)
-        return self._first
+            told = 1.0 / self._period
+            _log.warning("%s states no rate; frames without stamps play at %g Hz", self._path, told)
+        self._offset = -self._stamp()
+        self._image = np.asarray(image, np.uint8)
+        return self._image
 
     def newest(self, stamp: int) -> tuple[NDArray[np.uint8], int] | None:
         """Return the frame due at `stamp`, with that timestamp; None if returned already."""
         if self._start is None:
             self._start = stamp
-        due = math.floor(seconds(stamp - self._start) * self._rate + _ROUNDING)
-        if due <= self._position or self.finished or self._capture is None:
-            return None
-        if self._position < 0 and due == 0 and self._first is not None:
-            self._position = 0
-            return self._first, stamp
-        # `open` has read frame 0, so the decoder is positioned after it.
-        self._position = max(self._position, 0)
-        while self._position < due:
-            if not self._advance():
-                return None
-        readable, image = self._capture.retrieve()
-        if not readable:
-            self.skipped += 1
-            _log.warning("%s: skipped frame %d, it cannot be decoded", self._path, due)
-            return None
-        return np.asarray(image, np.uint8), stamp
+        now = seconds(stamp - self._start) + _ROUNDING
+        newest = None
+        while self._due is not None and self._due <= now:
+            newest = self._read() if self._image is None else self._image
+            self._image = None
+            self._begun = self._due
+            self._due = self._advance()
+        self.finished = self._due is None and self._begun + self._period <= now
+        return None if newest is None else (newest, stamp)
 
     def close(self) -> None:
         """Close the file."""
         if self._capture is not None:
             self._capture.release()
             self._capture = None
+        self._due = None
 
-    def _advance(self) -> bool:
-        """Grab the next frame; a video that loops restarts at its end."""
+    def _stamp(self) -> float:
+        """The stamp of the frame that was grabbed last, seconds."""
+        return 0.0 if self._capture is None else self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+
+    def _read(self) -> NDArray[np.uint8] | None:
+        """The frame that was grabbed last."""
+        readable, image = (False, None) if self._capture is None else self._capture.retrieve()
+        if not readable:
+            self.skipped += 1
+            _log.warning("%s: skipped a frame that cannot be decoded", self._path)
+            return None
+        return np.asarray(image, np.uint8)
+
+    def _advance(self) -> float | None:
+        """Grab the next frame and return when it is due; None behind the last.
+
+        A video that loops begins again at its end.
+        """
         if self._capture is None:
-            return False
+            return None
+        following = self._begun + self._period
         if not self._capture.grab():
             if not self._loop:
-                self.finished = True
-                return False
+                return None
             self._capture.release()
             self._capture = cv2.VideoCapture(self._path.get_secret_value())
             if not self._capture.grab():
-                self.finished = True
-                return False
-        self._position += 1
-        return True
+                return None
+            self._offset = following - self._stamp()
+        due = self._stamp() + self._offset
+        if due < self._begun + 1.0 / _HIGHEST_RATE:
+            # No stamp, or one of a clock that was set back: it follows at the usual rate.
+            self._offset += following - due
+            return following
+        self._period = min(self._period, due - self._begun)
+        return due

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Iterator
+from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, ClassVar
 
+import av
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from aerodaas.cameras import live
 from aerodaas.cameras.base import Camera
@@ -66,6 +71,81 @@ def test_a_file_gives_the_frame_of_each_stamp(video: Path) -> None:
     before = source.finished
     assert source.capture(3 * NANOSECONDS, None) is None
     assert (before, source.finished) == (False, True)
+    source.close()
+
+
+def encode(path: Path, stamps: list[int], rate: int = 30, clock: int = 1000) -> Path:
+    """A video whose frames grow brighter, each at its own stamp in ticks of 1/`clock` s."""
+    with av.open(str(path), "w", options={"video_track_timescale": str(clock)}) as container:
+        stream: Any = container.add_stream("libx264", rate=rate)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.codec_context.time_base = stream.time_base = Fraction(1, clock)
+        stream.codec_context.max_b_frames = 0
+        for number, stamp in enumerate(stamps):
+            grey = np.full((48, 64, 3), number * STEP, np.uint8)
+            frame = av.VideoFrame.from_ndarray(grey, format="bgr24")
+            frame.pts, frame.time_base = stamp, Fraction(1, clock)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def played(source: VideoCamera, until: float, rate: float = 10.0) -> dict[int, float]:
+    """When each frame is shown first, seconds."""
+    source.open()
+    shown: dict[int, float] = {}
+    for tick in range(round(until * rate) + 1):
+        picture = source.capture(NANOSECONDS + round(tick * NANOSECONDS / rate), None)
+        if picture is not None:
+            shown.setdefault(number(picture.image), tick / rate)
+    source.close()
+    return shown
+
+
+def test_a_file_of_variable_rate_plays_by_its_frames_own_stamps(tmp_path: Path) -> None:
+    """Quick frames, slow frames, and a pause of a minute."""
+    stamps = [0, 100, 200, 1200, 2200, 3200, 63_200, 63_300, 63_400]
+    source = camera(path=str(encode(tmp_path / "variable.mp4", stamps)))
+    assert played(source, 65.0) == {index: stamp / 1000 for index, stamp in enumerate(stamps)}
+    assert source.finished
+
+
+def test_a_file_that_begins_late_begins_at_once(tmp_path: Path) -> None:
+    """Its first stamp is the beginning."""
+    source = camera(path=str(encode(tmp_path / "late.mkv", [5000, 5100, 5400])))
+    assert played(source, 1.0) == {0: 0.0, 1: 0.1, 2: 0.4}
+
+
+def test_a_header_of_too_high_a_rate_does_not_hide_frames(tmp_path: Path) -> None:
+    """30,000 Hz is the clock's: frames play by their stamps, or at the sensor's rate without."""
+    stamps = [3000 * index for index in range(10)]
+    path = encode(tmp_path / "ticks.mp4", stamps, 30_000, 30_000)
+    assert played(camera(path=str(path)), 1.0) == {index: index / 10 for index in range(10)}
+    path = encode(tmp_path / "ticks.avi", [*range(10)], 30_000, 30_000)
+    assert played(camera(path=str(path)), 1.0) == {index: index / 10 for index in range(10)}
+
+
+@given(
+    st.lists(st.integers(3, 3000), min_size=1, max_size=11),
+    st.lists(st.integers(1, 2000), min_size=1, max_size=30),
+)
+@settings(max_examples=30, deadline=None)
+def test_the_frame_shown_is_the_newest_that_is_due(
+    tmp_path_factory: pytest.TempPathFactory, gaps: list[int], steps: list[int]
+) -> None:
+    """Whatever the stamps, and whenever it is asked for."""
+    stamps = [0, *itertools.accumulate(gaps)]
+    path = encode(tmp_path_factory.mktemp("video") / "any.mp4", stamps)
+    source = camera(path=str(path))
+    source.open()
+    shown = -1
+    for now in [0, *itertools.accumulate(steps)]:
+        due = max(index for index, stamp in enumerate(stamps) if stamp <= now)
+        picture = source.capture(NANOSECONDS + now * 1_000_000, None)
+        assert (None if picture is None else number(picture.image)) == (
+            due if due > shown else None
+        )
+        shown = due
     source.close()
 
 
