@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.schedulers.trajectory.greedy import greedy_route
 from aerodaas.schedulers.trajectory.routing import (
     DroneRoute,
     RoutingProblem,
@@ -46,11 +47,15 @@ def share_out(
         raise SchedulerError("a fleet needs at least one drone")
     if not waypoints:
         return {name: [] for name in fleet}
-    problem = _problem(waypoints, list(fleet.values()))
-    routes = solve_routes(problem, budget / 4, seed)
+    drones = list(fleet.values())
+    problem = _problem(waypoints, drones)
+    simple = _one_after_the_other(waypoints, drones, problem)
+    complete = sum(map(len, simple)) == len(waypoints)
+    routes = solve_routes(problem, budget / 4, seed, simple if complete else ())
     if routes is None:
         problem = replace(problem, prizes=np.ones(len(waypoints)))
-        routes = solve_routes(problem, budget / 2, seed) or [[] for _ in fleet]
+        found = solve_routes(problem, budget / 2, seed, simple) or []
+        routes = max(found, simple, key=lambda shared: sum(map(len, shared)))
     elif objective == "time":
         routes = _earliest_end(problem, routes, budget * 3 / 4, seed)
     else:
@@ -73,6 +78,22 @@ def _problem(waypoints: Sequence[Waypoint], drones: list[PlanningContext]) -> Ro
         tours.append(DroneRoute(start, home, costs, durations, available))
     travel = TravelCosts.of(waypoints, drones[0])
     return RoutingProblem(travel.hover, travel.deadline, tuple(tours))
+
+
+def _one_after_the_other(
+    waypoints: Sequence[Waypoint], drones: list[PlanningContext], problem: RoutingProblem
+) -> list[list[int]]:
+    """What simple rules give each drone of what those before it left."""
+    left = list(range(len(waypoints)))
+    routes: list[list[int]] = []
+    for drone, tour in zip(drones, problem.tours, strict=True):
+        rows = [*left, tour.start, tour.end]
+        costs = tour.costs[np.ix_(rows, rows)]
+        some = [waypoints[i] for i in left]
+        route = greedy_route(some, drone, costs, np.ones(len(some)), tour.budget) if some else []
+        routes.append([left[i] for i in route])
+        left = [i for i in left if i not in routes[-1]]
+    return routes
 
 
 def _earliest_end(

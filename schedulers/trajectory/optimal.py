@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.exact import shortest_order
+from aerodaas.schedulers.trajectory.greedy import greedy_route, route_value
 from aerodaas.schedulers.trajectory.routing import (
+    MOST_PRIZE,
     DroneRoute,
     RoutingProblem,
     require_solver,
@@ -34,7 +36,8 @@ class OptimalScheduler(TrajectoryScheduler):
     Up to 11 waypoints the plan is exact; beyond, it is the best that PyVRP finds in a time that
     grows with their number. Deadlines are time windows and hovers are service times. Where the
     battery (or a deadline) does not allow every waypoint, as many as possible are visited,
-    weighted by their prizes, and the others are given up.
+    weighted by their prizes, and the others are given up. A plan is never worth less than that of
+    the given order, the nearest waypoint next, or the earliest deadline first.
     """
 
     def __init__(
@@ -48,8 +51,8 @@ class OptimalScheduler(TrajectoryScheduler):
     ) -> None:
         """Minimise `objective`, in `budget` seconds (None: 9.5 ms a waypoint, up to 1.9 s).
 
-        `prizes` weighs waypoints by id where not all can be visited; 1 where not named. Raises
-        SchedulerError for settings that make no sense, and without PyVRP (on Python 3.10).
+        `prizes` (0 to 1e6) weighs waypoints by id where not all can be visited; 1 where not named.
+        Raises SchedulerError for settings that make no sense, and without PyVRP (on Python 3.10).
         """
         super().__init__(environment)
         require_solver("the optimal scheduler")
@@ -57,8 +60,12 @@ class OptimalScheduler(TrajectoryScheduler):
             raise SchedulerError(f"the objective is distance or energy, not {objective!r}")
         if budget is not None and not 0.0 < budget < np.inf:
             raise SchedulerError(f"a planning budget is a positive number of seconds, not {budget}")
-        if any(not 0.0 <= prize < np.inf for prize in (prizes or {}).values()):
-            raise SchedulerError("prizes are finite and not negative")
+        for waypoint, prize in (prizes or {}).items():
+            if not 0.0 <= prize <= MOST_PRIZE:
+                raise SchedulerError(
+                    f"the prize of {waypoint!r} must be from 0 to {MOST_PRIZE:g}, not {prize}: "
+                    "prizes count relative to each other, so divide them all"
+                )
         self._objective = objective
         self._prizes = dict(prizes or {})
         self._budget = budget
@@ -72,24 +79,22 @@ class OptimalScheduler(TrajectoryScheduler):
         charge = travel.charge(situation.energy or EnergyModel())
         costs = charge if self._objective == "energy" else travel.distance
         order = self._order(pending, situation, travel, costs)
-        if order is not None and situation.energy is not None:
-            available = situation.battery - situation.reserve
-            if travel.cost(order, charge) > available:
-                order = self._choose(pending, travel, charge, available)
-        elif order is None:
-            order = self._choose(pending, travel, costs, np.inf)
-        return [pending[i] for i in self._forwards(order, travel, costs, situation)]
-
-    @staticmethod
-    def _forwards(
-        order: list[int], travel: TravelCosts, costs: Matrix, situation: PlanningContext
-    ) -> list[int]:
-        """Of two directions that cost the same, the one that begins as the waypoints were given."""
+        limited = situation.energy is not None
+        available = situation.battery - situation.reserve if limited else np.inf
+        if order is None or travel.cost(order, charge) > available:
+            bounded = charge if limited else costs
+            order = self._choose(pending, situation, travel, bounded, available)
         back = order[::-1]
-        if not order or order[0] < back[0] or any(map(len, situation.ordered)):
-            return order
-        same = bool(np.isclose(travel.cost(order, costs), travel.cost(back, costs), rtol=1e-9))
-        return back if same and travel.is_punctual(back) else order
+        # Of two directions that cost the same, people expect the one that begins as they gave it.
+        if (
+            back < order
+            and not any(map(len, situation.ordered))
+            and np.isclose(travel.cost(order, costs), travel.cost(back, costs), rtol=1e-9)
+            and travel.cost(back, charge) <= available
+            and travel.is_punctual(back)
+        ):
+            order = back
+        return [pending[i] for i in order]
 
     def _order(
         self,
@@ -113,14 +118,24 @@ class OptimalScheduler(TrajectoryScheduler):
             times = travel.duration.copy()
             times[:count] += travel.hover[:, None]
             return shortest_order(times, groups, travel.deadline)
-        return self._search(travel, costs, None, np.inf)
+        simple = greedy_route(pending, situation, costs, np.ones(count))
+        if len(simple) < count:
+            return None
+        return self._search(travel, costs, None, np.inf, simple) or simple
 
     def _choose(
-        self, pending: Sequence[Waypoint], travel: TravelCosts, costs: Matrix, available: float
+        self,
+        pending: Sequence[Waypoint],
+        situation: PlanningContext,
+        travel: TravelCosts,
+        costs: Matrix,
+        available: float,
     ) -> list[int]:
         """The waypoints worth most that can be served, in the best order."""
         prizes = np.array([self._prizes.get(waypoint.id, 1.0) for waypoint in pending])
-        return self._search(travel, costs, prizes, available) or []
+        simple = greedy_route(pending, situation, costs, prizes, available)
+        found = self._search(travel, costs, prizes, available, simple) or []
+        return max(found, simple, key=lambda route: route_value(route, travel, costs, prizes))
 
     def _search(
         self,
@@ -128,6 +143,7 @@ class OptimalScheduler(TrajectoryScheduler):
         costs: Matrix,
         prizes: NDArray[np.float64] | None,
         available: float,
+        start: Sequence[int],
     ) -> list[int] | None:
         count = len(travel.hover)
         problem = RoutingProblem(
@@ -137,5 +153,5 @@ class OptimalScheduler(TrajectoryScheduler):
             prizes,
         )
         budget = self._budget or min(1.9, 0.0095 * count)
-        routes = solve_routes(problem, budget, self._seed)
+        routes = solve_routes(problem, budget, self._seed, [start])
         return None if routes is None else routes[0]

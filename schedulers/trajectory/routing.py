@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +13,14 @@ from aerodaas.config.extras import has_extra
 from aerodaas.schedulers.trajectory.travel import Matrix
 from aerodaas.types.errors import SchedulerError
 
-__all__ = ["DroneRoute", "RoutingProblem", "require_solver", "solve_routes"]
+__all__ = ["MOST_PRIZE", "DroneRoute", "RoutingProblem", "require_solver", "solve_routes"]
 
 _RESOLUTION = 1e6
 """Whole units that the largest leg is divided into: PyVRP counts in integers."""
 _MILLISECONDS = 1000.0
 _UNBOUNDED = int(np.iinfo(np.int64).max)
+MOST_PRIZE = 1e6
+"""Largest prize: with 1,000 waypoints of it, PyVRP's sums stay within 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +62,22 @@ def require_solver(purpose: str) -> None:
         )
 
 
-def solve_routes(problem: RoutingProblem, budget: float, seed: int = 0) -> list[list[int]] | None:
+def solve_routes(
+    problem: RoutingProblem,
+    budget: float,
+    seed: int = 0,
+    start: Sequence[Sequence[int]] = (),
+) -> list[list[int]] | None:
     """Waypoints of each tour in order, found in about `budget` seconds; None if none is feasible.
 
     Iterated local search by PyVRP (Wouda, Lan and Kool, INFORMS J. Computing 36(4), 2024). With
     prizes, what is worth most is visited, and the cost decides between equals.
+
+    Args:
+        problem: Waypoints and drones; prizes up to `MOST_PRIZE`.
+        budget: Seconds for the search.
+        seed: Of the search.
+        start: A route for each tour from which the search begins; from random ones if empty.
     """
     import pyvrp  # noqa: PLC0415 - not there on Python 3.10
     from pyvrp.stop import MaxRuntime  # noqa: PLC0415
@@ -105,7 +119,15 @@ def solve_routes(problem: RoutingProblem, budget: float, seed: int = 0) -> list[
         _whole([tour.costs for tour in tours], unit),
         _whole([tour.durations for tour in tours], _MILLISECONDS),
     )
-    result = pyvrp.solve(data, MaxRuntime(budget), seed=seed, collect_stats=False, display=False)
+    first = [pyvrp.Route(data, list(route), i) for i, route in enumerate(start) if route]
+    result = pyvrp.solve(
+        data,
+        MaxRuntime(budget),
+        seed=seed,
+        collect_stats=False,
+        display=False,
+        initial_solution=pyvrp.Solution(data, first) if first else None,
+    )
     if not result.is_feasible():
         return None
     routes: list[list[int]] = [[] for _ in tours]
@@ -121,4 +143,4 @@ def _whole(matrices: list[Matrix], unit: float) -> list[Any]:
 
 def _bound(value: float) -> int:
     """A bound in PyVRP's whole units, where the largest number means none."""
-    return max(0, int(value)) if np.isfinite(value) else _UNBOUNDED
+    return max(0, int(min(value, _UNBOUNDED)))

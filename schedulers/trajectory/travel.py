@@ -31,6 +31,8 @@ class TravelCosts:
     """Seconds at each waypoint, (N,)."""
     deadline: NDArray[np.float64]
     """Seconds from now, (N,); infinite for none."""
+    home_speed: float
+    """m/s on the way home."""
 
     @classmethod
     def of(cls, waypoints: Sequence[Waypoint], situation: PlanningContext) -> TravelCosts:
@@ -48,14 +50,20 @@ class TravelCosts:
             distance / speeds[None, :],
             np.array([w.hover_duration for w in waypoints], dtype=np.float64),
             np.array(deadline, dtype=np.float64),
+            situation.speed,
         )
 
     def charge(self, model: EnergyModel) -> Matrix:
-        """Charge (0 to 1) of each leg and of the hover where it ends, (N + 2, N + 2)."""
+        """Charge (0 to 1) of each leg and of the hover where it ends, (N + 2, N + 2).
+
+        The last column is the way home and the landing there.
+        """
         seconds = np.where(self.duration > 0.0, self.duration, 1.0)
         hovers = np.append(self.hover, (0.0, 0.0)) * model.hover(1.0)
         flown = model.powers(self.offset / seconds[..., None]) * self.duration / model.endurance
         charge: Matrix = flown + hovers[None, :]
+        home = np.zeros(3)
+        charge[:, -1] = [model.way_home(-way, home, self.home_speed) for way in self.offset[:, -1]]
         return charge
 
     def arrivals(self, order: Sequence[int]) -> list[float]:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis.strategies import floats, integers
 from required import needs_python
 from waypoint_fields import HOME, in_a_hurry, places, scatter, waypoints
 
 from aerodaas.config.plugins import load_plugin
 from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.schedulers.trajectory.deadline import DeadlineScheduler
 from aerodaas.schedulers.trajectory.fleet import share_out
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.optimal import OptimalScheduler
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.schedulers.trajectory.travel import TravelCosts, tour_length
 from aerodaas.types.energy import EnergyModel
 from aerodaas.types.errors import SchedulerError
@@ -123,12 +127,64 @@ def test_energy_objective_spares_the_upwind_legs() -> None:
 
 @needs_solver
 @pytest.mark.parametrize(
-    "settings_of_it", [{"objective": "fun"}, {"budget": 0.0}, {"prizes": {"a": float("nan")}}]
+    "settings_of_it",
+    [
+        {"objective": "fun"},
+        {"budget": 0.0},
+        {"prizes": {"a": float("nan")}},
+        {"prizes": {"a": 1e15}},  # beyond what PyVRP can add up
+        {"prizes": {"a": -1.0}},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(settings_of_it: dict[str, object]) -> None:
     """With a SchedulerError, before anything flies."""
     with pytest.raises(SchedulerError):
         OptimalScheduler(**settings_of_it)  # type: ignore[arg-type]
+
+
+def hurried(count: int, seed: int) -> list[Waypoint]:
+    """Waypoints in a field of 200 m, one due every two seconds."""
+    xy = np.random.default_rng(seed).uniform(-100.0, 100.0, (count, 2))
+    return [
+        Waypoint(f"w{i}", x, y, 10.0, deadline=2.0 * (i + 1), waypoint_type="local")
+        for i, (x, y) in enumerate(xy.tolist())
+    ]
+
+
+@needs_solver
+@given(seed=integers(0, 1000), count=integers(12, 60), charge=floats(0.05, 1.0))
+@settings(max_examples=15)
+def test_it_is_never_worth_less_than_a_simple_rule(seed: int, count: int, charge: float) -> None:
+    """With too little time and charge for all, it serves at least as many."""
+    pending = hurried(count, seed)
+    model = EnergyModel(endurance=300.0)
+    here = PlanningContext(0.0, np.zeros(3), np.zeros(3), battery=charge, speed=5.0, energy=model)
+    plan = OptimalScheduler(budget=0.02).plan(pending, here)
+    assert TravelCosts.of(plan, here).is_punctual(range(len(plan)))
+    assert not plan or model.route(here.position, plan, here.home, here.speed) <= charge + 1e-9
+    for rule in (NearestNeighborScheduler(), DeadlineScheduler(), OrderedScheduler()):
+        served: list[Waypoint] = []
+        for waypoint in rule.plan(pending, here):
+            longer = [*served, waypoint]
+            punctual = TravelCosts.of(longer, here).is_punctual(range(len(longer)))
+            if punctual and model.route(here.position, longer, here.home, here.speed) <= charge:
+                served = longer
+        assert len(plan) >= len(served)
+
+
+@needs_solver
+def test_many_waypoints_with_deadlines_are_served() -> None:
+    """Of 150 that are due every two seconds, those that one rule serves and more."""
+    assert len(OptimalScheduler(budget=0.3).plan(hurried(150, 0), HOME)) >= 21
+    drones = {"left": HOME, "right": HOME}
+    assert sum(map(len, share_out(hurried(150, 0), drones, budget=0.5).values())) >= 21
+
+
+@needs_solver
+def test_a_deadline_beyond_all_time_is_none() -> None:
+    """A number that no clock reaches is planned with, not an error in flight."""
+    pending = [replace(waypoint, deadline=1e300) for waypoint in scatter(14)]
+    assert len(OptimalScheduler(budget=0.05).plan(pending, HOME)) == 14
 
 
 @needs_solver
