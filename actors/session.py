@@ -10,7 +10,14 @@ from dataclasses import dataclass, field, replace
 from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
-from aerodaas.types.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
+from aerodaas.types.clock import (
+    NANOSECONDS,
+    Clock,
+    HostEpoch,
+    LockstepClock,
+    ScaledClock,
+    host_time_ns,
+)
 
 __all__ = [
     "CONTROL_PERIOD_NS",
@@ -50,6 +57,8 @@ class Session:
     """Share of an edge that other flights use, too; None in lockstep, which waits for all work."""
     application: Application = field(default_factory=Application)
     """Definitions from the application's own files."""
+    epoch: HostEpoch = field(default_factory=HostEpoch)
+    """Clock of the application's process, which the actors on its machine take over."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
         """First timestamp later than `after` at which `source`, of `rate` Hz, is due.

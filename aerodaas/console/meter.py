@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import OrderedDict, defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut
-from aerodaas.types.clock import seconds
+from aerodaas.types.clock import host_time_ns, seconds
 from aerodaas.types.status import GROUNDED
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ class FlightMeter:
         self.status: dict[str, StatusOut] = {}
         """By robot; replaced and never changed, because other threads read it."""
         self.told: dict[str, float] = {}
-        """Unix seconds when each robot's newest status came; replaced as that is."""
+        """Host time in seconds when each robot's newest status came; replaced as that is."""
         self.preflight: dict[str, PreflightOut] = {}
         """The list before take-off by robot; replaced as the status is."""
         self.alerts: list[str] = []
@@ -56,7 +55,7 @@ class FlightMeter:
             now, before = seconds(report.status.stamp), self.status.get(name)
             # The same status again is no news: who told it may hang.
             same = before is not None and before.time == now
-            told[name] = self.told[name] if same else time.time()
+            told[name] = self.told[name] if same else seconds(host_time_ns())
             if before is not None and report.status.state not in GROUNDED:
                 self._flown[name] += max(0.0, now - before.time)
         self.told = told

@@ -76,7 +76,7 @@ def attach_file(recording: Path, file: Path, name: str, media_type: str, stamp: 
     part: Path | None = None
     try:
         before = recording.stat()
-        if not complete and time.time() - before.st_mtime < _STILL:
+        if not complete and abs(time.time() - before.st_mtime) < _STILL:
             raise RecordingError(
                 f"{recording} is still being written, or was a moment ago; attach to it once the "
                 "flight is over"

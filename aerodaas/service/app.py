@@ -57,7 +57,7 @@ def build_service(
     accounts.on_change = access.forget
     quotas, garage = Quotas(store), Garage(settings.config, store)
     models = ModelShelf(settings.models)
-    bookings = Bookings(settings.config, store, garage, quotas)
+    bookings = Bookings(settings.config, store, garage, quotas, settings.state / "clock")
     monitor = None
     if settings.monitor:
         monitor = FleetMonitor(settings.fleet, settings.state / "monitor.log", garage.observe)

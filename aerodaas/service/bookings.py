@@ -2,41 +2,107 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
 from collections.abc import Callable, Collection
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.private_file import write_private
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access import Principal, Quotas, sees
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook
 from aerodaas.service.store import Lease, Mission, Store
+from aerodaas.types.clock import WallOffset
 
 __all__ = ["Bookings"]
 
+_SET_SECONDS = 0.1
+"""Least seconds by which the wall clock counts as set."""
+_OFFSET = TypeAdapter(WallOffset)
+
 
 class Bookings:
-    """Leases of all tenants; safe in any thread."""
+    """Leases of all tenants; safe in any thread.
+
+    Their ends are Unix times, for people. When the wall clock is set, also while no service runs,
+    they are moved with it: a lease has as many minutes left as before.
+    """
 
     def __init__(
-        self, config: EnvironmentConfig, store: Store, garage: Garage, quotas: Quotas
+        self,
+        config: EnvironmentConfig,
+        store: Store,
+        garage: Garage,
+        quotas: Quotas,
+        clock: Path | None = None,
     ) -> None:
-        """Go on with the leases that the database has."""
+        """Go on with the leases that the database has.
+
+        Args:
+            config: The provider's environment.
+            store: Its open database.
+            garage: Tells of the drones.
+            quotas: Of the tenants.
+            clock: File of the wall clock's offset by which the database has its ends; None for one
+                that a further service does not learn.
+        """
         self._config = config
         self._store = store
         self._garage = garage
         self._quotas = quotas
         self._book = LeaseBook(store.leases)
+        self._clock_file = clock
+        self._clock_lock = threading.Lock()
+        self._offset = self._known_offset()
         self.on_end: list[Callable[[Lease], None]] = []
         """Called with each lease that has ended, to recall its flights."""
         self.flying: Callable[[], Collection[str]] = tuple
         """Tells which robots are in flight: they may be on their way home from an ended lease."""
         self.on_extension: list[Callable[[Lease], None]] = []
 
+    @property
+    def offset(self) -> WallOffset:
+        """Offset of the wall clock by which the leases have their ends."""
+        self.now()
+        return self._offset
+
+    def now(self) -> float:
+        """Seconds of Unix time; the leases are moved first if the wall clock was set."""
+        with self._clock_lock:
+            offset = WallOffset.read()
+            step = offset.seconds - self._offset.seconds
+            if abs(step) >= _SET_SECONDS:
+                self._book.set_clock(step)
+                self._offset = offset
+                self._write_offset()
+            return time.monotonic() + self._offset.seconds
+
+    def _known_offset(self) -> WallOffset:
+        """The last one that was written down in this boot of the machine, or the present one."""
+        if self._clock_file is not None:
+            with contextlib.suppress(OSError, ValidationError):
+                known = _OFFSET.validate_json(self._clock_file.read_bytes())
+                if known.current:
+                    return known
+        self._offset = WallOffset.read()
+        self._write_offset()
+        return self._offset
+
+    def _write_offset(self) -> None:
+        # Without it, a lease is shorter or longer by a step while no service runs.
+        if self._clock_file is not None:
+            with contextlib.suppress(OSError):
+                write_private(self._clock_file, _OFFSET.dump_json(self._offset))
+
     def request(self, principal: Principal, wish: LeaseIn) -> Lease:
         """Ask for drones; raises RefusedError, also for a quota that is used up."""
-        now = time.time()
+        now = self.now()
         self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
         lease, changed = self._book.request(
             wish, principal.tenant, principal.account, now, self._fleet()
@@ -49,7 +115,7 @@ class Bookings:
 
         `cloud` is whether what flies may call it.
         """
-        now = time.time()
+        now = self.now()
         committed = self._book.committed(tenant, now)
         self._quotas.check(tenant, minutes, now, committed, cloud=cloud)
 
@@ -60,7 +126,7 @@ class Bookings:
         self.require_quota(mission.tenant, minutes * len(mission.robots))
         wish = LeaseIn(robots=list(mission.robots), minutes=minutes)
         lease, changed = self._book.request(
-            wish, mission.tenant, mission.account, time.time(), self._fleet()
+            wish, mission.tenant, mission.account, self.now(), self._fleet()
         )
         self._tell(changed)
         return self.lease(lease.id)
@@ -96,7 +162,7 @@ class Bookings:
 
     def extend(self, principal: Principal, lease: str, minutes: float) -> Lease:
         """Let a lease end later; raises RefusedError."""
-        found, now = self._own(principal, lease), time.time()
+        found, now = self._own(principal, lease), self.now()
         committed = self._book.committed(found.tenant, now)
         left = self._quotas.left(found.tenant, now, committed)
         extended, changed = self._book.extend(
@@ -111,10 +177,10 @@ class Bookings:
         """Give a lease back, or revoke another tenant's as an operator; drones come home."""
         found = self.seen(principal, lease)
         if found.tenant == principal.tenant and principal.role.reaches(Role.PILOT):
-            changed = self._book.give_back(lease, time.time(), self._fleet())
+            changed = self._book.give_back(lease, self.now(), self._fleet())
         elif principal.role.reaches(Role.OPERATOR):
             reason = f"revoked by {principal.account}"
-            changed = self._book.revoke(lease, reason, time.time(), self._fleet())
+            changed = self._book.revoke(lease, reason, self.now(), self._fleet())
         else:
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
         self._tell(changed)
@@ -124,15 +190,15 @@ class Bookings:
         """Give back the lease that was asked for with a mission, once that is over."""
         own = mission.request.get("lease") is None
         if own and mission.lease is not None and self._book.get(mission.lease) is not None:
-            self._tell(self._book.give_back(mission.lease, time.time(), self._fleet()))
+            self._tell(self._book.give_back(mission.lease, self.now(), self._fleet()))
 
     def holder(self, robot: str) -> Lease | None:
         """The lease that holds a robot now."""
-        return self._book.holder(robot, time.time())
+        return self._book.holder(robot, self.now())
 
     def tick(self) -> None:
         """End what is over, and grant what has become free."""
-        self._tell(self._book.tick(time.time(), self._fleet()))
+        self._tell(self._book.tick(self.now(), self._fleet()))
 
     def _own(self, principal: Principal, lease: str) -> Lease:
         found = self.seen(principal, lease)

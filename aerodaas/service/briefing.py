@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 from aerodaas.config.plugins import require_plugin
@@ -145,7 +144,8 @@ class Briefing:
             fleet=self._settings.fleet,
             robots=list(mission.robots),
             locks=self._settings.locks,
-            ends=time.time() + 60.0 * minutes if ends is None else ends,
+            ends=self._bookings.now() + 60.0 * minutes if ends is None else ends,
+            offset=self._bookings.offset,
             minutes=minutes if granted is None else granted.minutes,
             limits=TenantLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),
             area=None if granted is None or granted.area is None else list(granted.area),

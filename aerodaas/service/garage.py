@@ -47,8 +47,13 @@ class Garage:
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
         self._news = {robot.id: VehicleNews() for robot in config.robots}
-        self._told: dict[str, tuple[float, float]] = {}
-        """Mission time of each robot's newest status, and the Unix moment at which it came."""
+        self._told: dict[str, tuple[float, float, float]] = {}
+        """Mission time of each robot's newest status; when it came, as Unix time and by
+        `time.monotonic`."""
+        self._lost_at: dict[str, float] = {}
+        """Since when each robot's link is lost, by `time.monotonic`."""
+        self._examined_at: dict[str, float] = {}
+        """When each robot's list before take-off was made, by `time.monotonic`."""
         for robot in config.robots:
             self._states[robot.id] = store.robots.get(robot.id) or RobotState(robot.id)
 
@@ -67,8 +72,9 @@ class Garage:
         """The list before take-off of a robot; raises RefusedError if there is none such."""
         if robot not in self._news:
             raise RefusedError(404, f"there is no robot {robot}")
-        news = self.news(robot)
-        age = None if news.examined is None else max(0.0, time.time() - news.examined)
+        with self._lock:
+            news, made = self._news[robot], self._examined_at.get(robot)
+        age = None if news.examined is None or made is None else time.monotonic() - made
         return PreflightOut.of(robot, news.health, age)
 
     def note(
@@ -91,11 +97,11 @@ class Garage:
         for name, one in status.items():
             if name not in self._news:
                 continue
-            moment = time.time() if ended is None else ended
-            if self._told.get(name, (None, 0.0))[0] != one.time or ended is not None:
-                self._told[name] = one.time, moment
-            told, over = self._told[name][1], one.state in _OVER
-            silent = moment - told > _SILENT_SECONDS and not over
+            now = time.monotonic()
+            if self._told.get(name, (None,))[0] != one.time or ended is not None:
+                self._told[name] = one.time, time.time() if ended is None else ended, now
+            _, told, came = self._told[name]
+            silent = now - came > _SILENT_SECONDS and one.state not in _OVER
             lost = silent or one.mode == VehicleMode.LOST.value
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.news(name)
@@ -141,9 +147,10 @@ class Garage:
         """Why a drone on the ground can be neither leased nor flown now; empty if it can."""
         with self._lock:
             enabled, news = self._states[robot].enabled, self._news[robot]
+            lost_at = self._lost_at.get(robot, math.inf)
         if not enabled:
             return OUT_OF_SERVICE
-        if news.link is LinkState.LOST and time.time() - news.since > _DROPOUT_SECONDS:
+        if news.link is LinkState.LOST and time.monotonic() - lost_at > _DROPOUT_SECONDS:
             return f"not reachable since {_moment(news.since)}: {news.reason}"
         if news.link is not LinkState.CONNECTED:
             return ""
@@ -189,6 +196,7 @@ class Garage:
     def _take(self, name: str, news: VehicleNews, *, heard: float | None, least: float) -> None:
         """Take over news, and write them down if the last row is `least` seconds old."""
         with self._lock:
+            self._date(name, news)
             self._news[name] = news
             if heard is None:
                 return
@@ -205,6 +213,14 @@ class Garage:
                 self._written[name] = moment, state
         if due:
             self._store.robots.put(state)
+
+    def _date(self, name: str, news: VehicleNews) -> None:
+        """Note since when a link is lost and a list is known: the wall clock may be set later."""
+        before, wall, now = self._news[name], time.time(), time.monotonic()
+        if news.link is LinkState.LOST and before.link is not LinkState.LOST:
+            self._lost_at[name] = now - max(0.0, wall - news.since)
+        if news.examined is not None and news.examined != before.examined:
+            self._examined_at[name] = now - max(0.0, wall - news.examined)
 
     def _change(self, robot: str, *, enabled: bool) -> RobotState:
         with self._lock:

@@ -3,6 +3,9 @@
 Every stamp in this project is an integer of nanoseconds on the mission clock, which reads zero
 when the mission's actors start. Latencies are taken on `host_time_ns`, because simulated time
 may stand still while a frame is processed.
+
+The wall clock may be set at any time, by NTP or by hand. Durations therefore go by
+`time.monotonic`, and host times that one process tells another of its machine by `HostEpoch`.
 """
 
 from __future__ import annotations
@@ -10,33 +13,94 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+from typing_extensions import Self
 
 from aerodaas.types.errors import ClockError, ConfigError
 
 __all__ = [
     "NANOSECONDS",
     "Clock",
+    "HostEpoch",
     "LockstepClock",
     "ScaledClock",
+    "WallOffset",
     "host_time_ns",
     "seconds",
 ]
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""
+_READING_SECONDS = 0.01
+"""Most seconds between two readings of `time.monotonic` around one of the wall clock."""
+_BOOT = Path("/proc/sys/kernel/random/boot_id")
 
 
-_EPOCH_OFFSET = time.time_ns() - time.monotonic_ns()
+def _boot() -> str:
+    """Identity of the machine's present boot, which `time.monotonic` counts from."""
+    try:
+        return _BOOT.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+@dataclass(frozen=True)
+class WallOffset:
+    """Unix time less `time.monotonic`: it changes when the wall clock is set, and only then."""
+
+    boot: str
+    """The machine's boot in which it was read."""
+    seconds: float
+
+    @classmethod
+    def read(cls) -> Self:
+        """The present offset of this machine."""
+        while True:
+            before, wall, after = time.monotonic(), time.time(), time.monotonic()
+            if after - before < _READING_SECONDS:
+                return cls(_boot(), wall - (before + after) / 2)
+
+    @property
+    def current(self) -> bool:
+        """Whether it was read in this boot: `time.monotonic` has not begun anew since."""
+        return bool(self.boot) and self.boot == _boot()
+
+    def monotonic(self, moment: float) -> float:
+        """`time.monotonic` of a moment in Unix seconds, told by the wall clock of that time."""
+        return moment - (self if self.current else self.read()).seconds
+
+
+_epoch_offset = round(WallOffset.read().seconds * NANOSECONDS)
 
 
 def host_time_ns() -> int:
     """Nanoseconds since the Unix epoch that never step backwards within a process.
 
-    Comparable between processes of one host to some microseconds, and between hosts as well as
-    their clocks are kept together.
+    Comparable between processes of one host to some microseconds, if one has sent the others its
+    `HostEpoch`, and between hosts as well as their clocks are kept together.
     """
-    return time.monotonic_ns() + _EPOCH_OFFSET
+    return time.monotonic_ns() + _epoch_offset
+
+
+@dataclass(frozen=True)
+class HostEpoch:
+    """This process' `host_time_ns`: a process of the same machine that unpickles it takes it over.
+
+    Otherwise two processes would differ by what the wall clock was set by between their starts.
+    """
+
+    def __reduce__(self) -> tuple[Any, tuple[str, int]]:
+        """Pickle it so that unpickling sets the clock."""
+        return _adopted, (_boot(), _epoch_offset)
+
+
+def _adopted(boot: str, offset: int) -> HostEpoch:
+    global _epoch_offset  # noqa: PLW0603 - one clock of a process
+    if boot and boot == _boot():
+        _epoch_offset = offset
+    return HostEpoch()
 
 
 def seconds(nanoseconds: int) -> float:

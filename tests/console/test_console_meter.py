@@ -48,7 +48,7 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
 def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who told it may hang."""
     now = 100.0
-    monkeypatch.setattr("aerodaas.console.meter.time.time", lambda: now)
+    monkeypatch.setattr("aerodaas.console.meter.host_time_ns", lambda: int(now * 1e9))
     meter, state = FlightMeter(), flying_to(1)
     for _ in range(2):
         meter.note(state)

@@ -24,7 +24,7 @@ T0 = 1_800_000_000.0
 
 
 class Clock:
-    """Unix time as a test wants it."""
+    """Time as a test wants it."""
 
     now = T0
 
@@ -33,9 +33,9 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Of the garage."""
     clock = Clock()
-    names = ("monotonic", "strftime", "gmtime")
-    functions = {name: getattr(time, name) for name in names}
-    monkeypatch.setattr(garages, "time", SimpleNamespace(time=lambda: clock.now, **functions))
+    functions = {name: getattr(time, name) for name in ("strftime", "gmtime")}
+    moments = dict.fromkeys(("time", "monotonic"), lambda: clock.now)
+    monkeypatch.setattr(garages, "time", SimpleNamespace(**moments, **functions))
     return clock
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import subprocess
+import sys
 import threading
 import time
 
@@ -81,6 +84,34 @@ def test_a_lockstep_sleeper_wakes_at_its_stamp_and_no_sooner() -> None:
     lockstep.advance_to(10)
     sleeper.join(10)
     assert woke == [10]
+
+
+@pytest.mark.parametrize("hours", [1, -1])
+def test_processes_of_one_machine_count_alike_if_the_wall_clock_is_set_between_their_starts(
+    hours: int,
+) -> None:
+    """One that unpickles the other's epoch; of another machine it means nothing."""
+    program = (
+        "import pickle, sys, time\n"
+        "real, whole = time.time, time.time_ns\n"
+        f"time.time = lambda: real() + {hours} * 3600\n"
+        f"time.time_ns = lambda: whole() + {hours} * 3600 * 10**9\n"
+        "from aerodaas.types import clock\n"
+        "print(clock.host_time_ns())\n"
+        "epoch = sys.stdin.buffer.read()\n"
+        "clock._adopted('another', 5)\n"
+        "print(clock.host_time_ns())\n"
+        "pickle.loads(epoch)\n"
+        "print(clock.host_time_ns())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        input=pickle.dumps(clock.HostEpoch()),
+        capture_output=True,
+        check=True,
+    )
+    apart = [(int(line) - clock.host_time_ns()) / NANOSECONDS for line in done.stdout.split()]
+    assert apart == pytest.approx([3600 * hours, 3600 * hours, 0], abs=60)
 
 
 def test_seconds_and_host_time() -> None:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from dataclasses import replace
 from http import HTTPStatus
 
 from aerodaas.analytics.remote.attempts import WrongTokens
@@ -17,7 +18,7 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.tokens import digest_of, fits, parse
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.store import Store
-from aerodaas.service.store.rows import Account
+from aerodaas.service.store.rows import Account, Token
 
 __all__ = ["Access"]
 
@@ -25,6 +26,8 @@ _NO_SECRET = "0" * 64
 _REMEMBERED = 600.0
 """Seconds for which a token is known while the database does not answer."""
 _MOST_REMEMBERED = 1000
+_RELEASED = 1_704_067_200.0
+"""2024 in Unix seconds: before it there was no release, so a clock that shows it is not set."""
 
 
 class Access:
@@ -118,13 +121,22 @@ class Access:
             fits(given.secret, _NO_SECRET)  # as long as for a known one
             return None
         token, account = found
-        now = self._clock()
-        valid = not token.revoked and now < token.expires and not account.disabled
-        if not fits(given.secret, token.digest) or not valid:
+        right = fits(given.secret, token.digest)
+        if right and token.created < _RELEASED <= self._clock():
+            token = self._store.tokens.update(token.id, self._dated)
+        valid = not token.revoked and self._clock() < token.expires and not account.disabled
+        if not right or not valid:
             self._forget(key)
             return None
         scopes = token.scopes & account.scopes
         return self._admitted(key, account, scopes, token.id, token.expires)
+
+    def _dated(self, token: Token) -> Token:
+        """A token that was issued before the machine's clock was set: its days begin now."""
+        if token.created >= _RELEASED:
+            return token
+        now = self._clock()
+        return replace(token, created=now, expires=now + token.expires - token.created)
 
     def _of_issuer(self, text: str, issuer: OidcVerifier) -> Principal | None:
         issued = issuer.issued(text)
@@ -160,7 +172,9 @@ class Access:
             token=token,
         )
         with self._lock:
-            self._known[key] = (principal, min(expires, self._clock() + _REMEMBERED))
+            # The database and the wall clock may fail together, as a machine starts.
+            left = min(expires - self._clock(), _REMEMBERED)
+            self._known[key] = (principal, time.monotonic() + left)
             self._known.move_to_end(key)
             if len(self._known) > _MOST_REMEMBERED:
                 self._known.popitem(last=False)
@@ -173,4 +187,4 @@ class Access:
     def _remembered(self, key: str) -> Principal | None:
         with self._lock:
             principal, until = self._known.get(key, (None, 0.0))
-        return principal if self._clock() < until else None
+        return principal if time.monotonic() < until else None

@@ -30,6 +30,7 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.unix_server import UnixServer
+from aerodaas.types.clock import host_time_ns, seconds
 from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["ControlServer", "Flown", "Reader"]
@@ -82,7 +83,7 @@ class Flown(Protocol):
         ...
 
     def told(self) -> dict[str, float]:
-        """Unix seconds when that status came, by robot."""
+        """Host time in seconds when that status came, by robot."""
         ...
 
     def preflight(self) -> dict[str, PreflightOut]:
@@ -209,6 +210,7 @@ class ControlServer:
             message = {
                 "robots": robots,
                 "told": self._flown.told(),
+                "now": seconds(host_time_ns()),
                 "alerts": alerts,
                 "analytics": None if sums is None else sums.model_dump(),
                 "streams": streams,
@@ -258,7 +260,11 @@ class ControlServer:
                 or not self._sharing.allows(mission, stream)
             ):
                 return
-            channel.send(*(found if found is not None else ({}, b"")), timeout=_SEND_SECONDS)
+            message, blob = found if found is not None else ({}, b"")
+            if "captured" in message:
+                # The other process may count host time from elsewhere.
+                message["age"] = max(0, host_time_ns() - message["captured"])
+            channel.send(message, blob, timeout=_SEND_SECONDS)
 
     def _here(self, channel: Channel, _: dict[str, Any]) -> None:
         """Connect the user's side: questions go out by a bounded queue, answers come in."""

@@ -18,6 +18,7 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.trouble import TroubleLog
+from aerodaas.types.clock import host_time_ns, seconds
 from aerodaas.types.errors import ConfigError, MissionError
 
 __all__ = ["FlightLink", "FlightNews"]
@@ -41,7 +42,7 @@ class FlightNews:
     """Counts the news."""
     status: dict[str, StatusOut] = field(default_factory=dict)
     told: dict[str, float] = field(default_factory=dict)
-    """Unix seconds when that status came, by robot."""
+    """Host time in seconds when that status came, by robot."""
     alerts: list[str] = field(default_factory=list)
     analytics: AnalyticsOut | None = None
     streams: dict[str, StreamKind] = field(default_factory=dict)
@@ -76,6 +77,8 @@ class FlightLink:
         self._places = threading.BoundedSemaphore(_MOST_ASKED)
         self._closed = threading.Event()
         self.news = FlightNews()
+        self._ahead = 0.0
+        """Seconds by which this process' host time is ahead of the flight's."""
         threading.Thread(target=self._follow, name="flight", daemon=True).start()
         threading.Thread(target=self._tell_heard, name="presence", daemon=True).start()
 
@@ -181,6 +184,10 @@ class FlightLink:
 
     def _follow_once(self) -> None:
         with contextlib.closing(self._connected("follow")) as channel:
+            message, _ = channel.receive(_SILENT_SECONDS)
+            # The flight's process may count host time from elsewhere.
+            self._ahead = seconds(host_time_ns()) - message.get("now", 0.0)
+            self._take(message)
             while not self._closed.is_set():
                 self._take(channel.receive(_SILENT_SECONDS)[0])
 
@@ -192,7 +199,7 @@ class FlightLink:
         self.news = FlightNews(
             self.news.number + 1,
             robots,
-            {name: float(moment) for name, moment in message.get("told", {}).items()},
+            {name: moment + self._ahead for name, moment in message.get("told", {}).items()},
             message["alerts"],
             None if sums is None else AnalyticsOut(**sums),
             streams,

@@ -12,6 +12,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
+from aerodaas.types.clock import WallOffset
 
 __all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome", "Progress"]
 
@@ -60,6 +61,8 @@ class FlightOrder(_Record):
     ends: float
     """End of the lease, Unix seconds; after it the drones come home, whatever becomes of the
     service."""
+    offset: WallOffset | None = None
+    """Of the wall clock by which `ends` is meant; None for the present one."""
     minutes: float
     """Length of the lease."""
     limits: TenantLimits = TenantLimits()

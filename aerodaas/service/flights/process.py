@@ -220,7 +220,7 @@ class Flying:
         return self._meter.status, self._meter.alerts
 
     def told(self) -> dict[str, float]:
-        """Unix seconds when that status came, by robot."""
+        """Host time in seconds when that status came, by robot."""
         return self._meter.told
 
     def preflight(self) -> dict[str, PreflightOut]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from aerodaas.cameras.base import Picture
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
 from aerodaas.service.flights.order import Attached
-from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Frame, Odometry
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import CameraModel
@@ -84,11 +84,11 @@ class SharedCamera:
             return None
         item, captured = frame
         self.model = item.camera
-        age = max(0, host_time_ns() - captured)
+        age = time.monotonic_ns() - captured
         return Picture(item.image, max(0, stamp - age), odometry=item.odometry, depth=item.depth)
 
     def _next_frame(self) -> tuple[Frame, int] | None:
-        """The newest frame that was not returned, and the host time of its capture."""
+        """The newest frame that was not returned, and its capture by `time.monotonic_ns`."""
         if self._channel is None or self.finished:
             return None
         try:
@@ -106,7 +106,7 @@ class SharedCamera:
         if not isinstance(item, Frame):
             self.skipped += 1
             return None
-        return item, int(message["captured"])
+        return item, time.monotonic_ns() - int(message["age"])
 
     def close(self) -> None:
         """Ask no more."""

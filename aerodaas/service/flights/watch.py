@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from aerodaas.protocol.schemas import SilencePolicy
 from aerodaas.service.flights.order import FlightOrder
+from aerodaas.types.clock import WallOffset
 
 __all__ = ["LeaseWatch"]
 
@@ -18,8 +19,8 @@ _PERIOD = 0.2
 class LeaseWatch:
     """Brings the drones home when their lease ends, their mission is cancelled or its user silent.
 
-    It runs beside the drones, so that neither needs the service. Time is monotonic from the start
-    on: a clock that is set in flight neither prolongs a lease nor ends it.
+    It runs beside the drones, so that neither needs the service. Time is monotonic from the order
+    on: a clock that is set neither prolongs a lease nor ends it.
     """
 
     def __init__(
@@ -41,14 +42,10 @@ class LeaseWatch:
         self._patience = order.silence_seconds
         self._lock = threading.Lock()
         self._heard = time.monotonic()
-        self._ends = self._monotonic(order.ends)
+        self._ends = (order.offset or WallOffset.read()).monotonic(order.ends)
         self._over = threading.Event()
         self.reason = ""
         """Why the drones were called home; empty while the lease is good."""
-
-    @staticmethod
-    def _monotonic(moment: float) -> float:
-        return time.monotonic() + moment - time.time()
 
     def start(self) -> None:
         """Start watching; what is due already is told before this returns."""
@@ -71,7 +68,7 @@ class LeaseWatch:
         with self._lock:
             if self.reason:
                 return False
-            self._ends = self._monotonic(ends)
+            self._ends = WallOffset.read().monotonic(ends)
             return True
 
     def end(self, reason: str) -> None:

@@ -184,6 +184,16 @@ class LeaseBook:
             self._settle(now, fleet)
             return self._told()
 
+    def set_clock(self, seconds: float) -> None:
+        """Move the ends of all leases by what the wall clock was set by: their minutes stay."""
+        with self._lock:
+            for lease in self._live.values():
+                if lease.granted is not None and lease.ends is not None:
+                    moved = replace(
+                        lease, granted=lease.granted + seconds, ends=lease.ends + seconds
+                    )
+                    self._live[lease.id] = self._unsaved[lease.id] = moved
+
     def live(self) -> list[Lease]:
         """Those queued or granted, in the queue's order."""
         with self._lock:
@@ -213,7 +223,7 @@ class LeaseBook:
 
     @property
     def unsaved(self) -> int:
-        """Ended leases that the database has not taken yet."""
+        """Leases that have ended or been moved, which the database has not taken yet."""
         return len(self._unsaved)
 
     def _end(

@@ -113,6 +113,8 @@ class VehicleWatcher:
     def _watch(self, vehicle: Vehicle) -> str:
         """Read until it is wanted no more, or silent; returns why it is lost."""
         armed = False
+        with self._lock:
+            self._read_at = time.monotonic()
         checklist = Checklist(vehicle, self._robot.limits, self._robot.preflight)
         while True:
             try:
@@ -132,7 +134,7 @@ class VehicleWatcher:
                 self._see(state, objections, now)
                 if items is not None:
                     self._tell(health=tuple(items), examined=now)
-            if not state.armed and self._silence(now) > _ANEW_SECONDS:
+            if not state.armed and self._silence() > _ANEW_SECONDS:
                 return self._news.reason
             with self._lock:
                 unwanted = self._lock.wait_for(lambda: not self._wanted, _READ_SECONDS)
@@ -141,9 +143,10 @@ class VehicleWatcher:
             if unwanted:
                 time.sleep(_READ_SECONDS)
 
-    def _silence(self, now: float) -> float:
-        news = self._news
-        return now - news.since if news.link is LinkState.LOST else 0.0
+    def _silence(self) -> float:
+        """Seconds since the vehicle was heard last, while its link is lost."""
+        lost = self._news.link is LinkState.LOST
+        return time.monotonic() - self._read_at if lost else 0.0
 
     def _see(self, state: VehicleState, objections: list[str], now: float) -> None:
         charge = state.battery.fraction
