@@ -8,9 +8,10 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 import pytest
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from aerodaas.analytics.remote import serving
@@ -104,6 +105,37 @@ def test_silent_clients_make_room_for_others(port: int) -> None:
         assert asking.recv(1000).startswith(b"HTTP/1.1 200")
 
 
+def test_a_new_client_takes_the_place_of_the_oldest_that_asks_nothing(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At once, however many come; who has asked, or has a WebSocket, keeps its place."""
+    monkeypatch.setattr(serving, "_HEAD_SECONDS", 10 * _ENOUGH)
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as kept, ExitStack() as stack:
+        for _ in range(20):
+            stack.enter_context(client(port))
+        with client(port) as asking:
+            asking.sendall(HEAD + b"body")
+            assert asking.recv(1000).startswith(b"HTTP/1.1 200")
+        kept.send("still here")
+        assert kept.recv(_ENOUGH) == "still here"
+
+
+def test_room_is_made_at_the_address_with_most_silent_connections(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who connects from elsewhere, once, and has not asked yet, keeps the place."""
+    monkeypatch.setattr(serving, "_HEAD_SECONDS", 10 * _ENOUGH)
+    source = ("127.0.0.2", 0)
+    with (
+        socket.create_connection(("127.0.0.1", port), _ENOUGH, source) as other,
+        ExitStack() as stack,
+    ):
+        for _ in range(20):
+            stack.enter_context(client(port))
+        other.sendall(HEAD + b"body")
+        assert other.recv(1000).startswith(b"HTTP/1.1 200")
+
+
 def test_headers_that_drip_are_closed(port: int) -> None:
     """More bytes of the same request do not start the clock anew."""
     with client(port) as slow:
@@ -187,6 +219,61 @@ def test_a_body_within_its_time_is_taken(port: int) -> None:
             slow.sendall(piece)
             time.sleep(PATIENCE / 8)
         assert slow.recv(1000).startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize("fragmented", [False, True])
+def test_a_websocket_message_is_whole_in_time(
+    port: int, monkeypatch: pytest.MonkeyPatch, *, fragmented: bool
+) -> None:
+    """One that never ends closes its connection; further bytes of it do not start the clock."""
+    monkeypatch.setattr(serving, "_MESSAGE_SECONDS", PATIENCE)
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as slow:
+        part = b"\x01\x81\x00\x00\x00\x00a" if fragmented else _masked(200)[:20]
+        slow.socket.sendall(part)
+        drip = b"\x00\x81\x00\x00\x00\x00a" if fragmented else b"a"
+        deadline = time.monotonic() + _ENOUGH
+        with pytest.raises(ConnectionClosed) as closed:
+            while time.monotonic() < deadline:
+                slow.socket.sendall(drip)
+                with suppress(TimeoutError):
+                    slow.recv(0.02)
+    assert closed.value.rcvd is not None
+    assert "whole within" in closed.value.rcvd.reason
+
+
+def test_messages_one_after_the_other_are_each_given_their_time(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a part of the next one comes with the last."""
+    monkeypatch.setattr(serving, "_MESSAGE_SECONDS", PATIENCE)
+    frame = _masked(8)
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as busy:
+        busy.socket.sendall(frame[:3])
+        for _ in range(10):
+            busy.socket.sendall(frame[3:] + frame[:3])
+            assert busy.recv(_ENOUGH) == 8 * "a"
+            time.sleep(PATIENCE / 4)
+
+
+def test_unfinished_messages_are_bounded_for_all_together(
+    port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The oldest ends; who sends whole messages meanwhile is not touched."""
+    monkeypatch.setattr(serving, "_UNFINISHED_BYTES", 1000)
+    url = f"ws://127.0.0.1:{port}/"
+    with connect(url, open_timeout=_ENOUGH) as hoarder, connect(url, open_timeout=_ENOUGH) as other:
+        hoarder.socket.sendall(_masked(5000)[:900])
+        for _ in range(5):
+            other.send("x" * 400)
+            assert other.recv(_ENOUGH) == "x" * 400
+        other.socket.sendall(_masked(5000)[:500])
+        with pytest.raises(ConnectionClosed, match="connect again"):
+            hoarder.recv(_ENOUGH)
+
+
+def _masked(size: int) -> bytes:
+    """The frame of a text of so many letters `a`, masked by zeros, with its length in two bytes."""
+    return b"\x81\xfe" + size.to_bytes(2, "big") + bytes(4) + b"a" * size
 
 
 def test_a_websocket_stays(port: int) -> None:

@@ -2,15 +2,19 @@
 
 A server bounds its connections, so whoever opens all of them and says nothing, or says it a byte a
 minute ("slowloris"), or does not take the answer, would shut everybody out. uvicorn bounds only the
-time between two requests.
+time between two requests. Where all connections are taken, the oldest that awaits a request is
+closed for a new one, of the address that has most of these. WebSocket messages that are not whole
+are bounded in time, and in memory for all connections together.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict, defaultdict
 from typing import TYPE_CHECKING, Any
 
 import uvicorn
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 if TYPE_CHECKING:
     import asyncio
@@ -27,6 +31,13 @@ _BODY_SECONDS = 300.0
 """For a body: 64 MiB, the largest model, by 2 Mbit/s."""
 _TAKEN_SECONDS, _TAKEN_BYTES = 30.0, 30_000
 """A client takes so many of the bytes that wait for it, or all of them, in so many seconds."""
+_MESSAGE_SECONDS = 30.0
+"""From the first byte of a WebSocket's message to its last."""
+_UNFINISHED_BYTES = 64 << 20
+"""Of the WebSocket messages of a server that are not whole yet; the oldest is given up first."""
+_MOST_FRAGMENTS = 64
+_TRY_AGAIN_LATER, _POLICY_VIOLATION = 1013, 1008
+"""Codes by which a WebSocket is closed (RFC 6455)."""
 
 
 def web_server(app: Any, *, most_connections: int, **settings: Any) -> uvicorn.Server:  # noqa: ANN401 - uvicorn's
@@ -34,12 +45,14 @@ def web_server(app: Any, *, most_connections: int, **settings: Any) -> uvicorn.S
 
     Args:
         app: The application.
-        most_connections: Connections at a time; a request of a further one is answered by 503.
+        most_connections: Connections at a time; a request of a further one is answered by 503,
+            unless one that awaits a request makes room for it.
         settings: Further ones of `uvicorn.Config`.
     """
-    config = uvicorn.Config(
+    config = _Config(
         app,
         http=_ImpatientProtocol,
+        ws=_ImpatientWebSocket,
         limit_concurrency=most_connections,
         log_config=None,
         access_log=False,
@@ -49,9 +62,113 @@ def web_server(app: Any, *, most_connections: int, **settings: Any) -> uvicorn.S
     return uvicorn.Server(config)
 
 
+class _Connections:
+    """Connections of one server that await a request, and WebSocket messages not yet whole."""
+
+    def __init__(self) -> None:
+        self._awaiting: defaultdict[str, OrderedDict[_ImpatientProtocol, None]]
+        self._awaiting = defaultdict(OrderedDict)
+        """By address, the oldest first."""
+        self._unfinished: dict[_ImpatientWebSocket, int] = {}
+        """Bytes by connection, the message that began first before the others."""
+
+    def await_request(self, connection: _ImpatientProtocol) -> None:
+        """Note that a connection may make room for another one."""
+        self._awaiting[connection.address].setdefault(connection)
+
+    def keep(self, connection: _ImpatientProtocol) -> None:
+        """Note that a connection has a request, or has ended."""
+        connections = self._awaiting[connection.address]
+        connections.pop(connection, None)
+        if not connections:
+            del self._awaiting[connection.address]
+
+    def make_room(self, newcomer: _ImpatientProtocol) -> None:
+        """Close the oldest connection without a request, of the address with most of them."""
+        oldest = next(iter(max(self._awaiting.values(), key=len)))
+        if oldest is not newcomer:
+            self.keep(oldest)
+            oldest.transport.abort()
+            # Its end is told later than a request of the new one may be.
+            oldest.connections.discard(oldest)
+
+    def hold(self, connection: _ImpatientWebSocket, size: int) -> None:
+        """Note the bytes that are kept of a message; the oldest ones end for too many of all."""
+        if size:
+            self._unfinished[connection] = size
+        else:
+            self._unfinished.pop(connection, None)
+        while sum(self._unfinished.values()) > _UNFINISHED_BYTES:
+            oldest = next(iter(self._unfinished))
+            del self._unfinished[oldest]
+            oldest.give_up(_TRY_AGAIN_LATER, "too many unfinished messages: connect again")
+
+
+class _Config(uvicorn.Config):
+    """Settings of one server, with what its connections share."""
+
+    def __init__(self, *words: Any, **settings: Any) -> None:  # noqa: ANN401 - uvicorn's
+        super().__init__(*words, **settings)
+        self.shared = _Connections()
+
+
+class _ImpatientWebSocket(WebSocketsSansIOProtocol):
+    """Closes a connection whose message does not become whole in time."""
+
+    config: _Config
+    _closing: asyncio.TimerHandle | None = None
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if len(self.frames) > _MOST_FRAGMENTS:
+            # Fragments of a byte take forty times their size.
+            self.frames = [b"".join(self.frames)]
+        size = len(self.conn.reader.buffer) + sum(map(len, self.frames))
+        self.config.shared.hold(self, size)
+        if not size:
+            self._stop()
+        elif self._closing is None:
+            self._closing = self.loop.call_later(_MESSAGE_SECONDS, self._require_whole)
+
+    def send_receive_event_to_app(self) -> None:
+        super().send_receive_event_to_app()
+        self._stop()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop()
+        self.config.shared.hold(self, 0)
+        super().connection_lost(exc)
+
+    def give_up(self, code: int, reason: str) -> None:
+        """Close the connection with a reason."""
+        self._stop()
+        if not self.close_sent and not self.transport.is_closing():
+            self.conn.fail(code, reason)
+            self.close_sent = True
+            self.transport.write(b"".join(self.conn.data_to_send()))
+            self.transport.close()
+
+    def _require_whole(self) -> None:
+        self._closing = None
+        if self.read_paused:
+            # It is not the client who is waited for.
+            self._closing = self.loop.call_later(_MESSAGE_SECONDS, self._require_whole)
+        else:
+            text = f"a message is whole within {_MESSAGE_SECONDS:g} s: send it faster"
+            self.give_up(_POLICY_VIOLATION, text)
+
+    def _stop(self) -> None:
+        if self._closing is not None:
+            self._closing.cancel()
+            self._closing = None
+
+
 class _ImpatientProtocol(_Protocol):
     """Closes a connection whose request does not become whole in time, or whose answer stays."""
 
+    config: _Config
+    address = ""
+    """From which the connection comes."""
     _awaited = 0.0
     """Seconds granted to what is awaited now; 0 while a request is answered."""
     _closing: asyncio.TimerHandle | None = None
@@ -61,7 +178,10 @@ class _ImpatientProtocol(_Protocol):
         super().connection_made(transport)
         # So that it is told of any byte that waits: a connection that is closed waits for the last.
         transport.set_write_buffer_limits(high=0)
+        self.address = self.client[0] if self.client else ""
         self._wait()
+        if len(self.connections) >= self.config.limit_concurrency:
+            self.config.shared.make_room(self)
 
     def pause_writing(self) -> None:
         super().pause_writing()
@@ -70,6 +190,7 @@ class _ImpatientProtocol(_Protocol):
     def resume_writing(self) -> None:
         super().resume_writing()
         self._stop_taking()
+        self._note()
 
     def handle_websocket_upgrade(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
@@ -84,11 +205,17 @@ class _ImpatientProtocol(_Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         super().connection_lost(exc)
+        self.config.shared.keep(self)
         self._stop_waiting()
         self._stop_taking()
 
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        self._note()
+
     def _wait(self) -> None:
         """Start the clock where something else is awaited than before; more bytes of it do not."""
+        self._note()
         seconds = self._seconds()
         if seconds != self._awaited:
             self._stop_waiting()
@@ -96,13 +223,25 @@ class _ImpatientProtocol(_Protocol):
             if seconds:
                 self._closing = self.loop.call_later(seconds, self.transport.close)
 
-    def _seconds(self) -> float:
-        if self.transport.get_protocol() is not self:
-            return 0.0  # a WebSocket, which has pings of its own
+    def _note(self) -> None:
+        # One whose answer is still on its way makes no room.
+        if self._awaits_request() and not self.transport.get_write_buffer_size():
+            self.config.shared.await_request(self)
+        else:
+            self.config.shared.keep(self)
+
+    def _awaits_request(self) -> bool:
+        if self.transport.get_protocol() is not self or self.transport.is_closing():
+            return False  # a WebSocket, which has pings of its own, or one that ends
         cycle = self.cycle
-        if cycle is None or cycle.response_complete:  # pyright: ignore[reportUnnecessaryComparison]
+        return cycle is None or cycle.response_complete  # pyright: ignore[reportUnnecessaryComparison]
+
+    def _seconds(self) -> float:
+        if self._awaits_request():
             return _HEAD_SECONDS
-        return _BODY_SECONDS if cycle.more_body else 0.0
+        if self.transport.get_protocol() is not self:
+            return 0.0
+        return _BODY_SECONDS if self.cycle.more_body else 0.0
 
     def _await_taking(self) -> None:
         waiting = self.transport.get_write_buffer_size()
