@@ -6,6 +6,7 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
+from aerodaas.analytics.here.relay import LARGEST_ANSWER
 from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.analytics.remote.listening import listen
 from aerodaas.analytics.remote.serving import web_server
@@ -20,8 +21,9 @@ from aerodaas.types.errors import ConfigError, SourceError
 __all__ = ["serve"]
 
 _MOST_CONNECTIONS = 1000
-_MOST_MESSAGE = 64 << 20
-"""Bytes of a WebSocket message: a picture that an analysis at the user's side answers with."""
+_MOST_MESSAGE = LARGEST_ANSWER + (64 << 10)
+"""Bytes of a WebSocket message: what an analysis at the user's side answers, and what belongs to
+it."""
 _PING_SECONDS = 5.0
 """Seconds after which a watcher who does not answer is gone."""
 

@@ -18,8 +18,7 @@ from served import document, fleet, robot
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from aerodaas.analytics.guests.channel import LARGEST_TEXT
-from aerodaas.analytics.here.relay import HereRelay, HereUser
+from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
 from aerodaas.analytics.remote.listening import listen
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.analytics.remote.serving import web_server
@@ -28,7 +27,7 @@ from aerodaas.console import controls as hand
 from aerodaas.console import live
 from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
-from aerodaas.service import gate
+from aerodaas.service import gate, serve
 from aerodaas.service import mission as missions
 from aerodaas.service.access import Accounts, Principal
 from aerodaas.service.app import build_service
@@ -183,7 +182,8 @@ def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
             start(desk)
 
         monkeypatch.setattr(MissionDesk, "start", started)
-        server = web_server(build_service(made.settings, made.store), most_connections=100)
+        app, largest = build_service(made.settings, made.store), serve._MOST_MESSAGE
+        server = web_server(app, most_connections=100, ws_max_size=largest)
         with listen("127.0.0.1", 0) as listener:
             made.port = listener.getsockname()[1]
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
@@ -297,7 +297,7 @@ def test_what_the_users_side_says_reaches_the_flight(
         assert service.relay.wait_attached(ENOUGH)
         socket.send(json.dumps({"number": 1, "item": None}))
         until(lambda: heard)
-        socket.send(json.dumps({"number": 2, "item": "x" * LARGEST_TEXT}))
+        socket.send(json.dumps({"number": 2, "item": "x" * 2 * LARGEST_ANSWER}))
         assert closed(socket)
     assert heard == [{"number": 1, "item": None}]
     flight.close()

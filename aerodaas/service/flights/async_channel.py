@@ -1,14 +1,16 @@
-"""The control socket's messages for an event loop; `analytics.guests.channel` has the others."""
+"""The control socket's messages for an event loop; `analytics.guests.channel` has the others.
+
+Their JSON is passed on as it is: who parses what a user has sent is the user's own flight.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import json
-from typing import Any
 
 from typing_extensions import Self
 
-from aerodaas.analytics.guests.channel import HEAD, LARGEST_BLOB, LARGEST_TEXT, GuestError
+from aerodaas.analytics.guests.channel import HEAD, GuestError
 from aerodaas.service.flights.folder import FlightFolder
 
 __all__ = ["AsyncChannel"]
@@ -29,26 +31,23 @@ class AsyncChannel:
             channel = cls(*await asyncio.open_unix_connection(str(folder.socket)))
         except OSError as error:
             raise GuestError(f"the flight does not answer: {error.strerror}") from None
-        await channel.send({"for": purpose})
+        await channel.send(json.dumps({"for": purpose}).encode())
         return channel
 
-    async def send(self, text: dict[str, Any], blob: bytes = b"") -> None:
-        """Send one message; raises GuestError if it is too large, or nobody is there any more."""
-        data = json.dumps(text).encode()
-        if len(data) > LARGEST_TEXT or len(blob) > LARGEST_BLOB:
-            raise GuestError(f"a message of {len(data)} and {len(blob)} bytes is too large")
+    async def send(self, text: bytes) -> None:
+        """Send a message of JSON; raises GuestError if nobody is there any more."""
         try:
-            self._writer.write(HEAD.pack(len(data), len(blob)) + data + blob)
+            self._writer.write(HEAD.pack(len(text), 0) + text)
             await self._writer.drain()
         except OSError as error:
             raise GuestError(f"the flight has ended: {error.strerror}") from None
 
-    async def receive(self) -> tuple[dict[str, Any], bytes]:
-        """Receive one message; raises GuestError when nobody is there any more."""
+    async def receive(self) -> tuple[bytes, bytes]:
+        """Receive one message, JSON and a blob; raises GuestError when nobody is there any more."""
         try:
             text, blob = HEAD.unpack(await self._reader.readexactly(HEAD.size))
             data = await self._reader.readexactly(text)
-            return json.loads(data), await self._reader.readexactly(blob)
+            return data, await self._reader.readexactly(blob)
         except (OSError, asyncio.IncompleteReadError) as error:
             raise GuestError(f"the flight has ended: {error}") from None
 

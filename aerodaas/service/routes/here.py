@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
-from typing import Any
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
-from aerodaas.analytics.guests.channel import LARGEST_TEXT, GuestError
+from aerodaas.analytics.guests.channel import GuestError
 from aerodaas.console.jobs import end_jobs
 from aerodaas.console.live import until_refused
 from aerodaas.protocol.schemas import Role, Scope
@@ -29,8 +27,8 @@ _AGAIN_SECONDS = 0.5
 class HereRoutes:
     """Route `/v1/missions/{id}/here`.
 
-    A message is a text with JSON, followed by a binary one if its `blob` is true. The connection
-    may be made before the flight begins, and ends with it.
+    A question is a text with JSON, followed by a binary message if its `blob` is true; an answer
+    is a text alone. The connection may be made before the flight begins, and ends with it.
     """
 
     def __init__(self, desk: MissionDesk, admission: Admission) -> None:
@@ -98,7 +96,8 @@ class _User:
         try:
             while True:
                 question, blob = await channel.receive()
-                await self._socket.send_text(json.dumps({**question, "blob": bool(blob)}))
+                more = b', "blob": true}' if blob else b', "blob": false}'
+                await self._socket.send_text((question[:-1] + more).decode())
                 if blob:
                     await self._socket.send_bytes(blob)
         finally:
@@ -110,18 +109,8 @@ class _User:
 
         It always listens: who has gone is noticed before the flight begins, too.
         """
-        while len(text := await self._socket.receive_text()) <= LARGEST_TEXT:
-            answer = _object(text)
-            blob = await self._socket.receive_bytes() if answer.pop("blob", False) else b""
+        while True:
+            answer = (await self._socket.receive_text()).encode()
             if self._channel is not None:
                 with contextlib.suppress(GuestError):
-                    await self._channel.send(answer, blob)
-
-
-def _object(text: str) -> dict[str, Any]:
-    """A JSON object; an empty one for anything else, which the flight takes for no answer."""
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}
+                    await self._channel.send(answer)
