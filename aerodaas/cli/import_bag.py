@@ -103,6 +103,10 @@ def _told(done: ImportedBag) -> list[str]:
     lines = [str(done.summary)]
     for topic, (count, reason) in done.skipped.items():
         lines.append(printable(f"skipped {count} of {topic}, the first because {reason}"))
+    if not done.complete:
+        lines.append("the bag was cut off at its end: what was recorded after that is missing")
+    if done.leaps:
+        lines.append("the bag's clock was set while it was recorded; times go on without the leap")
     if done.damaged:
         lines.append(f"skipped {done.damaged} broken messages or chunks")
     for camera, known in done.lenses.items():

@@ -189,7 +189,11 @@ def picture_topics(recording: Recording) -> list[str]:
 
 
 def shots(
-    recording: Recording, topics: Collection[str] | None = None, since: int | None = None
+    recording: Recording,
+    topics: Collection[str] | None = None,
+    since: int | None = None,
+    *,
+    as_written: bool = False,
 ) -> Iterator[Shot]:
     """Iterate over images in the order of recording, without decoding them.
 
@@ -201,6 +205,7 @@ def shots(
         topics: Topics to read; None for all that hold images.
         since: Earliest mission time of recording, nanoseconds; None for the beginning. Frames of
             a video can be decoded from its first key frame after that.
+        as_written: In the order of the file, as `Recording.records` has it.
 
     Yields:
         Images with their headers and, if recorded, odometry and depth.
@@ -212,7 +217,9 @@ def shots(
     wanted = None
     if topics is not None:
         wanted = {name for one in topics for name in (one, *_heads(one), _depth_of(one))}
-    for record in recording.records(schemas=schemas, topics=wanted, since=since):
+    for record in recording.records(
+        schemas=schemas, topics=wanted, since=since, as_written=as_written
+    ):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
             continue

@@ -241,11 +241,13 @@ class Recording:
         bare: Collection[str] = (),
         since: int | None = None,
         until: int | None = None,
+        as_written: bool = False,
     ) -> Iterator[Record]:
         """Iterate over messages in the order of log times.
 
         Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows. Chunks
-        outside of the given time are not read.
+        outside of the given time are not read. A message without a time of publishing was captured
+        when it was recorded.
 
         Args:
             schemas: Names of the schemas to read; None for all.
@@ -253,6 +255,7 @@ class Recording:
             bare: Topics whose messages are not decoded: their value is None.
             since: Earliest mission time of recording, nanoseconds; None for the first message's.
             until: Latest one; None for the last message's.
+            as_written: In the order of the file instead, as a clock that was set back asks for.
 
         Yields:
             Messages, checked by `messages.MessageDecoder`; a damaged chunk or a broken message is
@@ -266,7 +269,8 @@ class Recording:
         }
         first = 0 if since is None else since + self.epoch_ns
         last = _NEVER if until is None else until + self.epoch_ns
-        for message in self._messages(wanted, first, last):
+        is_ours = bool(self.provenance)
+        for message in self._messages(wanted, first, last, as_written=as_written):
             channel = self._index.channels[message.channel_id]
             schema = self._index.schemas.get(channel.schema_id)
             value = None
@@ -280,7 +284,8 @@ class Recording:
                 channel.topic,
                 self._schema_name(channel),
                 message.log_time - self.epoch_ns,
-                message.publish_time - self.epoch_ns,
+                (message.publish_time if is_ours else message.publish_time or message.log_time)
+                - self.epoch_ns,
                 message.sequence,
                 value,
             )
@@ -304,15 +309,21 @@ class Recording:
         schema = self._index.schemas.get(channel.schema_id)
         return schema.name if schema else ""
 
-    def _messages(self, wanted: set[int], first: int, last: int) -> Iterator[Message]:
-        blocks = sorted(
-            (
-                block
-                for block in self._index.blocks
-                if block.channels & wanted and block.start <= last and block.end >= first
-            ),
-            key=lambda block: block.start,
-        )
+    def _messages(
+        self, wanted: set[int], first: int, last: int, *, as_written: bool
+    ) -> Iterator[Message]:
+        blocks = [
+            block
+            for block in self._index.blocks
+            if block.channels & wanted and block.start <= last and block.end >= first
+        ]
+        if as_written:
+            for block in sorted(blocks, key=lambda block: block.offset):
+                for message in self._load(block):
+                    if message.channel_id in wanted and first <= message.log_time <= last:
+                        yield message
+            return
+        blocks.sort(key=lambda block: block.start)
         # Chunks may overlap in time: hold messages back until no later chunk can precede them.
         held: list[tuple[int, int, Message]] = []
         order = size = 0

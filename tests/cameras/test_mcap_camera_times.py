@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -35,16 +36,24 @@ def jpeg(number: int, width: int = 32) -> bytes:
 
 def write(path: Path, *pictures: tuple[float, bytes], topic: str = "/cam") -> Path:
     """Record pictures, each taken at a second, one after the other."""
+    timed = [
+        (5 * SECOND + number, 5 * SECOND + round(second * SECOND), data)
+        for number, (second, data) in enumerate(pictures)
+    ]
+    return write_at(path, timed, topic)
+
+
+def write_at(path: Path, timed: Sequence[tuple[int, int, bytes]], topic: str = "/cam") -> Path:
+    """Record pictures with their times of recording and capture, nanoseconds."""
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
         described = CompressedImage.get_schema()
         schema = writer.register_schema(described.name, described.encoding, described.data)
         channel = writer.register_channel(topic, "protobuf", schema)
-        for number, (second, data) in enumerate(pictures):
+        for number, (recorded, captured, data) in enumerate(timed):
             message = CompressedImage(data=data, format="jpeg").encode()
-            captured = 5 * SECOND + round(second * SECOND)
-            writer.add_message(channel, 5 * SECOND + number, message, captured, number)
+            writer.add_message(channel, recorded, message, captured, number)
         writer.finish()
     return path
 
@@ -123,6 +132,32 @@ def test_pictures_older_than_the_one_before_are_passed_over_and_counted(tmp_path
     assert asked(source, 0.5) == [4]
     assert source.skipped == 2
     assert asked(source, 0.9) == [5]
+    assert source.finished
+
+
+@pytest.mark.parametrize("leap", [-3600.0, -11.0, 7200.0, 56 * 365.25 * 86_400.0])
+@pytest.mark.parametrize("logged", [False, True])
+def test_a_clock_that_was_set_hides_no_picture_and_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, leap: float, *, logged: bool
+) -> None:
+    """After six of twelve, back or forth; of capture alone, or of the recording's time as well."""
+    timed = []
+    for number in range(12):
+        taken = round((5000 + 0.5 * number + (leap if number > 5 else 0.0)) * SECOND)
+        timed.append((taken if logged else 5 * SECOND + number, taken, jpeg(number)))
+    source = camera(write_at(tmp_path / "a.mcap", timed))
+    assert asked(source, *(0.5 * number for number in range(12))) == [*range(12)]
+    assert source.finished
+    assert source.skipped == 0
+    told = [one for one in caplog.records if "clock" in one.getMessage()]
+    assert len(told) == 1
+
+
+def test_pictures_without_a_time_of_publishing_were_taken_when_recorded(tmp_path: Path) -> None:
+    """Zero means that there is none."""
+    timed = [((9 + number) * SECOND, 0, jpeg(number)) for number in range(12)]
+    source = camera(write_at(tmp_path / "a.mcap", timed))
+    assert asked(source, *range(12)) == [*range(12)]
     assert source.finished
 
 

@@ -42,6 +42,7 @@ def cut_off(folder: Path, storage: str, share: float) -> Path:
 def test_what_is_whole_of_a_cut_off_bag_is_taken(tmp_path: Path) -> None:
     """As of any MCAP file."""
     done = imported(cut_off(tmp_path, "MCAP", 2 / 3), tmp_path)
+    assert not done.complete
     assert 0 < done.summary.channels["/drone/state"] < 4000
 
 
@@ -210,4 +211,5 @@ def test_the_start_is_that_of_the_first_message(tmp_path: Path) -> None:
     """Capture times count from the earliest, whatever the bag's own clock was late by."""
     sent = [odometry(index, late=SECOND // 50) for index in range(5)]
     done = imported(write(tmp_path / "bag", sent), tmp_path)
+    assert done.complete
     assert done.summary.duration == pytest.approx(0.4)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ros_bags import EPOCH, TYPES, Sent, odometry, read, write
+from ros_bags import EPOCH, SECOND, TYPES, Sent, odometry, read, write
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 from typer.testing import CliRunner
 
@@ -232,6 +232,49 @@ def test_a_split_bag_is_one(tmp_path: Path) -> None:
         times = [message.time for message in opened.messages(["/odom"])]
     assert times == sorted(times)
     assert len(times) == 20
+
+
+@pytest.mark.parametrize("storage", ["MCAP", "SQLITE3"])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(0, -3600 * SECOND), (0, 7200 * SECOND), (10 * SECOND - EPOCH, 0)],
+    ids=["back", "forth", "at last"],
+)
+def test_a_bag_whose_clock_was_set_lasts_as_long_as_it_was_recorded(
+    tmp_path: Path, storage: str, before: int, after: int
+) -> None:
+    """Back or forth by hours, or from 1970 on: all states in their order, and the leap told."""
+    sent = []
+    for index in range(40):
+        one = odometry(index)
+        time = one.time + (before if index < 20 else after)
+        one.value.header.stamp.sec, one.value.header.stamp.nanosec = divmod(time, SECOND)
+        sent.append(one._replace(time=time))
+    folder = write(tmp_path / "bag", sent, storage)
+    result = CliRunner().invoke(
+        app, ["import", str(folder), "--odometry", "/odom", "--out", str(tmp_path / "out")]
+    )
+    assert result.exit_code == 0, result.output
+    assert "clock was set while it was recorded" in result.output
+    with Recording.open(tmp_path / "out" / "flight.mcap") as recording:
+        begins = EPOCH - SECOND // 10 if before else EPOCH
+        assert recording.epoch_ns == pytest.approx(begins, abs=SECOND)
+        states = [state for _, state in vehicle_states(recording, "drone")]
+    assert [state.odometry.position[2] for state in states] == [
+        pytest.approx(index / 10) for index in range(40)
+    ]
+    steps = np.diff([state.stamp for state in states])
+    assert steps == pytest.approx(SECOND / 10)
+
+
+def test_topics_written_one_after_the_other_are_no_leap(tmp_path: Path) -> None:
+    """As converters of data sets write them."""
+    sent = [odometry(20 * index) for index in range(40)]
+    sent += [one._replace(topic="/other") for one in sent]
+    with RosBag.open(write(tmp_path / "bag", sent)) as opened:
+        times = [message.time for message in opened.messages(["/odom", "/other"])]
+        assert opened.leaps == 0
+    assert times == sorted(times)
 
 
 def test_messages_compressed_one_by_one_are_read(tmp_path: Path) -> None:

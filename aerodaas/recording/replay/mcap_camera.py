@@ -11,6 +11,7 @@ from aerodaas.cameras.settings import camera_model, camera_settings, required_pa
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.recording.pictures import Shot, decoded_ahead, picture_topics, shots
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.steady_clock import SteadyClock
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import RecordingError, SourceError
 from aerodaas.types.geometry import CameraModel
@@ -40,6 +41,9 @@ class McapCamera:
         self._topic = ""
         self._shots: Iterator[Shot] = iter(())
         self._next: Shot | None = None
+        self._clock = SteadyClock()
+        self._time = 0
+        """When `_next` was taken, nanoseconds by `_clock`."""
         self._offset: int | None = None
         self._skipped = 0
 
@@ -103,18 +107,22 @@ class McapCamera:
         return picture
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
-        """Mission time at which an image is due; the first one is due at once."""
+        """Mission time at which the next image is due; the first one is due at once."""
+        del shot
         if self._offset is None:
-            self._offset = stamp - shot.record.captured
-        return shot.record.captured + self._offset
+            self._offset = stamp - self._time
+        return self._time + self._offset
 
     def _advance(self, stamp: int) -> None:
-        last = self._next
         for shot in self._shots:
-            if last is not None and shot.record.captured < last.record.captured:
+            leaps = self._clock.leaps
+            time = self._clock.steady(shot.record.captured)
+            if self._clock.leaps > leaps == 0:
+                _log.warning("%s: the clock was set; %s plays on", self._path, self._topic)
+            if time < self._time:
                 self._skipped += 1
                 continue
-            self._next = shot
+            self._next, self._time = shot, time
             return
         self._next = None
         self._begin_again(stamp)
@@ -123,12 +131,14 @@ class McapCamera:
         if self._settings.loop:
             self._rewind()
             # A nanosecond later, so that a recording of a single image is not always due.
-            self._offset = stamp + 1 - self._next.record.captured if self._next else None
+            self._offset = stamp + 1 - self._time if self._next else None
 
     def _rewind(self) -> None:
         if self._recording is not None:
-            self._shots = self._play(shots(self._recording, [self._topic]))
+            self._shots = self._play(shots(self._recording, [self._topic], as_written=True))
             self._next = next(self._shots, None)
+            self._clock = SteadyClock()
+            self._time = self._clock.steady(self._next.record.captured) if self._next else 0
 
     def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
         return found

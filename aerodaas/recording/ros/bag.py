@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import heapq
+import re
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Protocol
@@ -13,22 +15,28 @@ from typing_extensions import Self
 
 from aerodaas.recording.reader import Recording, Topic
 from aerodaas.recording.ros.sqlite_part import SqlitePart
+from aerodaas.recording.steady_clock import SteadyClock
+from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import RecordingError
 
 __all__ = ["BagMessage", "RosBag"]
 
 _MAX_FILES = 1000
 """Files of a bag; rosbag2 splits by size or duration."""
+_CLOCKS_SET_SINCE = 946_684_800 * NANOSECONDS
+"""The year 2000: a clock before it has not been set."""
 
 
 class BagMessage(NamedTuple):
     """One message of a bag."""
 
     time: int
-    """When it was recorded, nanoseconds since 1970."""
+    """When it was recorded, nanoseconds since 1970, without leaps of the clock."""
     topic: str
     value: Any
     """The decoded message, with the fields of its type."""
+    shift: int = 0
+    """Nanoseconds that `time` has more than the file."""
 
 
 class _Part(Protocol):
@@ -36,7 +44,12 @@ class _Part(Protocol):
     def topics(self) -> dict[str, Topic]: ...
     @property
     def damaged(self) -> int: ...
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[int, str, Any]]: ...
+    @property
+    def complete(self) -> bool: ...
+    def times(self) -> Iterator[tuple[int, str]]: ...
+    def messages(
+        self, topics: Collection[str], *, as_written: bool
+    ) -> Iterator[tuple[int, str, Any]]: ...
     def close(self) -> None: ...
 
 
@@ -64,7 +77,8 @@ class RosBag:
         path = Path(path)
         files = [path]
         if path.is_dir():
-            files = sorted(one for one in path.iterdir() if one.suffix in {".mcap", ".db3"})
+            files = [one for one in path.iterdir() if one.suffix in {".mcap", ".db3"}]
+            files.sort(key=_numbered)
             packed = next((one for one in path.iterdir() if one.suffix == ".zstd"), None)
             if packed is not None:
                 raise RecordingError(f"{packed} is compressed; unpack it first: unzstd {packed}")
@@ -93,18 +107,53 @@ class RosBag:
         """Number of messages and chunks that could not be read so far."""
         return sum(part.damaged for part in self._parts)
 
+    @property
+    def complete(self) -> bool:
+        """Whether all files were closed properly; what follows in one that was not is lost."""
+        return all(part.complete for part in self._parts)
+
+    @property
+    def leaps(self) -> int:
+        """How often the bag's clock was set while a file was recorded."""
+        return self._leaps_and_shift[0]
+
+    @cached_property
+    def _leaps_and_shift(self) -> tuple[int, int]:
+        """How often the clock was set, and by how many nanoseconds it differs in the end."""
+        leaps, whole = 0, SteadyClock()
+        for part in self._parts:
+            # The names of files need not be in order.
+            own = SteadyClock()
+            for time, topic in part.times():
+                own.steady(time, topic)
+                whole.steady(time, topic)
+            leaps += own.leaps
+        return leaps, whole.shift
+
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Iterate over the messages of `topics` in the order of their times.
 
-        A message that cannot be decoded is skipped and counted in `damaged`.
+        A message that cannot be decoded is skipped and counted in `damaged`. Where the clock was
+        set meanwhile, messages come as they were written, and times go on without the leap; where
+        it had not been set at all at first, they are by the clock at the end.
 
         Raises:
             ConfigError: If the extra `ros` is not installed.
         """
-        found = heapq.merge(
-            *(part.messages(topics) for part in self._parts), key=lambda one: one[0]
-        )
-        return (BagMessage(*one) for one in found)
+        leaps, shift = self._leaps_and_shift
+        if not leaps:
+            found = heapq.merge(
+                *(part.messages(topics, as_written=False) for part in self._parts),
+                key=lambda one: one[0],
+            )
+            yield from (BagMessage(*one) for one in found)
+            return
+        begins = next(time for part in self._parts for time, _ in part.times())
+        clock = SteadyClock(-shift if begins < _CLOCKS_SET_SINCE else 0)
+        for part in self._parts:
+            for time, topic, value in part.messages(topics, as_written=True):
+                steady = clock.steady(time, topic)
+                yield BagMessage(steady, topic, value, clock.shift)
 
     def close(self) -> None:
         """Close its files."""
@@ -137,12 +186,27 @@ class _McapPart:
     def damaged(self) -> int:
         return self._recording.damaged
 
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[int, str, Any]]:
-        for record in self._recording.records(topics=topics):
+    @property
+    def complete(self) -> bool:
+        return self._recording.complete
+
+    def times(self) -> Iterator[tuple[int, str]]:
+        for record in self._recording.records(bare=self.topics, as_written=True):
+            yield record.stamp + self._recording.epoch_ns, record.topic
+
+    def messages(
+        self, topics: Collection[str], *, as_written: bool
+    ) -> Iterator[tuple[int, str, Any]]:
+        for record in self._recording.records(topics=topics, as_written=as_written):
             yield record.stamp + self._recording.epoch_ns, record.topic, record.value
 
     def close(self) -> None:
         self._recording.close()
+
+
+def _numbered(path: Path) -> list[tuple[int, str]]:
+    """Sorts bag_2 before bag_10."""
+    return [(int(number or -1), word) for word, number in re.findall(r"(\D*)(\d*)", path.name)]
 
 
 def _opened(path: Path, stack: ExitStack) -> _Part:

@@ -94,11 +94,12 @@ class Beginning:
         Raises:
             ValueError: If the two are too far apart to be believed.
         """
-        stamp = stamp_of(message.value) or message.time
+        stamp = stamp_of(message.value) or message.time - message.shift
         if self._offset is None:
-            apart = message.time - stamp
-            self._offset = apart if abs(apart) > _ONE_CLOCK else 0
-        captured = stamp + self._offset
+            apart = message.time - message.shift - stamp
+            self._offset = message.time - stamp if abs(apart) > _ONE_CLOCK else 0
+        # By one clock with the recording, the stamp leaps as that does.
+        captured = stamp + (self._offset or message.shift)
         if abs(captured - message.time) > (_DRIFT if self._offset else _ONE_CLOCK):
             raise ValueError("its stamp is too far from the time of its recording")
         # Clocks of two machines may differ by a little; nothing is recorded before it was.

@@ -60,6 +60,10 @@ class ImportedBag:
     """How many messages were not taken, and why the first was not, by topic."""
     damaged: int
     """Messages and chunks of the bag that could not be read."""
+    complete: bool
+    """Whether the bag's files were closed properly, and not cut off."""
+    leaps: int
+    """How often the bag's clock was set while it was recorded."""
     lenses: Mapping[str, bool]
     """Whether the bag told of each camera's lens, by the camera's id."""
 
@@ -118,7 +122,7 @@ def import_bag(
         camera: "horizontal_fov" in beginning.camera(topic)
         for camera, topic in topics.camera.items()
     }
-    return ImportedBag(summary, work.skipped, bag.damaged, lenses)
+    return ImportedBag(summary, work.skipped, bag.damaged, bag.complete, bag.leaps, lenses)
 
 
 def _why(bag: RosBag, work: _Import) -> str:

@@ -33,6 +33,9 @@ _STEPS_A_BYTE = 100
 """Instructions for each byte of the file, and `_STEPS_AT_LEAST`: a row takes some ten bytes and
 some dozens of instructions."""
 _STEPS_AT_LEAST = 50_000_000
+_ROWS_BY_TIME = "SELECT id, topic_id, timestamp, length(data) FROM messages ORDER BY timestamp"
+"""Without their data, which would be sorted along where there is no index."""
+_ROWS_AS_WRITTEN = "SELECT id, topic_id, timestamp, length(data) FROM messages ORDER BY id"
 _LATEST = 1 << 63
 """Nanoseconds since 1970, exclusive."""
 _LONGEST_NAME = 4096
@@ -46,6 +49,7 @@ class SqlitePart:
     def __init__(self, path: Path) -> None:
         """Open the file; raises RecordingError for one that is no bag, or not within bounds."""
         self.damaged = 0
+        self._is_cut = False
         self._path = path
         self._size = path.stat().st_size
         self._steps = 0
@@ -75,8 +79,29 @@ class SqlitePart:
         """Topics by name."""
         return {topic.name: topic for topic in self._topics.values()}
 
-    def messages(self, topics: Collection[str]) -> Iterator[tuple[int, str, Any]]:
-        """Time (nanoseconds since 1970), topic and decoded message; broken ones are counted."""
+    @property
+    def complete(self) -> bool:
+        """Whether it was read without an end that is missing."""
+        return not self._is_cut
+
+    def times(self) -> Iterator[tuple[int, str]]:
+        """Time (nanoseconds since 1970) and topic of each message as it was written."""
+        try:
+            for number, time in self._database.execute(
+                "SELECT topic_id, timestamp FROM messages ORDER BY id"
+            ):
+                if number in self._topics and isinstance(time, int) and 0 <= time < _LATEST:
+                    yield time, self._topics[number].name
+        except sqlite3.Error:
+            self._is_cut = True
+
+    def messages(
+        self, topics: Collection[str], *, as_written: bool
+    ) -> Iterator[tuple[int, str, Any]]:
+        """Time (nanoseconds since 1970), topic and decoded message; broken ones are counted.
+
+        They come in the order of their times, or `as_written`.
+        """
         wanted = {number: topic for number, topic in self._topics.items() if topic.name in topics}
         decoders = {
             number: ros_decoder(topic.schema)
@@ -85,10 +110,7 @@ class SqlitePart:
         }
         self._left = self._size * MAX_RATIO + MAX_UNPACKED
         try:
-            # Without their data, which would be sorted along where there is no index.
-            rows = self._database.execute(
-                "SELECT id, topic_id, timestamp, length(data) FROM messages ORDER BY timestamp"
-            )
+            rows = self._database.execute(_ROWS_AS_WRITTEN if as_written else _ROWS_BY_TIME)
             for row, number, time, length in rows:
                 if number not in decoders:
                     continue
@@ -106,6 +128,7 @@ class SqlitePart:
                 yield time, wanted[number].name, value
         except sqlite3.Error:
             # Cut off, or damaged from here on.
+            self._is_cut = True
             self.damaged += 1
 
     def close(self) -> None:
