@@ -78,7 +78,8 @@ class KinematicVehicle:
     def read(self) -> VehicleState:
         """Return the state."""
         position = np.full(3, np.nan) if self.blind else self.position.copy()
-        odometry = Odometry(position, self.velocity.copy(), self.yaw)
+        flies = self.mode is not VehicleMode.GROUNDED
+        odometry = Odometry(position, self.velocity + self.wind * flies, self.yaw)
         state = VehicleState(
             self._now,
             odometry,

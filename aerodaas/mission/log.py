@@ -58,6 +58,16 @@ class MissionLog:
         """How many waypoints were reached, and how many are known with those `ahead`."""
         return len(self._reached), len(self._reached) + len(set(ahead) - self._reached)
 
+    def completion(self) -> str:
+        """What became of all waypoints, once none is left to fly to."""
+        if not self.given_up:
+            return "all waypoints are visited" if self.visits else "no waypoint is left to fly to"
+        count = len(self._reached)
+        visited = (
+            f"{count} waypoint{'' if count == 1 else 's'} visited" if count else "none visited"
+        )
+        return f"no waypoint is left to fly to: {visited}, {len(self.given_up)} given up"
+
     def fly(self, position: Vector) -> None:
         """Add the distance to `position`, ENU metres."""
         if self._counted_at is None:

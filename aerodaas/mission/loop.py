@@ -82,13 +82,15 @@ class SetpointLoop:
             for text in concerns(items):
                 self.mission.concern(text)
         try:
-            return self._carry_out(action, state, now, neighbours)
+            record = self._carry_out(action, state, now, neighbours)
         except VehicleError as error:
             self.mission.vehicle_refused(str(error))
-            return SetpointRecord(now, None, None)
+            record = SetpointRecord(now, None, None)
         finally:
             self._last_action = type(action)
             self._before = now
+        self.mission.command_sent(action, record.sent)
+        return record
 
     def _examined(self, state: VehicleState, now: int) -> tuple[HealthItem, ...]:
         """The list as it counts for this turn: in preflight alone, and gone through anew then."""

@@ -63,7 +63,7 @@ from aerodaas.types.energy import EnergyMeter, EnergyModel
 from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector
 from aerodaas.types.status import RECENT, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.types.waypoints import HeightDatum
 
 __all__ = ["Mission"]
@@ -338,6 +338,11 @@ class Mission:
         }
         return turns.get(self.state, self._fly)(state)
 
+    def command_sent(self, action: Action, setpoint: Setpoint | None) -> None:
+        """Compare the motion with `action` from now on, sent as `setpoint` if as one."""
+        if self._obeyed:
+            self._supervisor.motion.command(action, setpoint)
+
     def use_planner(self, planner: Planner) -> None:
         """Plan with `planner` from now on, beginning with the whole queue."""
         self._navigator.use_planner(planner)
@@ -547,14 +552,15 @@ class Mission:
                 return self._hover(state)
             self._to(MissionState.RETURNING, f"navigation has been silent for {quiet:.0f} s")
             return self._return(state)
-        if options.on_complete == "hold":
-            self._to(MissionState.HOLDING, "all waypoints are visited")
-            return self._hover(state)
+        ending = self._log.completion()
+        if options.on_complete == "return":
+            self._to(MissionState.RETURNING, ending)
+            return self._return(state)
         if options.on_complete == "land":
-            self._to(MissionState.LANDING, "all waypoints are visited")
+            self._to(MissionState.LANDING, ending)
             return Land()
-        self._to(MissionState.RETURNING, "all waypoints are visited")
-        return self._return(state)
+        self._to(MissionState.HOLDING, ending)
+        return self._hover(state)
 
     def _hover(self, state: VehicleState) -> Action:
         self._leg = None

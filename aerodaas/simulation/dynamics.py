@@ -170,16 +170,19 @@ class Multirotor:
         vx, vy, vz = self.velocity
         ax = _VELOCITY_GAIN * (demand[0] - vx)
         ay = _VELOCITY_GAIN * (demand[1] - vy)
-        az = _VELOCITY_GAIN * (demand[2] - vz)
+        az = upward = _VELOCITY_GAIN * (demand[2] - vz)
         if ax * ax + ay * ay + az * az > self._max_acceleration * self._max_acceleration:
             ax, ay, az = _limited((ax, ay, az), demand, self._max_acceleration)
         lx, ly, lz = self._disturbance
         fx, fy, fz = ax - lx, ay - ly, az - lz + GRAVITY
         fz = min(max(fz, _MIN_THRUST_SHARE * GRAVITY), self._max_thrust)
         sideways = math.hypot(fx, fy)
-        widest = self._tilt_slope * fz
-        if sideways > widest:
-            scale = widest / sideways
+        if sideways > self._tilt_slope * fz:
+            # At its largest tilt the height goes first, as in PX4 and ArduPilot.
+            upward = min(max(upward, -self._max_acceleration), self._max_acceleration)
+            least = _MIN_THRUST_SHARE * GRAVITY
+            fz = min(max(upward - lz + GRAVITY, least), self._max_thrust)
+            scale = min(1.0, self._tilt_slope * fz / sideways)
             fx, fy = fx * scale, fy * scale
         return fx, fy, fz
 

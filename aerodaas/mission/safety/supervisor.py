@@ -12,10 +12,11 @@ from aerodaas.mission.log import subject
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
+from aerodaas.mission.safety.motion import STANDS_AFTER, MotionWatch
 from aerodaas.mission.safety.traffic import TrafficWatch
 from aerodaas.types.clock import seconds
 from aerodaas.types.energy import EnergyMeter
-from aerodaas.types.geometry import Vector, is_finite
+from aerodaas.types.geometry import Vector, is_finite, length
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = [
@@ -59,6 +60,11 @@ _GUARDED = frozenset({VehicleMode.GUIDED, VehicleMode.MISSION})
 """Modes in which the drone flies where we want it."""
 _SLACK = 0.5
 """Metres below the clearance from which people are told: a position's noise and lag are less."""
+_BEYOND = 2.0
+"""Metres above the ceiling, or out of range, from which the drone is outside: a place on the very
+limit is allowed, and flown with noise and lag."""
+_LOW = 1.0
+"""Metres above the ground, as far as its height is known, up to which a drone may stand on it."""
 
 CALM = Assessment(Fault(FailsafeAction.NOTHING, "", ""))
 """An assessment without faults."""
@@ -85,6 +91,9 @@ class Supervisor:
         self._fence = fence
         self._meter = meter
         self._traffic = TrafficWatch(limits)
+        self.motion = MotionWatch(limits)
+        """Told by the setpoint loop what the drone follows."""
+        self._outside_since: int | None = None
         self._lost_since: int | None = None
         self._blind_for = 0
         """Nanoseconds with a link since the vehicle last had a position."""
@@ -97,8 +106,9 @@ class Supervisor:
             self._link(state, now),
             self._position(state, now),
             self._battery(state),
-            self._place(state),
+            self._place(state, now),
             self._ground(state),
+            *self._motion(state, now),
         )
         self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
@@ -191,12 +201,66 @@ class Supervisor:
             return Fault(FailsafeAction.RETURN, "battery_low", text)
         return None
 
-    def _place(self, state: VehicleState) -> Fault | None:
-        position = state.odometry.position
-        if has_position(state) and not self._fence.inside(position):
-            text = f"the drone is outside its geofence, at {_place(position)}"
-            return Fault(FailsafeAction.NOTHING, "geofence", text)
-        return None
+    def _place(self, state: VehicleState, now: int) -> Fault | None:
+        """Judge where the drone is: outside its fence the guard brings it back while it holds."""
+        where = self._outside(state.odometry.position) if has_position(state) else ""
+        if not where:
+            self._outside_since = None
+            return None
+        if self._outside_since is None:
+            self._outside_since = now
+        patient = seconds(now - self._outside_since) < self._limits.link_timeout
+        demand = FailsafeAction.HOLD if patient else FailsafeAction.RETURN
+        return Fault(demand, "geofence", where, "" if patient else "return")
+
+    def _outside(self, position: Vector) -> str:
+        if not self._fence.inside(position):
+            return f"the drone is outside its geofence, at {_place(position)}"
+        if position[2] > self._fence.ceiling + _BEYOND:
+            return f"the drone is above its geofence's ceiling, at {_place(position)}"
+        if length(position - self._home) > self._limits.max_range + _BEYOND:
+            return f"the drone is out of its range (limits.max_range), at {_place(position)}"
+        return ""
+
+    def _motion(self, state: VehicleState, now: int) -> list[Fault]:
+        """Judge whether the drone moves as commanded.
+
+        One that is carried off goes home; where it is carried off on the way, too, or while it
+        takes off, it lands.
+        """
+        if self._is_lost(state, now) or not has_position(state):
+            self.motion.forget()
+            return []
+        self.motion.observe(state, now)
+        faults = []
+        if self.motion.carried_off:
+            text = (
+                f"the drone is carried off at {self.motion.drift:.1f} m/s against its commands, "
+                "as by wind that it cannot hold"
+            )
+            home = self.motion.carried_off == 1 and state.mode is not VehicleMode.TAKING_OFF
+            demand = FailsafeAction.RETURN if home else FailsafeAction.LAND
+            faults.append(Fault(demand, "wind", text, "" if home else "land"))
+        if self.motion.stands_for < STANDS_AFTER:
+            return faults
+        what = (
+            f"for {STANDS_AFTER:g} s and its motors run: if it stands, stop them by remote control"
+        )
+        if state.mode is VehicleMode.LANDING:
+            text = f"the landing drone has come no lower {what}"
+            faults.append(Fault(FailsafeAction.NOTHING, "motors_running", text))
+        elif self._height(state) < _LOW:
+            text = f"the drone neither climbs nor moves as commanded {what}"
+            faults.append(Fault(FailsafeAction.LAND, "motors_running", text, "land"))
+        return faults
+
+    def _height(self, state: VehicleState) -> float:
+        """Metres above the ground; where that is not known, above the place of take-off."""
+        if state.below is not None:
+            return state.below
+        east, north, up = (float(axis) for axis in state.odometry.position)
+        ground = math.nan if self._clearance is None else self._clearance.ground.height(east, north)
+        return up - (float(self._home[2]) if math.isnan(ground) else ground)
 
     def _ground(self, state: VehicleState) -> Fault | None:
         """Tell of a drone that is nearer to the ground on its way than it may be."""

@@ -159,14 +159,14 @@ def test_whoever_else_flies_is_let_fly(mode: VehicleMode, kind: str) -> None:
 
 
 def test_the_gravest_of_several_is_done() -> None:
-    """A critical battery outweighs a link that is lost, and a fence is only told of."""
+    """A critical battery outweighs a link that is lost, and outside its fence the drone holds."""
     watching = supervisor()
     watching.assess(state(mode=VehicleMode.LOST), 0)
     both = watching.assess(state(0.1, mode=VehicleMode.LOST), 0)
     assert both.demand is FailsafeAction.LAND
     assert {one.kind for one in both.findings} == {"link_lost", "battery_critical"}
     outside = supervisor().assess(state(at=(51.0, 0.0, 5.0)), 0)
-    assert outside.demand is FailsafeAction.NOTHING
+    assert outside.demand is FailsafeAction.HOLD
     assert [one.kind for one in outside.findings] == ["geofence"]
     assert "at (51.0, 0.0, 5.0) m" in outside.findings[0].text
 

@@ -1,0 +1,148 @@
+"""Comparison of a drone's motion with its commands.
+
+It finds a drone that is carried off, as by wind that it cannot hold, and one that does not move at
+all although it is commanded to, as on the ground with its motors running.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from aerodaas.config.model import LimitsConfig
+from aerodaas.mission.actions import Action, Land, TakeOff
+from aerodaas.types.braking import velocity_towards
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector, length
+from aerodaas.types.vehicle import (
+    PositionSetpoint,
+    Setpoint,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
+
+__all__ = ["STANDS_AFTER", "MotionWatch"]
+
+_CARRIED = 0.5
+"""m/s along the ground against all commands: more than the noise of a measured velocity."""
+_CARRIED_AFTER = 5.0
+"""Seconds of that in a row, beside the time that the drone needs to brake."""
+_REMEMBERED = 2 * NANOSECONDS
+"""Nanoseconds for which a command explains the motion: vehicles lag behind."""
+_FASTER = 2.0
+"""Times the commanded speed that still follows the command."""
+_STANDS = 0.2
+"""m/s below which a drone does not move."""
+_MOVES = 0.3
+"""m/s commanded from which it should."""
+STANDS_AFTER = 10.0
+"""Seconds of standing against the commands after which it counts."""
+_STEERED = frozenset({VehicleMode.GUIDED, VehicleMode.HOLDING, VehicleMode.TAKING_OFF})
+"""Modes in which it holds its place, or flies as commanded."""
+
+
+class MotionWatch:
+    """Compares one drone's velocity with the commands of the last seconds."""
+
+    def __init__(self, limits: LimitsConfig) -> None:
+        """Compare within `limits`, whose acceleration is what the drone brakes by."""
+        self.carried_off = 0
+        """How often the drone was found carried off, each time after the same patience."""
+        self.drift = 0.0
+        """m/s along the ground that no command of the last seconds explains."""
+        self._limits = limits
+        self._setpoint: Setpoint | None = None
+        self._commands: deque[tuple[int, Vector]] = deque()
+        """Time (ns) and commanded velocity, newest last."""
+        self._adrift_since: int | None = None
+        self._patience = 0.0
+        self._stands_since: int | None = None
+        self._now = 0
+
+    def command(self, action: Action, setpoint: Setpoint | None) -> None:
+        """Compare the motion with `action` from now on.
+
+        Args:
+            action: What the vehicle is asked to do.
+            setpoint: The setpoint as which it was sent; None if it was not sent as one.
+        """
+        if isinstance(action, Land):
+            setpoint = VelocitySetpoint(np.array([0.0, 0.0, -self._limits.max_climb]))
+        elif isinstance(action, TakeOff):
+            setpoint = VelocitySetpoint(np.zeros(3))
+        self._setpoint = setpoint
+
+    def observe(self, state: VehicleState, now: int) -> None:
+        """Compare the state with the commands.
+
+        Args:
+            state: The vehicle's newest state, with a known position.
+            now: Mission clock, nanoseconds.
+        """
+        self._now = now
+        if self._setpoint is None:
+            self.forget()
+            return
+        velocity = state.odometry.velocity
+        wanted = self._velocity(self._setpoint, state.odometry)
+        self._commands.append((now, wanted))
+        while now - self._commands[0][0] > _REMEMBERED:
+            self._commands.popleft()
+        if state.mode in _STEERED:
+            self._observe_drift(velocity[:2])
+        else:
+            self._adrift_since = None
+        stands = length(velocity) < _STANDS and length(wanted) >= _MOVES
+        if not stands:
+            self._stands_since = None
+        elif self._stands_since is None:
+            self._stands_since = now
+
+    def forget(self) -> None:
+        """Begin anew: the drone follows no setpoint, or its motion is not known."""
+        self._commands.clear()
+        self._adrift_since = self._stands_since = None
+
+    @property
+    def stands_for(self) -> float:
+        """Seconds for which the drone has not moved against its commands; 0 if it moves."""
+        return 0.0 if self._stands_since is None else seconds(self._now - self._stands_since)
+
+    def _observe_drift(self, velocity: Vector) -> None:
+        self.drift = min(_beside(velocity, wanted[:2]) for _, wanted in self._commands)
+        if self.drift < _CARRIED:
+            self._adrift_since = None
+            return
+        if self._adrift_since is None:
+            self._adrift_since = self._now
+            self._patience = _CARRIED_AFTER + self.drift / self._limits.max_acceleration
+        if seconds(self._now - self._adrift_since) >= self._patience:
+            self.carried_off += 1
+            self._adrift_since = None
+
+    def _velocity(self, setpoint: Setpoint, odometry: Odometry) -> Vector:
+        if not isinstance(setpoint, PositionSetpoint):
+            return setpoint.velocity
+        limits = self._limits
+        return velocity_towards(
+            setpoint,
+            odometry.position,
+            odometry.yaw,
+            speed=limits.cruise_speed,
+            deceleration=limits.max_acceleration,
+            reaction_time=limits.reaction_time,
+            yaw_rate=0.0,
+        ).velocity
+
+
+def _beside(velocity: Vector, wanted: Vector) -> float:
+    """How far `velocity` is from following `wanted` at any speed from 0 to `_FASTER` times it."""
+    speed = length(wanted)
+    if speed == 0.0:
+        return length(velocity)
+    along = wanted / speed
+    share = float(np.clip(velocity @ along, 0.0, _FASTER * speed))
+    return length(velocity - share * along)
