@@ -123,8 +123,8 @@ class StreamActor:
         self._started = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._told: dict[tuple[str, str], int] = {}
-        """Mission time of each of the newest alerts, by kind and text."""
+        self._told: dict[tuple[str, str, str], int] = {}
+        """Mission time of each of the newest alerts, by source, kind and text."""
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         # Reentrant: sending an alert may raise another one, if it turns out unsendable.
         self._alerting = threading.RLock()
@@ -278,22 +278,32 @@ class StreamActor:
         """Publish an alert at the current mission time; thread-safe."""
         self.tell(kind, text, self.clock.now(), values)
 
-    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Publish an alert at mission time `stamp`; thread-safe.
+    def tell(
+        self, kind: str, text: str, stamp: int, values: dict[str, Any], source: str = ""
+    ) -> None:
+        """Publish an alert; thread-safe.
 
-        An alert with the same text within the last seconds is suppressed.
+        An alert of the same source with the same text within the last seconds is suppressed.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+            stamp: Mission time in nanoseconds.
+            values: Further figures by name.
+            source: Whose alert it is; empty for this actor's own.
         """
+        source = source or self.name
         with self._alerting:
-            before = self._told.get((kind, text))
+            before = self._told.get((source, kind, text))
             if before is not None and 0 <= stamp - before < _REPEATED:
                 return
-            self._told[kind, text] = stamp
+            self._told[source, kind, text] = stamp
             while len(self._told) > _ALERTS_KEPT:
                 self._told.pop(next(iter(self._told)))
-            header = Header(self.alerts.sent, stamp, self.name)
+            header = Header(self.alerts.sent, stamp, source)
             alert = Alert(header, kind, text, values)
             if self.alerts.measure(alert, header, host_time_ns()).item is None:
-                header = Header(self.alerts.sent, stamp, self.name)
+                header = Header(self.alerts.sent, stamp, source)
                 alert = Alert(header, kind, text, {})
                 self.alerts.measure(alert, header, host_time_ns())
             self._newest_alerts.append(alert)

@@ -288,8 +288,10 @@ class DroneActor(StreamActor):
         state = controller.loop.state
         if state is not None:
             self._whereabouts.hear(controller.id, Whereabouts.of(state))
+        source = f"drone/{controller.id}"
         for alert in controller.new_alerts():
-            self._publisher.do(partial(self.tell, alert.kind, alert.text, now, dict(alert.values)))
+            values = dict(alert.values)
+            self._publisher.do(partial(self.tell, alert.kind, alert.text, now, values, source))
 
     def _take(self, message: Message[Any], now: int) -> None:
         if message.stream in self._neighbours:

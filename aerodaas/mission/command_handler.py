@@ -163,9 +163,18 @@ class CommandHandler:
             return Answer(accepted=False, text=str(error))
         for velocity in navigation.commands:
             self._navigator.obey(velocity, now, cause)
+        for waypoint in taken:
+            self._log.given_up.pop(waypoint.id, None)
         for waypoint_id, reason in refused.items():
-            self._log.give_up(now, waypoint_id, reason)
+            self._refuse(waypoint_id, reason, now)
         accepted = bool(taken or navigation.commands)
         if accepted:
             self.last_received = now
         return Answer(accepted, "; ".join(refused.values()), refused)
+
+    def _refuse(self, waypoint_id: str, reason: str, now: int) -> None:
+        """Give a refused waypoint up, unless another one of its id is queued or was reached."""
+        if self._navigator.queue.find(waypoint_id) or self._log.reached(waypoint_id):
+            self._log.alert(now, "refused", reason)
+        else:
+            self._log.give_up(now, waypoint_id, reason)

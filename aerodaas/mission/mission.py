@@ -227,6 +227,8 @@ class Mission:
         """Why no command of this kind is executed in the present state; empty if it is."""
         if self.finished:
             return f"the mission is over: {self.state.value}"
+        if self._supervisor.taken_over(self._now) is not None:
+            return self._machine.reason
         late = isinstance(command, _NAVIGATION) and self.state in _LEAVING
         return f"the drone is {self.state.value} by now" if late else ""
 
@@ -328,7 +330,7 @@ class Mission:
         if self._motors_stopped(state):
             return Wait()
         self._protect(state)
-        if self.finished or (self.state in _LEAVING and self._lost_for_good()):
+        if self._taken_over() or (self.state in _LEAVING and self._lost_for_good()):
             return Wait()
         turns = {
             MissionState.TAKING_OFF: self._take_off,
@@ -423,12 +425,26 @@ class Mission:
         demand, reason = self._assessment.demand, self._assessment.gravest.text
         for fault in self._assessment.news(before):
             self._log.alert(self._now, fault.kind, fault.text, fault.about)
-        if demand is FailsafeAction.RELEASE:
-            self._to(MissionState.ABORTED, reason)
-        elif demand is FailsafeAction.LAND and self.state is not MissionState.LANDING:
+        if self._supervisor.taken_over(self._now) is not None:
+            return
+        if demand is FailsafeAction.LAND and self.state is not MissionState.LANDING:
             self._to(MissionState.LANDING, reason)
         elif demand is FailsafeAction.RETURN and self.state not in _LEAVING:
             self._to(MissionState.RETURNING, reason)
+
+    def _taken_over(self) -> bool:
+        """Whether somebody else flies; if so, end the mission as soon as it is known why."""
+        taken = self._supervisor.taken_over(self._now)
+        if taken is None:
+            return False
+        fault, settled = taken
+        if settled:
+            self._to(MissionState.ABORTED, fault.text)
+            self._log.alert(self._now, fault.kind, fault.text)
+        else:
+            self._to(self.state, "somebody else flies the drone")
+            self.take_back(self._machine.reason)
+        return True
 
     def _take_off(self, state: VehicleState) -> Action:
         self._planning.plan(state, self._now)

@@ -9,13 +9,17 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from drone_by_hand import DroneByHand, drone_by_hand
-from flying import hop
+from drone_by_hand import DroneByHand, LockstepDroneByHand, drone_by_hand, spec_by_hand
+from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors.drone.robot_report import LATENCIES_KEPT, Latencies
+from aerodaas.actors.lockstep.schedule import LockstepSchedule
+from aerodaas.actors.session import Session
+from aerodaas.actors.stream_names import state_stream
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
@@ -245,3 +249,23 @@ def _land(actor: DroneByHand) -> None:
     _until_over(actor)
     assert actor.robots()["drone"].status.state is MissionState.LANDED
     actor.stop()
+
+
+def test_alerts_of_drones_on_one_link_say_whose_they_are() -> None:
+    """Both tell the same at once; neither is lost, and each names its own drone."""
+    robots = [robot(id=name, sensors=[], settings={"battery": 0.1}) for name in ("west", "east")]
+    environment = EnvironmentConfig.model_validate(
+        {"name": "shared", "robots": robots, "simulation": {"world": "empty"}}
+    )
+    specs = tuple(spec_by_hand(one, AddNavigation(hop((1, 0)))) for one in environment.robots)
+    schedule = LockstepSchedule(
+        {}, {}, windows={state_stream(name): 0 for name in ("west", "east")}
+    )
+    session = Session(environment, None)
+    actor = LockstepDroneByHand(session, "drone/west+east", specs, schedule)
+    actor.open_here()
+    actor.start(0)
+    _until_over(actor)
+    told = [one for one in actor.report().alerts if one.kind == "takeoff_refused"]
+    actor.stop()
+    assert {one.header.source for one in told} == {"drone/west", "drone/east"}

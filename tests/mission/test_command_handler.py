@@ -117,6 +117,23 @@ def test_the_deadline_of_a_batch_is_that_of_each_waypoint(own: float | None) -> 
     assert {w.deadline for w in one.status.pending if w.id == "wp"} == {60.0}
 
 
+def test_a_refused_waypoint_leaves_the_good_one_of_its_id_alone() -> None:
+    """A duplicate is told of; what is queued or was reached stands in no other list."""
+    one = flight(live(), add(Waypoint("wp", 5, 0, 1.5), Waypoint("on", 9, 0, 1.5)))
+    one.run_to(S.ENROUTE)
+    answer = one.tell(add(Waypoint("wp", 1, 1, 1.5)))
+    assert "already queued" in answer.refused["wp"]
+    assert not one.status.given_up
+    assert [alert.kind for alert in one.mission.alerts] == ["refused"]
+    one.run(until=lambda: "wp" in one.status.visited)
+    assert one.tell(add(Waypoint("wp", 9e9, 1, 1.5))).refused
+    assert not one.status.given_up
+    assert one.tell(add(Waypoint("new", 9e9, 1, 1.5))).refused
+    assert one.status.given_up == ("new",)
+    assert one.tell(add(Waypoint("new", 9, 9, 1.5))).accepted
+    assert not one.status.given_up
+
+
 def test_all_that_is_refused_is_told_with_its_reason_and_time() -> None:
     """In the answer, in the status and as alerts; the good ones of the batch are flown."""
     one = flight(live(), add(*square()))

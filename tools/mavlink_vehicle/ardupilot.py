@@ -34,6 +34,8 @@ _PRESENT, _ENABLED = 0x5371FC0F, 0x5361BC0F
 """SYS_STATUS' bits of what is always there, and of what is switched on without a position."""
 _LEAST = 0.5
 """Metres of a take-off."""
+_TELLS_AFTER = 1.2
+"""Seconds after a breach of its fence at which it tells of it."""
 
 
 class EmulatedArduPilot(Firmware):
@@ -75,6 +77,7 @@ class EmulatedArduPilot(Firmware):
         super().__init__(options, flight, say, ParameterStore(values, set(), bytewise=False))
         self._mode = _STABILIZE
         self._station_at: float | None = None
+        self._breached_at: float | None = None
 
     @property
     def custom_mode(self) -> int:
@@ -177,14 +180,19 @@ class EmulatedArduPilot(Firmware):
         values = self.parameters.values
         if values["FENCE_ENABLE"] == 0.0:
             return
-        self.text("Fence Breached")
         mode = {1.0: _RETURN, 2.0: _LAND, 4.0: _BRAKE}.get(values["FENCE_ACTION"])
         if mode is not None:
+            # A breach makes no state critical, and its text may come after the HEARTBEAT.
             self._set_mode(mode)
-            self.failsafe = True
+        self._breached_at = self.now
 
     def protect(self) -> None:
         """Stop when setpoints do; return when the ground station is lost."""
+        if self._breached_at is not None and self.now - self._breached_at > _TELLS_AFTER:
+            self._breached_at = None
+            self.text("Polygon fence breached", mavlink.MAV_SEVERITY_NOTICE)
+            outside = mavlink.FENCE_BREACH_BOUNDARY
+            self._say(mavlink.MAVLink_fence_status_message(1, 1, outside, 0, 0))
         target = self.flight.target
         if self.guided and target is not None and self.now - self._setpoint_at > _TIMEOUT:
             if target.position is None:

@@ -200,7 +200,10 @@ class EmulatedPX4(Firmware):
     def breach(self) -> None:
         """By GF_ACTION: 2 hold, 3 return, 5 land."""
         sub = {2.0: _HOLD, 3.0: _RETURN, 5.0: _LAND}.get(self.parameters.values["GF_ACTION"])
+        self._event("commander_failsafe_enter_generic", mavlink.MAV_SEVERITY_CRITICAL)
+        self._event("commander_arming_check_summary", 8)
         self._event("check_gf_violation_custom_gf", mavlink.MAV_SEVERITY_CRITICAL)
+        self._event("commander_health_summary", 8)
         if sub is not None:
             self._set_mode(_AUTO, sub)
             self.failsafe = True

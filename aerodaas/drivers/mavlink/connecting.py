@@ -156,7 +156,8 @@ def _await_ready(
         if now - began > settings.ready_timeout:
             if places:
                 return
-            said = telemetry.texts.recent(now, _WORDS) or list(telemetry.events.objections)
+            said = [telemetry.health.gps_objection, *telemetry.events.objections]
+            said = list(dict.fromkeys(filter(None, [*said, *telemetry.texts.recent(now, _WORDS)])))
             words = f"; it says: {'; '.join(said)}" if said else ""
             raise VehicleError(
                 f"{name}: {autopilot.name} has not told its position within "

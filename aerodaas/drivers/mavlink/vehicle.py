@@ -34,7 +34,7 @@ from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.one_link import check_links, link_of
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
-from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.phase import PROTECTIVE, FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
@@ -164,7 +164,7 @@ class MavlinkVehicle:
                     words=self._reasons,
                     land=lambda: self._change(FlightMode.LAND),
                 )
-                self._report.departure = self._departure
+                self._report.autopilot, self._report.departure = found.autopilot, self._departure
                 self._modes = ModeChange(
                     found.autopilot,
                     commander,
@@ -305,6 +305,7 @@ class MavlinkVehicle:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
+                reasons += filter(None, [self._telemetry.health.gps_objection])
             reasons += self._connection.fallback.objections + self._report.objections(now)
             said = self._connection.autopilot.objections(self._telemetry, now)
             if said and now - self._checked_at > CHECKS:
@@ -340,10 +341,12 @@ class MavlinkVehicle:
     def _reasons(self) -> list[str]:
         """The autopilot's texts about its latest refusal; in the link's thread."""
         now = time.monotonic()
-        said = self._telemetry.texts.recent(now, REASONS)
-        if self._connection is not None and not said:
-            said = self._connection.autopilot.objections(self._telemetry, now)
-        return said
+        texts = self._telemetry.texts.recent(now, REASONS)
+        if self._connection is None:
+            return texts
+        # Its objections to a take-off come first: a text of late may be about something else.
+        objections = self._connection.autopilot.objections(self._telemetry, now)
+        return list(dict.fromkeys([*objections, *texts]))
 
     def send(self, setpoint: Setpoint) -> Setpoint:
         """Send one setpoint and return it after clipping to the limits of the vehicle.
@@ -522,7 +525,9 @@ class MavlinkVehicle:
         assert found is not None  # noqa: S101 - it speaks
         shown = found.autopilot.mode(telemetry.custom_mode)
         was_armed = phase.armed
-        phase.observe(shown, now, armed=telemetry.armed, critical=telemetry.critical)
+        # Only ArduPilot's fence acts without a critical state.
+        critical = telemetry.critical or (bool(telemetry.breach) and shown in PROTECTIVE)
+        phase.observe(shown, now, armed=telemetry.armed, critical=critical)
         self._touchdown.observe(shown, now, armed=telemetry.armed)
         if telemetry.armed and not was_armed:
             self._report.restarted = ""

@@ -14,7 +14,7 @@ from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motion import STANDS_AFTER, MotionWatch
 from aerodaas.mission.safety.traffic import TrafficWatch
-from aerodaas.types.clock import seconds
+from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.energy import EnergyMeter
 from aerodaas.types.geometry import Vector, is_finite, length
 from aerodaas.types.vehicle import VehicleMode, VehicleState
@@ -44,6 +44,7 @@ class Assessment:
     def news(self, before: Assessment) -> list[Fault]:
         """The faults that are to be told: those that there were not `before`.
 
+        A takeover is told as soon as it is settled why (`Supervisor.taken_over`).
         The reason for a takeover or a lost position already names the faults behind it.
         """
         known = {subject(one.kind, one.text, one.about) for one in before.findings}
@@ -52,6 +53,7 @@ class Assessment:
             one
             for one in self.findings
             if subject(one.kind, one.text, one.about) not in known
+            and one.demand is not FailsafeAction.RELEASE
             and not (acts and one.kind == "vehicle" and one.text in reason)
         ]
 
@@ -60,6 +62,8 @@ _GUARDED = frozenset({VehicleMode.GUIDED, VehicleMode.MISSION})
 """Modes in which the drone flies where we want it."""
 _SLACK = 0.5
 """Metres below the clearance from which people are told: a position's noise and lag are less."""
+_SETTLED = 2 * NANOSECONDS
+"""Nanoseconds after a takeover in which the reason for it may become known."""
 _BEYOND = 2.0
 """Metres above the ceiling, or out of range, from which the drone is outside: a place on the very
 limit is allowed, and flown with noise and lag."""
@@ -93,6 +97,8 @@ class Supervisor:
         self._traffic = TrafficWatch(limits)
         self.motion = MotionWatch(limits)
         """Told by the setpoint loop what the drone follows."""
+        self._taken: Fault | None = None
+        self._taken_at = 0
         self._outside_since: int | None = None
         self._lost_since: int | None = None
         self._blind_for = 0
@@ -112,11 +118,23 @@ class Supervisor:
         )
         self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
+        if (pilot := checks[0]) is not None:
+            self._taken_at = now if self._taken is None else self._taken_at
+            self._taken = pilot
         findings += self._traffic.assess(state, now)
         findings += [Fault(FailsafeAction.NOTHING, "vehicle", text) for text in state.faults]
         if not findings:
             return CALM
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
+
+    def taken_over(self, now: int) -> tuple[Fault, bool] | None:
+        """Who has taken the drone over for good, as last assessed; None if nobody has.
+
+        The second value tells whether the reason is settled at `now` (mission clock, nanoseconds).
+        """
+        if self._taken is None:
+            return None
+        return self._taken, now - self._taken_at >= _SETTLED
 
     def silent_for(self, now: int) -> float:
         """Seconds since the link was lost, as last assessed; 0 while it is up."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import ClassVar
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import (
@@ -68,6 +69,8 @@ _WAYS = {
 }
 _LANDS_ON = 1 << 3
 """Bit of FS_OPTIONS: a landing goes on."""
+_PROTECTS = re.compile(r"failsafe|breached|EKF|crash|thrust|battery.*(low|critical)", re.IGNORECASE)
+"""Texts of its own protection."""
 _TALK = 35.0
 """Seconds: longer than the 30 s between its repeated objections."""
 
@@ -96,6 +99,7 @@ class ArduPilot(Autopilot):
     rates: ClassVar[dict[int, float]] = {
         **Autopilot.rates,
         mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,
+        mavlink.MAVLINK_MSG_ID_FENCE_STATUS: 2.0,
     }
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
@@ -153,6 +157,12 @@ class ArduPilot(Autopilot):
             if text.startswith(("PreArm:", "Arm:"))
         ]
         return said or ["ArduPilot's arming checks fail"]
+
+    def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
+        """Its fence's status, and its texts about failsafes, of whatever severity they are."""
+        said = telemetry.texts.recent(now, seconds, mavlink.MAV_SEVERITY_NOTICE)
+        telling = [text for text in said if _PROTECTS.search(text) and "clear" not in text.lower()]
+        return [telemetry.breach, *telling] if telemetry.breach else telling
 
     def encode(self, value: float, kind: int) -> float:
         """Every parameter travels as a float."""

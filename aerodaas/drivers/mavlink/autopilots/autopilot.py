@@ -154,6 +154,19 @@ class Autopilot(ABC):
         """Reasons why it would not arm, in its own texts as far as it sends any."""
 
     @abstractmethod
+    def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
+        """What its own protection acts for.
+
+        Args:
+            telemetry: The vehicle's.
+            now: Monotonic seconds.
+            seconds: Greatest age of what it says.
+
+        Returns:
+            Its own words or ours for them, the most telling first; empty if it tells none.
+        """
+
+    @abstractmethod
     def encode(self, value: float, kind: int) -> float:
         """A parameter's value as PARAM_SET carries it."""
 

@@ -136,7 +136,8 @@ class PX4(Autopilot):
         """Complaints of its latest report of the arming checks."""
         del now
         if telemetry.altitude is None:
-            return ["PX4 does not know its altitude above the sea yet"]
+            unknown = "PX4 does not know its altitude above the sea yet"
+            return [*telemetry.events.objections, unknown]
         ready, events = self.ready(telemetry), telemetry.events
         if ready is None:
             return ["PX4 has not told yet whether its arming checks pass"]
@@ -146,6 +147,11 @@ class PX4(Autopilot):
             # A take-off begins with hold, so that what only its present mode lacks does not matter.
             return list(events.objections_to_hold)
         return list(events.objections) or ["PX4's arming checks fail"]
+
+    def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
+        """Texts of its events, and what its checks have newly found in flight."""
+        said = telemetry.texts.recent(now, seconds)
+        return [*said, *telemetry.events.new_objections(now, seconds)]
 
     def encode(self, value: float, kind: int) -> float:
         """Integers travel as the float of the same bytes."""

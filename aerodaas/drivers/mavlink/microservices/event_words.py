@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["CHECKS", "COMMANDER"]
+__all__ = ["CAUSES", "CHECKS", "COMMANDER"]
 
 _CHECKS = """
 above_wind_limits_warning: wind: stronger than allowed
@@ -166,3 +166,12 @@ CHECKS = _table(_CHECKS)
 """Of the arming and health checks, `check_…`."""
 COMMANDER = _table(_COMMANDER)
 """Of the commander itself, `commander_…`; the mode shows that its protection takes over."""
+CAUSES = {
+    1: "remote control: lost",
+    2: "the ground station is lost",
+    3: "battery: low",
+    4: "battery: critical",
+    5: "battery: about to be empty",
+    6: "battery: little time of flight is left",
+}
+"""Of a failsafe, by PX4's `failsafe_cause_t`; the generic one, 0, is in its report of checks."""

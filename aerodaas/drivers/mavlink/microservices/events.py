@@ -7,9 +7,10 @@ gets our texts, and none for other events.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from aerodaas.drivers.mavlink.microservices.event_words import CHECKS, COMMANDER
+from aerodaas.drivers.mavlink.microservices.event_words import CAUSES, CHECKS, COMMANDER
 
 __all__ = ["EventReader", "EventText", "event_number"]
 
@@ -27,6 +28,12 @@ _TEXTS = {
     **_CHECKS,
     **{event_number(f"commander_{name}"): words for name, words in COMMANDER.items()},
 }
+_CAUSE_AT = {
+    event_number("commander_failsafe_enter"): 5,
+    event_number("commander_failsafe_enter_hold"): 7,
+    event_number("commander_failsafe_enter_warn"): 4,
+}
+"""Where among an event's arguments the cause of a failsafe stands."""
 _OF_THE_MODE = frozenset(
     CHECKS[name]
     for name in (
@@ -55,6 +62,8 @@ class EventReader:
     def __init__(self) -> None:
         self.objections: tuple[str, ...] = ()
         """Complaints of the latest complete report of the arming checks."""
+        self._since: dict[str, float] = {}
+        """Second at which each of them was first reported."""
         self._report: list[str] | None = None
         self._latest: int | None = None
 
@@ -63,8 +72,27 @@ class EventReader:
         """The same without those of its present mode's own requirements: hold has none of them."""
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
-    def take(self, number: int, log_levels: int, sequence: int) -> EventText | None:
-        """Decode one event; None for a repetition and for one of no interest."""
+    def new_objections(self, now: float, seconds: float) -> list[str]:
+        """Those of the last `seconds`, in flight as well: they are what its failsafes act for."""
+        return [text for text in self.objections if now - self._since[text] <= seconds]
+
+    def take(
+        self,
+        number: int,
+        log_levels: int,
+        sequence: int,
+        arguments: Sequence[int] = (),
+        now: float = 0.0,
+    ) -> EventText | None:
+        """Decode one event; None for a repetition and for one of no interest.
+
+        Args:
+            number: The event's number.
+            log_levels: External log level in the lower four bits.
+            sequence: Number of this sending; the same one again is a repetition.
+            arguments: The event's own arguments, as bytes.
+            now: Arrival in seconds.
+        """
         if sequence == self._latest:
             return None
         self._latest = sequence
@@ -74,12 +102,15 @@ class EventReader:
         if number == _END:
             if self._report is not None:
                 self.objections = tuple(dict.fromkeys(self._report))
+                self._since = {text: self._since.get(text, now) for text in self.objections}
             self._report = None
             return None
         severity = log_levels & 0x0F
         if severity >= _HARMLESS:
             return None
         text = _TEXTS.get(number)
+        if number in _CAUSE_AT and len(arguments) > _CAUSE_AT[number]:
+            text = CAUSES.get(arguments[_CAUSE_AT[number]], text)
         if self._report is not None:
             # Failed checks matter before a take-off; in flight the health monitor reports them.
             self._report.append(text or f"a check that is not known here (event {number:#010x})")

@@ -29,6 +29,9 @@ _DOES_NOT_FIT = 0.8
 _SHAKES = (60, 30)
 """Excessive vibration in m/s², and the level worth a report."""
 _UNKNOWN = 65535
+_UNKNOWN_SATELLITES = 255
+_ENOUGH = 6
+"""Satellites that both autopilots ask for (EKF2_REQ_NSATS; ArduPilot's EKF)."""
 _HIGHEST_CELL = 4600
 """Millivolts that no cell has, at 4.35 V when it is full."""
 _CLIPS = 10
@@ -104,6 +107,8 @@ class Health:
         """Whether the GPS has a position in space."""
         self.gps_fix_type = 0
         """GPS_FIX_TYPE as last told; 0: no GPS."""
+        self.satellites: int | None = None
+        """Satellites that the GPS uses; None while they are not told."""
         self._charges_told = False
         """Batteries are reported by their own messages."""
         self._takers = {
@@ -138,6 +143,15 @@ class Health:
         return complaint is not None and now - complaint.since >= _STANDS
 
     @property
+    def gps_objection(self) -> str:
+        """Why the GPS gives no position that an autopilot flies by; empty if that is not told."""
+        count, fixed = self.satellites, self.gps_fix_type >= _FIX
+        if count is None or (fixed and count >= _ENOUGH):
+            return ""
+        words = f"GPS: {count} satellite{'' if count == 1 else 's'}, {_ENOUGH} are needed"
+        return words if fixed else f"{words}; no fix"
+
+    @property
     def gps_rtk(self) -> str:
         """How far its corrections have come; empty without any."""
         return _RTK.get(self.gps_fix_type, "")
@@ -159,6 +173,8 @@ class Health:
         self._gps_silence = 0.0
         self.gps_fix = bool(message.fix_type >= _FIX)
         self.gps_fix_type = int(message.fix_type)
+        told = message.satellites_visible != _UNKNOWN_SATELLITES
+        self.satellites = int(message.satellites_visible) if told else None
         if message.fix_type >= _FIX:
             self._fixed_at = now
         # A vehicle that never had a fix flies without GPS, or reports the reason itself.

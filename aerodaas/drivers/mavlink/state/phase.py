@@ -11,10 +11,12 @@ import math
 
 from aerodaas.types.vehicle import VehicleMode
 
-__all__ = ["FlightMode", "FlightPhase"]
+__all__ = ["PROTECTIVE", "FlightMode", "FlightPhase"]
 
 _LAG = 2.5
 """Seconds for which HEARTBEATs may show the previous mode after a change was accepted."""
+_EXPLAINED = 2.5
+"""Seconds after a takeover in which the vehicle may still tell that its own protection did it."""
 
 
 class FlightMode(enum.Enum):
@@ -31,6 +33,8 @@ class FlightMode(enum.Enum):
     """Flown by a pilot."""
 
 
+PROTECTIVE = frozenset({FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND})
+"""Modes into which an autopilot's own protection changes."""
 _FOLLOWS = {
     FlightMode.GUIDED: frozenset({FlightMode.GUIDED}),
     FlightMode.TAKE_OFF: frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED}),
@@ -68,6 +72,9 @@ class FlightPhase:
         self._before: frozenset[FlightMode] = frozenset()
         """Modes that HEARTBEATs may still show for a moment after the request."""
         self._asked_at = -math.inf
+        self._taken_by = FlightMode.OTHER
+        """The mode in which it was taken, and when, in seconds."""
+        self._taken_at = -math.inf
 
     @property
     def mode(self) -> VehicleMode:
@@ -112,6 +119,9 @@ class FlightPhase:
             self.armed, self.shown = armed, shown
             return
         self.armed, self.shown = armed, shown
+        if self.taken is VehicleMode.MANUAL and critical and shown is self._taken_by:
+            explained = now - self._taken_at <= _EXPLAINED
+            self.taken = VehicleMode.FAILSAFE if explained else self.taken
         if self.wish is None or self.taken is not None:
             return
         if shown in _FOLLOWS[self.wish]:
@@ -120,3 +130,4 @@ class FlightPhase:
         late = now - self._asked_at <= _LAG or not self.seen
         if shown not in self._before or not late:
             self.taken = VehicleMode.FAILSAFE if critical else VehicleMode.MANUAL
+            self._taken_by, self._taken_at = shown, now

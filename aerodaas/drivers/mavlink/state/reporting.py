@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.state.alignment import Alignment
@@ -51,6 +52,8 @@ class VehicleReport:
         measures = telemetry.rangefinder is not None
         self.rates = {mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: RATE} if measures else {}
         """What must be sent beside what every vehicle sends, Hz by message."""
+        self.autopilot: Autopilot | None = None
+        """Its family; None before it is found."""
         self.departure: Departure | None = None
         """Its take-offs; None before it is found."""
         self.alignment: Alignment | None = None
@@ -193,6 +196,9 @@ class VehicleReport:
     def _faults(self, now: float) -> list[str]:
         telemetry = self._telemetry
         faults = [self.restarted, self._touchdown.fault]
+        if self._phase.taken is VehicleMode.FAILSAFE and self.autopilot is not None:
+            faults += self.autopilot.protection_reasons(telemetry, now, REASONS)
+        faults.append(telemetry.breach)
         speaks = now - telemetry.heard_at <= _LOST_AFTER < now - telemetry.back_at
         if speaks and self._silence(now) > _LOST_AFTER:
             faults.append("telemetry: packets come, and say nothing new")

@@ -30,6 +30,11 @@ _FAR = 5.0
 _FULL = 100
 """Percent."""
 _UNKNOWN_SATELLITES = 255
+_BREACHES = {
+    mavlink.FENCE_BREACH_MINALT: "too low",
+    mavlink.FENCE_BREACH_MAXALT: "too high",
+    mavlink.FENCE_BREACH_BOUNDARY: "outside",
+}
 _UNKNOWN_VOLTAGE = 65535
 
 
@@ -54,16 +59,14 @@ class Telemetry:
         """The latest message whose stamp was newer than all before."""
         self.beat_at = -math.inf
         """The latest HEARTBEAT."""
-        self.custom_mode = 0
-        self.armed = False
+        self.custom_mode, self.armed = 0, False
         self.critical = False
         """Its own protection is at work."""
         self.position: Vector | None = None
         """NED metres from the autopilot's own origin."""
         self.velocity: Vector = np.zeros(3)
         self.position_at = -math.inf
-        self.attitude = Attitude()
-        self.attitude_at = -math.inf
+        self.attitude, self.attitude_at = Attitude(), -math.inf
         self.home: Vector | None = None
         """Position where it was armed, NED metres."""
         self.altitude: float | None = None
@@ -73,6 +76,8 @@ class Telemetry:
         self.gps: GpsFix | None = None
         self.battery = Battery(math.nan)
         self.on_ground: bool | None = None
+        self.breach = ""
+        """How it says that it is outside its own fence; empty if it does not."""
         self.sensors: Sensors | None = None
         """Bits of SYS_STATUS; None before it has come."""
         self.health = Health()
@@ -105,6 +110,7 @@ class Telemetry:
             "SYS_STATUS": self._status,
             "EXTENDED_SYS_STATE": self._landed,
             "HOME_POSITION": self._home,
+            "FENCE_STATUS": self._fence,
             "SYSTEM_TIME": self._time,
             "TIMESYNC": lambda message, _: self.boot_clock.take(message),
             "AUTOPILOT_VERSION": self._version,
@@ -227,6 +233,10 @@ class Telemetry:
         home = np.array([message.x, message.y, message.z], dtype=np.float64)
         self.home = home if np.isfinite(home).all() else None
 
+    def _fence(self, message: Any, _: float) -> None:  # noqa: ANN401
+        how = _BREACHES.get(message.breach_type, "left")
+        self.breach = f"its own geofence: {how}" if message.breach_status else ""
+
     def _time(self, message: Any, _: float) -> None:  # noqa: ANN401
         self.clock = message.time_unix_usec / 1e6
 
@@ -258,7 +268,7 @@ class Telemetry:
         self.position_at = self.attitude_at = -math.inf
         self.home = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
-        self.sensors = self.on_ground = None
+        self.sensors, self.on_ground, self.breach = None, None, ""
         self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock()
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
@@ -282,7 +292,9 @@ class Telemetry:
         self.texts.take(message.text, message.severity, now, message.id, message.chunk_seq)
 
     def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
-        said = self.events.take(message.event, message.log_levels, message.sequence)
+        said = self.events.take(
+            message.event, message.log_levels, message.sequence, message.arguments, now
+        )
         if said is not None:
             self.texts.add(said.text, said.severity, now)
 

@@ -16,6 +16,8 @@ _OVERDUE = 3.0
 """Seconds without a message after which it is asked for again."""
 _PAUSE = 5.0
 """Seconds between two requests for the same message."""
+_OCCASIONAL = frozenset({mavlink.MAVLINK_MSG_ID_FENCE_STATUS})
+"""Messages that do not come while the vehicle has nothing to tell by them."""
 
 
 class RateKeeper:
@@ -29,7 +31,7 @@ class RateKeeper:
         self._commander = commander
         self._rates = {**autopilot.rates, **(more or {})}
         self._asked_at = dict.fromkeys(self._rates, -math.inf)
-        self._refused: set[int] = set()
+        self._settled: set[int] = set()
         self._reboots = 0
         self._waiting = False
 
@@ -38,7 +40,7 @@ class RateKeeper:
         if telemetry.reboots != self._reboots:
             self._reboots = telemetry.reboots
             self._asked_at = dict.fromkeys(self._asked_at, -math.inf)
-            self._refused.clear()
+            self._settled.clear()
         if self._waiting:
             return
         for message, rate in self._rates.items():
@@ -46,7 +48,7 @@ class RateKeeper:
             first = self._asked_at[message] == -math.inf
             missing = first or now - telemetry.seen.get(name, -math.inf) > _OVERDUE + 2.0 / rate
             due = now - self._asked_at[message] > _PAUSE
-            if missing and due and message not in self._refused:
+            if missing and due and message not in self._settled:
                 self._asked_at[message] = now
                 self._ask(message, rate, now)
                 return
@@ -56,7 +58,8 @@ class RateKeeper:
 
         def done(outcome: CommandResult) -> None:
             self._waiting = False
-            if not outcome.accepted and outcome.text != "no answer":
-                self._refused.add(message)
+            answered = outcome.text != "no answer"
+            if answered and (not outcome.accepted or message in _OCCASIONAL):
+                self._settled.add(message)
 
         self._commander.give(self._autopilot.interval(message, rate), done, now=now)
