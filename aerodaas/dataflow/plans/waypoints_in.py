@@ -181,6 +181,8 @@ class _Flown:
             self._say(item, "its radius (params 2, 3) is not used, but limits.arrival_radius")
         if item.command != NAV_WAYPOINT or self._ardupilot:
             # Only PX4 has a heading here, and only of a waypoint.
+            if item.command == NAV_WAYPOINT and yaw:
+                self._say(item, "its yaw (param 4) is not used, as ArduPilot does not turn to it")
             yaw = None
         plain = Waypoint(
             f"item{item.number}",

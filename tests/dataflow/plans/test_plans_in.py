@@ -177,6 +177,12 @@ def test_headings_are_px4s(tmp_path: Path) -> None:
     assert flown_plan(px4)[0][0].yaw == pytest.approx(math.pi / 2)
     ardupilot = plan(tmp_path / "ardupilot.plan", north, mission={"firmwareType": 3})
     assert flown_plan(ardupilot)[0][0].yaw is None
+    assert not told(ardupilot)
+    east = plan(
+        tmp_path / "east.plan", item(16, [0, 0, 0, 90, 47, 8, 9]), mission={"firmwareType": 3}
+    )
+    assert flown_plan(east)[0][0].yaw is None
+    assert "its yaw (param 4) is not used" in told(east)[0]
     assert (
         flown_plan(lines(tmp_path / "a.waypoints", "3 16 0 0 0 0 47.001 8.0 9"))[0][0].yaw is None
     )

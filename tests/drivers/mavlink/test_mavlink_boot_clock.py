@@ -92,16 +92,32 @@ def test_an_old_one_gives_way_as_clocks_drift() -> None:
     assert world.error < 0.011
 
 
-def test_it_asks_often_at_first_and_seldom_later() -> None:
-    """Each second ten times, then each tenth."""
+def test_it_asks_often_at_first_and_without_answers() -> None:
+    """Each second ten times, then every other; each second again while an answer is missing."""
     world = Exchanges()
-    for _ in range(9):
+    for pause in (0.0, *[1.0] * 9, 2.0, 2.0):
+        began = world.now
         world.exchange(0.0, 0.0)
-    began = world.now
+        assert world.now - began == pytest.approx(pause, abs=0.1)
+    for pause in (2.0, 2.0, 1.0, 1.0):
+        began = world.now
+        world.ask()
+        assert world.now - began == pytest.approx(pause, abs=0.1)
+
+
+def test_a_vehicle_that_answered_and_answers_no_more_is_noticed() -> None:
+    """Counted from the first request that it left unanswered; one that never answered is not."""
+    world = Exchanges()
     world.ask()
-    assert world.now - began == pytest.approx(1.0, abs=0.1)
+    world.now += 60.0
+    assert world.clock.unanswered == 0.0
+    world.exchange(0.4, 2.0)
+    assert world.clock.unanswered == 0.0
     world.ask()
-    assert world.now - began == pytest.approx(11.0, abs=0.2)
+    world.now += 4.0
+    assert world.clock.unanswered == pytest.approx(4.0)
+    world.exchange(0.0, 0.0)
+    assert world.clock.unanswered == 0.0
 
 
 def test_what_is_no_answer_of_ours() -> None:

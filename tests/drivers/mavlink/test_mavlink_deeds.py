@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from handmade import HOLD, LAND, OFFBOARD, POSITION, RETURN, TAKE_OFF, Handmade
 
+from aerodaas.drivers.mavlink.microservices.events import event_number
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import InvalidWaypointError, VehicleError
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
@@ -116,6 +117,29 @@ def test_what_speaks_against_a_take_off(world: Handmade) -> None:
     world.advance(3.0)
     assert world.vehicle.preflight() == ["no word from the vehicle for 3 s"]
     with pytest.raises(VehicleError, match="no word from the vehicle"):
+        world.vehicle.take_off(2.0)
+
+
+def test_what_keeps_it_from_arming_is_told_before_all_else(world: Handmade) -> None:
+    """Its checks' own complaint comes before a text of late that is about something else."""
+    world.well = 0
+    world.say(mavlink.MAVLink_statustext_message(4, b"Logging: low on space", 0, 0))
+    names = (
+        "commander_arming_check_summary",
+        "check_estimator_gps_num_sats_too_low",
+        "commander_health_summary",
+    )
+    for number, name in enumerate(names):
+        event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 3, [0] * 40)
+        world.say(event)
+    world.turn(0.2)
+    assert world.vehicle.preflight() == ["GPS: too few satellites"]
+    world.well = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    world.turn(0.2)
+    world.vehicle.take_off(2.0)
+    world.well, world.result = 0, mavlink.MAV_RESULT_DENIED
+    world.turn(0.6)
+    with pytest.raises(VehicleError, match="denied; GPS: too few satellites; Logging: low on"):
         world.vehicle.take_off(2.0)
 
 

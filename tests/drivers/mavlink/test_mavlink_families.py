@@ -208,6 +208,13 @@ def test_what_px4_objects_to() -> None:
     assert PX4().objections(Telemetry(), 0.0) == [
         "PX4 does not know its altitude above the sea yet"
     ]
+    few = Telemetry()
+    for number, name in enumerate(
+        ("commander_arming_check_summary", "check_estimator_gps_num_sats_too_low")
+    ):
+        few.events.take(event_number(name), 4, number)
+    few.events.take(event_number("commander_health_summary"), 3, 2)
+    assert PX4().objections(few, 0.0)[0] == "GPS: too few satellites"
     assert PX4().objections(telling(0, 0), 0.0) == [
         "PX4 has not told yet whether its arming checks pass"
     ]

@@ -284,6 +284,23 @@ def test_an_autopilot_that_is_found_starting_has_not_started_anew() -> None:
     assert reboots == [0, 0, 1]
 
 
+@pytest.mark.parametrize(
+    ("satellites", "fix", "said"),
+    [
+        (3, 1, "GPS: 3 satellites, 6 are needed; no fix"),
+        (1, 3, "GPS: 1 satellite, 6 are needed"),
+        (6, 3, ""),
+        (255, 1, ""),
+    ],
+)
+def test_too_few_satellites_are_counted(satellites: int, fix: int, said: str) -> None:
+    """A number that is not told is no complaint."""
+    health = Health()
+    assert health.gps_objection == ""
+    health.take(mavlink.MAVLink_gps_raw_int_message(0, fix, 1, 1, 0, 80, 80, 0, 0, satellites), 0.0)
+    assert health.gps_objection == said
+
+
 def test_a_place_of_zeros_is_none() -> None:
     """An autopilot without GPS sends zeros."""
     telemetry, places = Telemetry(), []

@@ -130,12 +130,14 @@ def test_the_word_of_the_driver_decides() -> None:
 
 
 def test_a_failsafe_says_what_it_is_for() -> None:
-    """The vehicle's complaints are in the reason."""
+    """The vehicle's complaints are in the reason, those of a second later, too."""
     one = flight(add(*square()))
     one.run(12.0)
-    one.vehicle.faults = ("battery: critical", "GPS: no fix")
     one.vehicle.mode = VehicleMode.FAILSAFE
-    one.turn()
+    one.run(1.0)
+    assert not one.tell(ReturnHome()).accepted
+    one.vehicle.faults = ("battery: critical", "GPS: no fix")
+    one.run(3.0)
     one.expect(S.ABORTED)
     said = "the vehicle's own protection has taken over: battery: critical; GPS: no fix"
     assert one.status.reason == said

@@ -12,8 +12,8 @@ from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["BootClock"]
 
-_OFTEN, _SELDOM = 1.0, 10.0
-"""Seconds from one exchange to the next, at first and later on."""
+_OFTEN, _SELDOM = 1.0, 2.0
+"""Seconds from one exchange to the next: at first and while answers are missing, and later on."""
 _FIRST = 10
 """Exchanges of the former kind: enough that one of them is likely to be swift."""
 _LONGEST = 1.0
@@ -64,8 +64,11 @@ class BootClock:
         """
         self._clock = clock
         self._due = 0.0
-        self._asked = 0
+        self._asked = self._system = 0
         self._pending: int | None = None
+        self._answered = False
+        self._unanswered_since: float | None = None
+        """When the first request after the last answer left."""
         self._best: _Sample | None = None
         self._doubt: _Sample | None = None
 
@@ -75,14 +78,19 @@ class BootClock:
         if self._asked and now < self._due:
             return None
         self._asked += 1
-        self._due = now + (_SELDOM if self._asked >= _FIRST else _OFTEN)
+        calm = self._asked >= _FIRST and self._unanswered_since is None
+        self._due = now + (_SELDOM if calm else _OFTEN)
+        self._unanswered_since = now if self._unanswered_since is None else self._unanswered_since
         # Every vehicle on a wire answers: its own number tells whose answer it is.
+        self._system = system
         self._pending = (int(now * NANOSECONDS) // _SYSTEMS - 1) * _SYSTEMS + system
         return mavlink.MAVLink_timesync_message(0, self._pending)
 
     def take(self, message: Any) -> None:  # noqa: ANN401
         """Take a TIMESYNC of the autopilot; its own requests are none of our answers."""
         now = self._clock()
+        if message.tc1 > 0 and (message.ts1 - self._system) % _SYSTEMS == 0:
+            self._answered, self._unanswered_since = True, None
         if message.ts1 != self._pending or not 0 < message.tc1 < _LATEST:
             return
         asked, self._pending = message.ts1 / NANOSECONDS, None
@@ -99,6 +107,13 @@ class BootClock:
             self._best, self._doubt = sample, None
         else:
             self._doubt, self._due = sample, now + _OFTEN
+
+    @property
+    def unanswered(self) -> float:
+        """Seconds for which a vehicle that answered before has left all requests unanswered."""
+        if not self._answered or self._unanswered_since is None:
+            return 0.0
+        return self._clock() - self._unanswered_since
 
     def reading(self, at: float) -> tuple[float, float] | None:
         """What it reads at the second `at` of ours, and by how much that may be wrong, in seconds.

@@ -34,6 +34,8 @@ _FINDING = 1.0
 """Seconds for a first position after the link is back."""
 _DATED = 1e9
 """Seconds since the Unix epoch that its clock shows at least once it knows the date."""
+_DEAF_AFTER = 5.0
+"""Seconds without an answer from a vehicle that is heard, after which the uplink is in doubt."""
 _GRAVE = 3
 """Severity of an error; smaller is more severe."""
 
@@ -202,6 +204,8 @@ class VehicleReport:
         speaks = now - telemetry.heard_at <= _LOST_AFTER < now - telemetry.back_at
         if speaks and self._silence(now) > _LOST_AFTER:
             faults.append("telemetry: packets come, and say nothing new")
+        if speaks and telemetry.boot_clock.unanswered > _DEAF_AFTER:
+            faults.append("link: the vehicle answers nothing, it may not hear us")
         if self.alignment is not None:
             faults.append(self.alignment.fault)
         faults += [*telemetry.health.faults(now), *self.objections(now)]
