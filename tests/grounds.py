@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ def ground(
     steps = np.arange(side + 1)
     north, east = np.meshgrid((side / 2 - steps) * _STEP, (steps - side / 2) * _STEP, indexing="ij")
     samples = 500.0 + shape(east.astype(np.float64), north.astype(np.float64))
-    tile = Tile("made up", grid, lambda: samples, None)
+    tile = Tile(Path("made up"), grid, lambda: samples, None)
     return Ground(Terrain([tile]), ORIGIN, np.array(takeoff, dtype=np.float64), reach)
 
 

@@ -9,11 +9,14 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
 
 from numpy.typing import NDArray
 
 from aerodaas.config.extras import require_extra
+from aerodaas.config.json_text import read_text
 from aerodaas.config.printable import printable
+from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.terrain.tile import MOST_SAMPLES, Grid, Tile
 from aerodaas.types.errors import ConfigError
 
@@ -26,6 +29,15 @@ _WGS84 = 4326
 _ABOVE_SEA = (None, 3855, 5773, 5798, 5714)
 """Vertical datums: none said, EGM2008, EGM96, EGM84, mean sea level."""
 _METRE = (None, 9001)
+_FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
+_UNITS = {
+    **dict.fromkeys(("", "m", "metre", "meter", "metres", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot"), _FOOT),
+    **dict.fromkeys(("us-ft", "ftus", "us survey foot", "us_survey_foot"), _SURVEY_FOOT),
+}
+"""Metres of GDAL's units."""
+_WRITE_METRES = "write metres by `gdal_calc`"
+_MOST_ELEMENTS = 10_000
 _PIXEL_IS_POINT = 2
 
 
@@ -41,7 +53,9 @@ def geotiff_tile(path: Path) -> Tile:
 
     try:
         with tifffile.TiffFile(path) as file:
-            grid, void = _described(file.pages[0], path)
+            page = file.pages[0]
+            grid, void = _described(page, path)
+            scale, offset = _metres(page, path)
     except ConfigError:
         raise
     except Exception as error:  # noqa: BLE001 - a stranger's bytes may raise anything
@@ -50,7 +64,7 @@ def geotiff_tile(path: Path) -> Tile:
     def read() -> NDArray[Any]:
         return _samples(path, grid)
 
-    return Tile(path.name, grid, read, void)
+    return Tile(path, grid, read, void, scale, offset)
 
 
 def _samples(path: Path, grid: Grid) -> NDArray[Any]:
@@ -136,6 +150,52 @@ def _check(keys: Mapping[int, int], path: Path) -> None:
         )
     if keys.get(4099) not in _METRE:
         raise ConfigError(f"{path}: its heights are not in metres: convert it by `gdal_calc`")
+
+
+def _metres(page: TiffPage, path: Path) -> tuple[float, float]:
+    """Metres of a sample's unit, and of a sample of zero.
+
+    GDAL's own words: UNITTYPE, SCALE and OFFSET in the file or, where it could not be written, in
+    one beside it. Heights are in the unit once they are scaled.
+    """
+    tag, beside = page.tags.get(42112), path.with_name(f"{path.name}.aux.xml")
+    words: dict[str, str] = {}
+    try:
+        if beside.is_file():
+            text = read_text(beside, "what GDAL says of a terrain")
+            words = _words(parse_xml(text, "GDAL's metadata", _MOST_ELEMENTS))
+        if tag is not None:
+            words |= _words(parse_xml(str(tag.value).strip("\0 "), "GDAL_METADATA", _MOST_ELEMENTS))
+        unit = words.get("UNITTYPE", "").strip().lower()
+        metres, scale = _UNITS[unit], float(words.get("SCALE", 1.0))
+        offset = float(words.get("OFFSET", 0.0))
+    except XmlError as error:
+        raise ConfigError(f"{path}: GDAL's words for it {error}: {_WRITE_METRES}") from None
+    except (KeyError, ValueError) as error:
+        raise ConfigError(
+            f"{path}: its heights have an unknown unit or scale "
+            f"({printable(str(error))[:40]}): {_WRITE_METRES}"
+        ) from None
+    if not (math.isfinite(scale) and scale > 0.0 and math.isfinite(offset)):
+        raise ConfigError(f"{path}: SCALE is {scale:g}, OFFSET {offset:g}: {_WRITE_METRES}")
+    if unit and metres != 1.0 and _keys(page).get(4099) is not None:
+        raise ConfigError(
+            f"{path}: its UNITTYPE is {unit}, and its VerticalUnits are metres: {_WRITE_METRES}"
+        )
+    return metres * scale, metres * offset
+
+
+def _words(root: ET.Element) -> dict[str, str]:
+    """GDAL's words for the first band, by its names for them in a GeoTIFF."""
+    words = {}
+    for item in root.iter("Item"):
+        if item.get("sample", "0") == "0" and item.get("name") in {"UNITTYPE", "SCALE", "OFFSET"}:
+            words[str(item.get("name"))] = item.text or ""
+    for band in root.iter("PAMRasterBand"):
+        if band.get("band", "1") == "1":
+            for name in ("UnitType", "Scale", "Offset"):
+                words |= {name.upper(): item.text or "" for item in band.iter(name)}
+    return words
 
 
 def _keys(page: TiffPage) -> dict[int, int]:

@@ -52,4 +52,4 @@ def hgt_tile(path: Path) -> Tile:
     def read() -> NDArray[Any]:
         return np.memmap(path, dtype=">i2", mode="r", shape=(side, side))
 
-    return Tile(path.name, Grid(south + 1.0, float(west), step, step, side, side), read, _VOID)
+    return Tile(path, Grid(south + 1.0, float(west), step, step, side, side), read, _VOID)

@@ -81,8 +81,8 @@ class Terrain:
         for tile in tiles[1:]:
             if not tiles[0].grid.is_aligned(tile.grid):
                 raise ConfigError(
-                    f"{tile.name} and {tiles[0].name} have different grids: make one file of them "
-                    "by `gdalwarp -t_srs EPSG:4326`"
+                    f"{_gridded(tiles[0])} and {_gridded(tile)} have different grids: name one of "
+                    "them, or make one file of both by `gdalwarp -t_srs EPSG:4326`"
                 )
 
     @classmethod
@@ -148,6 +148,14 @@ class Terrain:
         for tile in self.tiles:
             _copy(tile, grid, samples)
         return Patch(grid, samples)
+
+
+def _gridded(tile: Tile) -> str:
+    """A file with its folder and its steps."""
+    steps = (tile.grid.latitude_step, tile.grid.longitude_step)
+    return (
+        f"{tile.path} (steps of {' x '.join(f'{3600 * step:.5g}' for step in steps)} arc seconds)"
+    )
 
 
 def _copy(tile: Tile, grid: Grid, samples: NDArray[np.float32]) -> None:

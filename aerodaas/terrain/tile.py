@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,12 +86,21 @@ class Grid:
 class Tile:
     """The heights of one file, above mean sea level, read when they are first asked for."""
 
-    name: str
+    path: Path
     grid: Grid
     read: Callable[[], NDArray[Any]]
     """Reads the samples, shape (rows, columns); a memory map where the format allows it."""
     void: float | None
     """The sample that means that nothing is known, if the file says one."""
+    scale: float = 1.0
+    """Metres of a sample's unit."""
+    offset: float = 0.0
+    """Metres of a sample of zero."""
+
+    @property
+    def name(self) -> str:
+        """The file's, without its folder."""
+        return self.path.name
 
     @cached_property
     def _samples(self) -> NDArray[Any]:
@@ -100,6 +110,8 @@ class Tile:
         """Heights of a part in metres; NaN where nothing is known."""
         part = np.asarray(self._samples[rows, columns])
         heights = part.astype(np.float32)
-        unknown = ~((part >= _DEEPEST) & (part <= _HIGHEST))
+        heights *= np.float32(self.scale)
+        heights += np.float32(self.offset)
+        unknown = ~((heights >= _DEEPEST) & (heights <= _HIGHEST))
         heights[unknown if self.void is None else unknown | (part == self.void)] = np.nan
         return heights

@@ -38,9 +38,13 @@ def write_geotiff(
     point: bool = False,
     keys: dict[int, int] | None = None,
     nodata: str | None = None,
+    gdal: str | None = None,
     **words: Any,  # noqa: ANN401
 ) -> Path:
-    """Write a GeoTIFF whose first pixel's corner (or, with `point`, middle) is north-west."""
+    """Write a GeoTIFF whose first pixel's corner (or, with `point`, middle) is north-west.
+
+    `gdal` are the items of GDAL's metadata.
+    """
     import tifffile  # noqa: PLC0415 - an extra
 
     named = {1024: 2, 1025: 2 if point else 1, 2048: 4326, **(keys or {})}
@@ -54,6 +58,8 @@ def write_geotiff(
     ]
     if nodata is not None:
         tags.append((42113, 2, 0, nodata, True))
+    if gdal is not None:
+        tags.append((42112, 2, 0, f"<GDALMetadata>{gdal}</GDALMetadata>", True))
     tifffile.imwrite(path, samples, extratags=tags, metadata=None, **words)
     return path
 

@@ -123,6 +123,18 @@ def test_files_that_are_no_terrain_are_refused(tmp_path: Path, name: str, why: s
         Terrain.open([path])
 
 
+def test_two_files_of_one_tile_are_told_apart_by_folder_and_steps(tmp_path: Path) -> None:
+    """Their names are the same."""
+    (tmp_path / "coarse").mkdir()
+    (tmp_path / "fine").mkdir()
+    coarse = hgt(tmp_path / "coarse", "N47E008", _sloping)
+    fine = hgt(tmp_path / "fine", "N47E008", _sloping, 3601)
+    with pytest.raises(ConfigError) as refused:
+        Terrain.open([coarse, fine])
+    for word in (f"{coarse} (steps of 3 x 3 arc", f"{fine} (steps of 1 x 1 arc"):
+        assert word in str(refused.value)
+
+
 def test_files_of_different_steps_are_not_joined(tmp_path: Path) -> None:
     """A seam between them would be guessed."""
     coarse = hgt(tmp_path, "N46E008", _sloping)
@@ -181,6 +193,79 @@ def test_geotiff_holes_are_unknown(tmp_path: Path, nodata: str | None) -> None:
     path = write_geotiff(tmp_path / "a.tif", samples, 47.09, 8.0, 0.01, point=True, nodata=nodata)
     with pytest.raises(ConfigError, match="has a hole there"):
         Terrain.open([path]).height(47.052, 8.041)
+
+
+UNIT = '<Item name="UNITTYPE" sample="0" role="unittype">{}</Item>'
+SCALED = (
+    '<Item name="OFFSET" sample="0" role="offset">{1}</Item>'
+    '<Item name="SCALE" sample="0" role="scale">{0}</Item>'
+)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize(
+    ("unit", "scale", "offset", "metres"),
+    [
+        ("m", 1.0, 0.0, (1.0, 0.0)),
+        ("metre", 0.1, 0.0, (0.1, 0.0)),
+        ("ft", 1.0, 0.0, (0.3048, 0.0)),
+        ("US survey foot", 1.0, 0.0, (1200 / 3937, 0.0)),
+        ("ft", 0.1, 1000.0, (0.03048, 304.8)),
+    ],
+)
+def test_geotiff_heights_are_in_the_unit_and_scale_that_gdal_says(
+    tmp_path: Path,
+    unit: str,
+    scale: float,
+    offset: float,
+    metres: tuple[float, float],
+    *,
+    beside: bool,
+) -> None:
+    """In the file, or in one beside it where GDAL could not write into it."""
+    pytest.importorskip("tifffile")
+    path = tmp_path / "a.tif"
+    words = UNIT.format(unit) + SCALED.format(scale, offset)
+    write_geotiff(
+        path, _slope(9, 9, "int16"), 47.09, 8.0, 0.01, point=True, gdal=None if beside else words
+    )
+    if beside:
+        (tmp_path / "a.tif.aux.xml").write_text(
+            f'<PAMDataset><PAMRasterBand band="1"><UnitType>{unit}</UnitType>'
+            f"<Offset>{offset}</Offset><Scale>{scale}</Scale></PAMRasterBand></PAMDataset>"
+        )
+    found = Terrain.open([path]).height(47.04, 8.03)
+    assert found == pytest.approx(53.0 * metres[0] + metres[1], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (UNIT.format("fathom"), "unknown unit or scale .*fathom"),
+        (SCALED.format("ten", 0), "unknown unit or scale .*ten"),
+        (SCALED.format(0, 0), "SCALE is 0"),
+        (SCALED.format(-1, 0), "SCALE is -1"),
+        (SCALED.format("nan", 0), "SCALE is nan"),
+        (SCALED.format(1, "inf"), "OFFSET inf"),
+        ("<Item", "is no XML"),
+    ],
+)
+def test_geotiff_heights_in_no_unit_are_refused(tmp_path: Path, words: str, why: str) -> None:
+    """With the remedy."""
+    pytest.importorskip("tifffile")
+    path = write_geotiff(tmp_path / "a.tif", _slope(9, 9), 47.0, 8.0, 0.01, gdal=words)
+    with pytest.raises(ConfigError, match=rf"a\.tif: .*{why}.*gdal_calc"):
+        Terrain.open([path])
+
+
+def test_geotiff_that_names_two_units_is_refused(tmp_path: Path) -> None:
+    """Metres by its key, feet by GDAL."""
+    pytest.importorskip("tifffile")
+    path = write_geotiff(
+        tmp_path / "a.tif", _slope(9, 9), 47.0, 8.0, 0.01, keys={4099: 9001}, gdal=UNIT.format("ft")
+    )
+    with pytest.raises(ConfigError, match="UNITTYPE is ft, and its VerticalUnits are metres"):
+        Terrain.open([path])
 
 
 @pytest.mark.parametrize(
