@@ -28,6 +28,8 @@ _ROUNDING = 1e-3
 """How far beyond 0 and 1 a score may lie: half precision and quantisation round."""
 _FRACTION = 2.0
 """Boxes all of whose corners lie within so many pixels of the origin are fractions, not pixels."""
+_SURE = 0.5
+"""A detector is this sure of less than half its boxes where there is nothing."""
 _SEEN, _COMMON = 0.1, 0.1
 """Patches of colour hold nothing: no detector gives a tenth of its boxes scores of 0.1 and more."""
 _CELLS = 100
@@ -119,6 +121,14 @@ def _check_scores(
         problem = f"gives scores from {lowest:.2g} to {highest:.2g} instead of 0 to 1"
         remedy = f"export it with its sigmoid{_stripped(model, decoder)}"
         raise model.refusal(problem, remedy)
+    many = len(scores) >= _CELLS * _PICTURES
+    if many and float(np.median(scores)) >= _SURE:
+        problem = f"scores most of its boxes above {_SURE} in pictures that hold nothing"
+        remedy = (
+            "its scores may be logits of another kind, or its last class 'no object': export it "
+            "with scores from 0 to 1 for each class, or pass a ModelFamily of your own in families="
+        )
+        raise model.refusal(problem, remedy)
     if not decoder.overlapping:
         return
     if highest == 0.0:
@@ -129,7 +139,7 @@ def _check_scores(
         )
         raise model.refusal(problem, remedy)
     share = float((scores >= _SEEN).mean())
-    if len(scores) >= _CELLS * _PICTURES and share > _COMMON:
+    if many and share > _COMMON:
         problem = f"scores {share:.0%} of its boxes above {_SEEN} in pictures that hold nothing"
         remedy = f"export it for detection alone{_stripped(model, decoder)}"
         raise model.refusal(problem, remedy)

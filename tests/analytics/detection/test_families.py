@@ -192,6 +192,26 @@ def test_rt_detr_stretches_the_frame(tmp_path: Path, form: str) -> None:
     assert found.box == pytest.approx((75, 6.25, 125, 43.75), abs=1e-3)
 
 
+@pytest.mark.parametrize("classes", [2, 91])
+def test_detr_is_no_rt_detr(tmp_path: Path, classes: int) -> None:
+    """By a sigmoid, each of its queries for the background would be a thing of 0.99."""
+    logits = np.full((100, classes + 1), -2.0, np.float32)
+    logits[:, -1] = 6.0
+    boxes = np.random.default_rng(3).uniform(0.3, 0.6, (100, 4)).astype(np.float32)
+    path = constant_model(tmp_path / "detr.onnx", [logits[None], boxes[None]])
+    with pytest.raises(ModelError, match="no object"):
+        OnnxDetector(path)
+
+
+def test_a_list_that_is_sure_of_the_background_is_refused(tmp_path: Path) -> None:
+    """Whatever it is: a detector is not sure of most of its boxes where there is nothing."""
+    boxes = np.random.default_rng(3).uniform(0.3, 0.6, (100, 4)).astype(np.float32)
+    rows = np.hstack([boxes, np.full((100, 1), 0.99), np.zeros((100, 1))]).astype(np.float32)
+    path = constant_model(tmp_path / "sure.onnx", [rows[None]])
+    with pytest.raises(ModelError, match="hold nothing"):
+        OnnxDetector(path)
+
+
 def test_yolo_nas_without_nms(tmp_path: Path) -> None:
     """Corners and scores in outputs of their own; overlapping boxes of one class are suppressed."""
     boxes = np.zeros((1, CELLS, 4), np.float32)

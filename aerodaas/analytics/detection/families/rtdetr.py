@@ -32,6 +32,7 @@ __all__ = ["RtDetrDecoder", "rtdetr"]
 _AXES = 3
 _BOX, _SCORE, _CLASS, _ROW = 4, 4, 5, 6
 _MOST_QUERIES = 1000
+_SURE = 0.5
 _PIXELS = Preprocessing(stretched=True)
 
 
@@ -87,11 +88,27 @@ def rtdetr(model: ModelFile) -> RtDetrDecoder | None:
     if separate is not None:
         # One number is enough: hundreds of logits do not all lie between 0 and 1.
         logits = bool(((scores < 0) | (scores > 1)).any())
+        if logits and _has_no_object(scores):
+            raise model.refusal(
+                "gives a softmax over its classes and a last column 'no object', as DETR and YOLOS "
+                "do",
+                "such a network also wants its input normalised by ImageNet's mean and deviation; "
+                "choose an RT-DETR, or pass a ModelFamily of your own in families=",
+            )
         return RtDetrDecoder(scores.shape[1], separate, logits)
     names = model.names or COCO_NAMES
     if scores.shape[1] == _ROW - _BOX and (scores[:, 1] % 1 == 0).all():
         return RtDetrDecoder(len(names), ranked=True)
     return RtDetrDecoder(len(names)) if scores.shape[1] == len(names) else None
+
+
+def _has_no_object(logits: NDArray[np.float32]) -> bool:
+    """Whether most queries of an empty picture are surely of the last class, by a softmax.
+
+    Carion et al., "End-to-End Object Detection with Transformers", ECCV 2020, section 3.1.
+    """
+    odds = np.exp(logits - logits.max(axis=1, keepdims=True))
+    return bool(np.median(odds[:, -1] / odds.sum(axis=1)) > _SURE)
 
 
 def _may_be(model: ModelFile) -> bool:
