@@ -170,6 +170,36 @@ def test_actions_are_what_was_sent(tmp_path: Path) -> None:
     assert actions[17] == [0, 0, 0, 0]
 
 
+def test_rows_keep_to_the_clock_of_thirty_pictures_a_second(tmp_path: Path) -> None:
+    """Each picture is shown, in the row of its own time; the video's times agree with the rows'."""
+    path, count = tmp_path / "flight.mcap", 240
+    lens = CameraModel.from_fov(64, 48, 1.4)
+    pose = Odometry(np.array([1.0, 2.0, 3.0]), np.zeros(3), 0.0)
+    begin = 7_000_000
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for number in range(count):
+            # Truncated or rounded to a nanosecond, as cameras' stamps are.
+            stamp = begin + (number * 1_000_000_000 + (29 if number % 2 else 0)) // 30
+            state = VehicleState(stamp, pose, Battery(1.0), VehicleMode.GUIDED, armed=True)
+            image = np.full((48, 64, 3), number % 16 * 16, np.uint8)
+            header = Header(number, stamp, "a/cam")
+            for stream, item in (("a", state), ("a/cam", Frame(header, image, lens))):
+                recorder.write(Message(stream, number, stamp, header, stamp, (), item))
+    with Recording.open(path) as recording:
+        (folder,) = write_lerobot(recording, tmp_path, task=TASK)
+    rows = table(folder, "data/chunk-000/file-000.parquet")
+    assert len(rows) == count
+    video = folder / "videos/observation.images.cam/chunk-000/file-000.mp4"
+    with av.open(str(video)) as container:
+        shown = list(container.decode(video=0))
+    assert len(shown) == count
+    for row, picture in zip(rows, shown, strict=True):
+        # LeRobot's own tolerance between a row's time and its picture's.
+        assert picture.time == pytest.approx(row["timestamp"], abs=1e-4)
+        level = row["index"] % 16 * 16
+        assert picture.to_ndarray(format="gray").mean() == pytest.approx(level, abs=6)
+
+
 def test_a_camera_that_becomes_smaller_keeps_its_video(tmp_path: Path) -> None:
     """Its pictures are scaled; there is a frame for each row."""
     path = tmp_path / "flight.mcap"

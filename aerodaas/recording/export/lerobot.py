@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
@@ -48,6 +48,8 @@ _SAMPLES = 100
 """Pictures from which the statistics of a camera's pixels are made, at most."""
 _SAMPLE_WIDTH = 160
 """Pixels to which they are scaled before."""
+_ROUNDING = 1000
+"""Nanoseconds by which the stamp of what belongs to a row may be rounded up."""
 
 _Floats = NDArray[np.float32]
 _Stamps = NDArray[np.int64]
@@ -56,10 +58,11 @@ _Stamps = NDArray[np.int64]
 def write_lerobot(recording: Recording, folder: Path, *, task: str) -> list[Path]:
     """Write a LeRobot dataset of one episode for each robot with a camera.
 
-    Rows come at the cameras' rate (the median of the fastest one's, in whole frames per second):
-    each has the newest picture of each camera and the newest state up to then, and the velocity
-    setpoint in force: as sent, after all limits, zero where none was sent for a second. Where a
-    place was sent instead, it is the velocity straight there, at the speed asked for or else flown.
+    Rows come at the cameras' rate (the median of the fastest one's, in whole frames per second).
+    A picture belongs to the row whose time is nearest to its own. Each row has the newest picture
+    of each camera, the newest state up to then, and the velocity setpoint in force: as sent, after
+    all limits, zero where none was sent for a second. Where a place was sent instead, it is the
+    velocity straight there, at the speed asked for or else flown.
 
     Args:
         recording: An open recording.
@@ -128,7 +131,7 @@ class _Camera:
         if image.shape[0] < height or image.shape[1] < width:
             # A camera that has become smaller; a video has one size.
             image = np.asarray(cv2.resize(image, (width, height)), np.uint8)
-        self.video.add(image, self.start + self.frames * NANOSECONDS // self.fps)
+        self.video.add(image, self.start + _times(self.frames, self.fps))
         if self.frames % -(-self.rows // _SAMPLES) == 0:
             small = (_SAMPLE_WIDTH, max(1, round(height * _SAMPLE_WIDTH / width)))
             pixels = cv2.resize(image, small, interpolation=cv2.INTER_AREA)
@@ -195,6 +198,19 @@ class _Episode:
         return found
 
 
+_Count = TypeVar("_Count", int, NDArray[np.int64])
+
+
+def _times(rows: _Count, fps: int) -> _Count:
+    """Nanoseconds from the first row to each of `rows`, rounded to the nearest."""
+    return (rows * NANOSECONDS + fps // 2) // fps
+
+
+def _row(nanoseconds: int, fps: int) -> int:
+    """The row whose time is nearest to `nanoseconds` from the first."""
+    return (nanoseconds * fps + NANOSECONDS // 2) // NANOSECONDS
+
+
 def _feature(dtype: str, names: Sequence[str] = ()) -> dict[str, Any]:
     return {"dtype": dtype, "shape": [len(names) or 1], "names": list(names) or None}
 
@@ -230,13 +246,13 @@ def _episode(recording: Recording, robot: str, cameras: dict[str, list[int]]) ->
     fps = min(max(round(NANOSECONDS / gap), 1), _FASTEST)
     begin = max(int(times[0]), *(stamps[0] for stamps in cameras.values()))
     end = min(int(times[-1]), *(stamps[-1] for stamps in cameras.values()))
-    count = (end - begin) * fps // NANOSECONDS + 1
+    count = _row(end - begin, fps) + 1
     if count <= 1:
         return None
     if count > _MOST_FRAMES:
         raise RecordingError(f"{robot} has {count} frames, more than {_MOST_FRAMES}")
-    stamps = begin + np.arange(count, dtype=np.int64) * NANOSECONDS // fps
-    newest = times[np.searchsorted(times, stamps, side="right") - 1]
+    stamps = begin + _times(np.arange(count, dtype=np.int64), fps)
+    newest = times[np.searchsorted(times, stamps + _ROUNDING, side="right") - 1]
     rows = np.array([states[int(at)] for at in newest], np.float32)
     return _Episode(fps, stamps, rows, _actions(recording, robot, stamps, rows))
 
@@ -251,7 +267,7 @@ def _actions(recording: Recording, robot: str, stamps: _Stamps, states: _Floats)
     times = np.array(sorted(sent), np.int64)
     if not len(times):
         return actions
-    for row, place in enumerate(np.searchsorted(times, stamps, side="right") - 1):
+    for row, place in enumerate(np.searchsorted(times, stamps + _ROUNDING, side="right") - 1):
         if place >= 0 and stamps[row] - times[place] < _STALE:
             setpoint = sent[int(times[place])]
             actions[row] = np.nan_to_num(_action(setpoint, states[row, :3], states[row, 3:6]))
@@ -295,8 +311,8 @@ def _filmed(
                 made[source] = _Camera(
                     key, VideoFile(file, frame), frame.image, frame.header.stamp, episode.fps, rows
                 )
-            first = int(np.searchsorted(episode.stamps, frame.header.stamp))
-            made[source].fill(first)
+            first = _row(frame.header.stamp - int(episode.stamps[0]), episode.fps)
+            made[source].fill(min(first, rows))
             made[source].last = frame.image
         if len(made) < len(cameras):
             raise RecordingError(f"{recording.path}: no picture of a camera can be decoded")

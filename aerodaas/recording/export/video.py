@@ -102,7 +102,7 @@ class VideoFile:
         A gap of hours, as a false time makes, is shortened to a second.
         """
         width, height = self.size
-        ticks = (stamp - self._start) * _TICKS // NANOSECONDS
+        ticks = ((stamp - self._start) * _TICKS + NANOSECONDS // 2) // NANOSECONDS
         if ticks <= self._last or image.shape[0] < height or image.shape[1] < width:
             return
         if ticks - self._last > _LONGEST_GAP:
