@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Literal
 
 import cv2
+import numpy as np
 import pytest
 from pycocotools.coco import COCO
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
@@ -15,7 +17,11 @@ from aerodaas.recording.export.coco import write_coco
 from aerodaas.recording.pictures import detections, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Detection, Detections, Frame, Header
 from aerodaas.types.errors import RecordingError
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.status import Message
 
 
 @pytest.mark.parametrize("images", ["jpeg", "h264"])
@@ -61,6 +67,33 @@ def test_pictures_are_as_far_apart_as_asked(tmp_path: Path) -> None:
     images = list((folder / "images").iterdir())
     assert 5 < len(images) < len(kept) / 5
     assert {image.read_bytes() for image in images} <= kept
+
+
+def test_odd_boxes_and_frame_numbers_cost_no_others(tmp_path: Path) -> None:
+    """Boxes without a pixel and scores that are no number are left out; numbers may begin anew."""
+    path, lens = tmp_path / "flight.mcap", CameraModel.from_fov(64, 48, 1.4)
+    good = Detection((5.0, 5.0, 200.0, 25.0), "car", 0.9)
+    odd = (
+        Detection((-20.0, 5.0, -4.0, 25.0), "car", 0.8),
+        Detection((30.0, 5.0, 10.0, 25.0), "car", 0.7),
+        Detection((5.0, 5.0, 20.0, 25.0), "car", math.nan),
+        Detection((math.nan, 5.0, 20.0, 25.0), "car", 0.6),
+    )
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for number, identity in enumerate((0, 1, 0, 1)):
+            header = Header(identity, number * NANOSECONDS, "a/cam")
+            image = np.full((48, 64, 3), 90, np.uint8)
+            found = Detections(header, (good, *odd), 64, 48)
+            for stream, item in (("a/cam", Frame(header, image, lens)), ("found", found)):
+                at = header.stamp
+                recorder.write(Message(stream, number, at, header, at, (), item))
+    with Recording.open(path) as recording:
+        folder = write_coco(recording, tmp_path, interval=0.0)
+    dataset = COCO(folder / "annotations.json")
+    assert len({image["file_name"] for image in dataset.loadImgs(dataset.getImgIds())}) == 4
+    assert len(list((folder / "images").iterdir())) == 4
+    boxes = [annotation["bbox"] for annotation in dataset.loadAnns(dataset.getAnnIds())]
+    assert boxes == [[5.0, 5.0, 59.0, 20.0]] * 4
 
 
 def test_a_recording_without_pictures_is_told(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
-from pydantic import ConfigDict, Field, TypeAdapter, with_config
+from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, with_config
 from typing_extensions import NotRequired, TypedDict
 
 from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
@@ -213,6 +213,18 @@ class _Detection(TypedDict):
     depth: NotRequired[Gap]
 
 
+def _without_gaps(items: object) -> object:
+    """Detections whose score and box are numbers: one that is not finite costs no other."""
+    if not isinstance(items, list):
+        return items
+    return [item for item in items if not (isinstance(item, dict) and _has_gap(item))]
+
+
+def _has_gap(item: dict[str, Any]) -> bool:
+    box = item.get("box")
+    return item.get("score", 0.0) is None or (isinstance(box, list) and None in box)
+
+
 @with_config(_OPEN)
 class _Detections(TypedDict):
     id: Count
@@ -220,7 +232,7 @@ class _Detections(TypedDict):
     source: Word
     width: Pixels
     height: Pixels
-    items: list[_Detection]
+    items: Annotated[list[_Detection], BeforeValidator(_without_gaps)]
 
 
 @with_config(_OPEN)

@@ -7,7 +7,9 @@ top, width and height in pixels of the picture.
 from __future__ import annotations
 
 import json
+import logging
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,7 @@ from aerodaas.types.errors import RecordingError
 
 __all__ = ["write_coco"]
 
+_log = logging.getLogger(__name__)
 _SEEN = 2
 """COCO's flag of a keypoint that is seen; 0 is one that is not labelled."""
 
@@ -53,6 +56,8 @@ def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> 
         raise RecordingError(f"{recording.path} has {len(labels)} labels, more than {MAX_KEYS}")
     points = _points(found)
     numbers = {label: number for number, label in enumerate(labels, 1)}
+    names: Counter[str] = Counter()
+    left_out = 0
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     try:
@@ -63,7 +68,11 @@ def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> 
             width, height = picture.width, picture.height
             suffix = "jpg" if picture.format == "jpeg" else picture.format
             source, stamp = shot.header.source, shot.header.stamp
-            name = f"{file_name(source) or 'camera'}-{shot.header.id:06}.{suffix}"
+            stem = f"{file_name(source) or 'camera'}-{shot.header.id:06}"
+            # A camera that was started anew counts its frames anew.
+            again = names[stem]
+            names[stem] += 1
+            name = f"{stem}{f'-{again + 1}' if again else ''}.{suffix}"
             target = new_file(path / "images" / name)
             target.write_bytes(picture.data)
             images.append(
@@ -78,10 +87,15 @@ def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> 
             )
             for item in found.get((source, stamp), ()):
                 annotation = _annotation(item, width, height, points.get(item.label, 0))
+                if annotation is None:
+                    left_out += 1
+                    continue
                 annotation["id"] = len(annotations) + 1
                 annotation["image_id"] = len(images)
                 annotation["category_id"] = numbers[item.label]
                 annotations.append(annotation)
+        if left_out:
+            _log.warning("%s: left out %d boxes outside their pictures", path, left_out)
         if not images:
             raise RecordingError(f"{recording.path} holds no pictures; were they switched off?")
         content = {
@@ -124,10 +138,13 @@ def _category(label: str, number: int, points: dict[str, int]) -> dict[str, Any]
     return category
 
 
-def _annotation(item: Detection, width: int, height: int, points: int) -> dict[str, Any]:
+def _annotation(item: Detection, width: int, height: int, points: int) -> dict[str, Any] | None:
+    """COCO's annotation of a detection; None where no pixel of the picture lies in its box."""
     left, right = (min(max(edge, 0.0), width) for edge in item.box[::2])
     top, bottom = (min(max(edge, 0.0), height) for edge in item.box[1::2])
-    across, down = max(right - left, 0.0), max(bottom - top, 0.0)
+    across, down = right - left, bottom - top
+    if across <= 0.0 or down <= 0.0:
+        return None
     annotation: dict[str, Any] = {
         "bbox": [left, top, across, down],
         "area": across * down,
