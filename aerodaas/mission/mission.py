@@ -597,10 +597,12 @@ class Mission:
         position = state.odometry.position
         way = (above := self._route.above_home(position)) - position
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
+        stuck = self._supervisor.motion.stands_for > self._options.stall_timeout
         drift = math.hypot(*state.odometry.velocity[:2])
         arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
-        if late or (arrived and drift <= _DRIFT):
+        if late or stuck or (arrived and drift <= _DRIFT):
             why = "the return took too long; " if late else ""
+            why = "the drone comes no nearer to home; " if stuck else why
             self._to(MissionState.LANDING, f"{why}{self._machine.reason}")
             return Land()
         place = self._route.towards(above, position)

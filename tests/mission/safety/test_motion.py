@@ -20,7 +20,7 @@ from aerodaas.config.model import (
 )
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.mission.actions import Fly
-from aerodaas.mission.commands import Start
+from aerodaas.mission.commands import ReturnHome, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
@@ -148,6 +148,20 @@ def test_a_drone_that_is_carried_off_on_its_way_home_lands_within_its_fence() ->
     assert S.RETURNING in away.states
     assert "wind" in away.status.reason
     assert away.vehicle.position[0] < 40.0
+
+
+def test_a_drone_that_makes_no_way_home_lands() -> None:
+    """Wind that it just holds, or whatever blocks its way: it does not hover till it is empty."""
+    options = MissionConfig(stall_timeout=20.0)
+    away = flight(add(Waypoint("far", 35, 0, 3)), limits=_FENCED, options=options)
+    away.run(until=lambda: away.vehicle.position[0] > 20.0)
+    away.tell(ReturnHome("asked to"))
+    began = away.seconds
+    while not away.mission.finished and away.seconds < began + 60.0:
+        away.vehicle.position[0], away.vehicle.velocity[:2] = 20.0, 0.0
+        away.turn()
+    away.expect(S.LANDED)
+    assert "comes no nearer to home" in away.status.reason
 
 
 def test_a_drone_outside_its_fence_comes_back_or_ends_its_flight() -> None:
