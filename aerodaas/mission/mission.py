@@ -463,7 +463,9 @@ class Mission:
         if self._paused:
             self._to(MissionState.PAUSED)
             return self._stay(state)
-        if self._assessment.demand is FailsafeAction.HOLD:
+        # An autopilot that flies the plan by itself flies on through a short loss of the link.
+        unheard = self.handover.flies and self._assessment.gravest.kind == "link_lost"
+        if self._assessment.demand is FailsafeAction.HOLD and not unheard:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
         if not self.handover.active:

@@ -141,7 +141,10 @@ class Route:
 
     def _place(self, item: Any) -> Vector:  # noqa: ANN401
         place = self._flight.origin.to_local(item.x / _EARTH, item.y / _EARTH, 0.0)
-        place[2] = item.z + self._flight.enu(self._home())[2]
+        if item.frame == mavlink.MAV_FRAME_GLOBAL:
+            place[2] = self._flight.believed.position[2] + self._flight.rise_to(item.z)
+        else:
+            place[2] = item.z + self._flight.enu(self._home())[2]
         return place
 
 

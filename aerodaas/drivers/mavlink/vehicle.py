@@ -152,7 +152,8 @@ class MavlinkVehicle:
             target = (found.system, found.component)
             link.adopt(target, found.peer, time.monotonic())
             with self._lock:
-                commander = Commander(link.send, target, self._settings.sender)
+                telemetry = self._telemetry
+                commander = Commander(link.send, target, self._settings.sender, telemetry.in_touch)
                 self._rates = RateKeeper(found.autopilot, commander, self._report.rates)
                 self._departure = Departure(
                     commander,
@@ -163,6 +164,7 @@ class MavlinkVehicle:
                     flies=lambda: self._touchdown.flew,
                     words=self._reasons,
                     land=lambda: self._change(FlightMode.LAND),
+                    short=found.autopilot.stops_short,
                 )
                 self._report.autopilot, self._report.departure = found.autopilot, self._departure
                 self._modes = ModeChange(
@@ -235,13 +237,18 @@ class MavlinkVehicle:
         with self._lock:
             if departure.climbs:
                 departure.call_off(time.monotonic())
-            elif phase.ours:
-                self._change(FlightMode.LAND)
-            elif not departure.withdrawing:
+            elif not (phase.ours or departure.withdrawing):
                 return
         deadline = time.monotonic() + _PARTING
         while time.monotonic() < deadline:
-            if phase.shown is FlightMode.LAND or not (departure.withdrawing or phase.armed):
+            with self._lock:
+                if phase.ours and not departure.withdrawing:
+                    self._change(FlightMode.LAND)
+            if (
+                phase.taken is not None
+                or phase.shown is FlightMode.LAND
+                or not (departure.withdrawing or phase.armed)
+            ):
                 return
             self._pause()
 
@@ -297,7 +304,10 @@ class MavlinkVehicle:
                 return ["not connected"]
             now = time.monotonic()
             if self._report.lost(now):
-                return [f"no word from the vehicle for {self._telemetry.silence(now):.0f} s"]
+                silent = self._telemetry.silence(now)
+                if silent < 1.0:
+                    return ["no HEARTBEAT from the vehicle since its link is back"]
+                return [f"no word from the vehicle for {silent:.0f} s"]
             reasons = []
             if self._phase.armed:
                 reasons.append(f"already {self._report.mode.value.replace('_', ' ')}")
@@ -527,7 +537,13 @@ class MavlinkVehicle:
         was_armed = phase.armed
         # Only ArduPilot's fence acts without a critical state.
         critical = telemetry.critical or (bool(telemetry.breach) and shown in PROTECTIVE)
-        phase.observe(shown, now, armed=telemetry.armed, critical=critical)
+        phase.observe(
+            shown,
+            now,
+            armed=telemetry.armed,
+            critical=critical,
+            climbed=self._departure is not None and self._departure.climbed,
+        )
         self._touchdown.observe(shown, now, armed=telemetry.armed)
         if telemetry.armed and not was_armed:
             self._report.restarted = ""
@@ -568,12 +584,15 @@ class MavlinkVehicle:
     def _climb_on(self, connection: Connection, now: float) -> None:
         """Complete a take-off by setpoints, where the autopilot stops short."""
         goal, frame = connection.departure.goal, connection.alignment.frame
-        able = connection.autopilot.stops_short and self._watchdog.healthy(now)
+        able = connection.autopilot.stops_short > 0.0 and self._watchdog.healthy(now)
         if goal is None or frame is None or not able:
             return
         odometry = partial(self._report.odometry, frame, known=True)
-        climb, flew = self._steering.climb_rate, self._touchdown.flew
-        if setpoint := self._completion.setpoint(goal, frame, odometry, climb, flew=flew):
+        climb, near = (
+            self._steering.climb_rate,
+            self._touchdown.flew and connection.departure.climbed,
+        )
+        if setpoint := self._completion.setpoint(goal, frame, odometry, climb, near=near):
             self._steer(setpoint, connection, now)
 
     def _mind_the_loop(self, now: float) -> None:
@@ -581,7 +600,8 @@ class MavlinkVehicle:
 
         An autopilot may follow its last target for ever, and heartbeats alone do not stop it.
         """
-        step = None if self._connection is None else self._watchdog.step(now, self._phase)
+        able = self._connection is not None and self._telemetry.in_touch(now)
+        step = self._watchdog.step(now, self._phase) if able else None
         if step is not None:
             self._words.append(f"the control loop is silent: {step.value}")
             self._change(step)

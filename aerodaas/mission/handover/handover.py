@@ -179,7 +179,8 @@ class Handover:
             some = f"{count} waypoint{'s' if count > 1 else ''}"
             self.log.alert(now, _KIND, f"handed over to the autopilot: {some}")
         elif self.flies and (
-            phase is not MissionModePhase.FLYING or state.mode is not VehicleMode.MISSION
+            phase is not MissionModePhase.FLYING
+            or state.mode not in {VehicleMode.MISSION, VehicleMode.LOST}
         ):
             self.take_back("it has left its mission mode", now)
 

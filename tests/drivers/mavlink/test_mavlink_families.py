@@ -110,7 +110,7 @@ def test_px4_rises_to_an_altitude_above_the_sea(altitude: float | None, goal: fl
     assert (second, third) == (0.0, 0.0)
     assert x == y == ANYWHERE == 2**31 - 1
     assert z == goal
-    assert climb.mode is None
+    assert climb.mode is FlightMode.TAKE_OFF
 
 
 def test_ardupilot_rises_to_a_height_above_home() -> None:
@@ -243,5 +243,5 @@ def test_families_are_known_by_their_heartbeats() -> None:
     assert ArduPilot.rates[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT] == 2.0
     assert {PX4.rates[32], PX4.rates[30], ArduPilot.rates[32]} == {20.0}
     assert SimpleNamespace(px4=PX4.stops_short, ardupilot=ArduPilot.stops_short) == (
-        SimpleNamespace(px4=True, ardupilot=False)
+        SimpleNamespace(px4=1.2, ardupilot=0.0)
     )

@@ -161,7 +161,10 @@ def test_the_autopilot_flies_them_all(monkeypatch: pytest.MonkeyPatch, family: s
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_what_is_uploaded(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
-    """Places, heights, speeds where they change, stays; at the end a stay and the way home."""
+    """Places, heights above the sea (the ground lies 488 m up), stays, speeds where they change.
+
+    At the end come a stay and the way home.
+    """
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
         plan = flight.ends.autopilot.firmware.plans.plans[mavlink.MAV_MISSION_TYPE_MISSION]
@@ -177,7 +180,9 @@ def test_what_is_uploaded(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
         assert [item.param2 for item in plan if item.command == speed] == [3.0, 1.0, 3.0]
         places = [item for item in plan if item.command == waypoint]
         assert [item.param1 for item in places] == [0.0, 2.0, 0.0, 0.0]
-        assert {item.z for item in places} == {3.0}
+        assert {(item.frame, round(item.z, 1)) for item in places} == {
+            (mavlink.MAV_FRAME_GLOBAL, 491.0)
+        }
         origin = flight.ends.vehicle.connection.alignment.origin
         east, north, _ = origin.to_local(places[1].x / 1e7, places[1].y / 1e7, 0.0)
         assert (east, north) == pytest.approx((15.0, 15.0), abs=0.05)
@@ -281,15 +286,77 @@ def test_a_low_battery_takes_them_back(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_lost_link_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
-    """Once the vehicle is heard again, it follows setpoints; nothing is flown twice or left out."""
+    """After `link_timeout`; once the vehicle is heard again, it follows setpoints home."""
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
         flight.ends.autopilot.cut()
-        flight.until(lambda: flight.mission.state is S.HOLDING, 5.0)
+        flight.until(lambda: flight.mission.state is S.RETURNING, 5.0)
         assert "no word from the vehicle" in flight.told[-1]
         flight.ends.autopilot.cut(off=False)
         flight.until(lambda: flight.mode is VehicleMode.GUIDED, 10.0)
+        flight.until(lambda: flight.mission.state is S.LANDED, 60.0)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_short_loss_of_the_link_leaves_them_handed_over(
+    monkeypatch: pytest.MonkeyPatch, family: str
+) -> None:
+    """Shorter than `link_timeout`, the autopilot flies on, and so does the mission afterwards."""
+    with handed(monkeypatch, family, limits={"link_timeout": 5.0}) as flight:
+        flight.hand_over()
+        flight.ends.autopilot.cut()
+        cut = flight.ends.now
+        flight.until(lambda: flight.ends.now > cut + 4.0)
+        assert flight.mode is VehicleMode.LOST
+        assert flight.mission.handover.flies, flight.story
+        flight.ends.autopilot.cut(off=False)
+        flight.until(lambda: flight.mode is VehicleMode.MISSION, 3.0)
         flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        assert flight.visited == ["a", "b", "c", "d"]
+        assert flight.told[1:] == ["the hand-over has ended: all waypoints are flown"]
+
+
+def test_a_stall_of_the_whole_process_leaves_them_handed_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Neither thread has turned: the loop does not hang, and nobody left the mission mode."""
+    with handed(monkeypatch) as flight:
+        flight.hand_over()
+        for _ in range(200):
+            flight.ends.now += 0.01
+            flight.ends.autopilot.turn(flight.ends.now)
+        flight.until(lambda: flight.mode is VehicleMode.MISSION, 3.0)
+        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        assert flight.told[1:] == ["the hand-over has ended: all waypoints are flown"]
+
+
+def test_a_loop_that_hangs_is_told_as_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The link's thread has told the vehicle to hold meanwhile."""
+    with handed(monkeypatch) as flight:
+        flight.hand_over()
+        flight.ends.advance(2.0)
+        flight.until(lambda: not flight.mission.handover.flies, 3.0)
+        assert "the control loop hung" in flight.told[-1]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("moved", [(0.0, 0.0, 8.0), (4.0, 0.0, 0.0), (0.0, -25.0, 0.0)])
+def test_a_home_that_is_moved_is_told_and_moves_nothing(
+    monkeypatch: pytest.MonkeyPatch, family: str, moved: tuple[float, float, float]
+) -> None:
+    """Within two seconds it is told and taken back; the drone stays at its height."""
+    with handed(monkeypatch, family) as flight:
+        flight.hand_over()
+        flight.ends.autopilot.firmware.home = flight.ends.autopilot.firmware.home + moved
+        began = flight.ends.now
+        while flight.ends.now < began + 2.0:
+            flight.turn()
+            assert flight.ends.autopilot.truth.position[2] == pytest.approx(3.0, abs=0.5)
+        off = f"{np.linalg.norm(moved):.0f} m from where it took off"
+        assert flight.told[-1] == f"the hand-over has ended: its home has moved, {off}"
+        alerts = [alert.text for alert in flight.mission.alerts]
+        assert alerts.count(f"home: its own return leads {off}") == 1
+        flight.until(lambda: flight.mission.state is S.LANDED, 120.0)
         assert flight.visited == ["a", "b", "c", "d"]
 
 

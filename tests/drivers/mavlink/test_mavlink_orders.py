@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.control import watchdog
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.commander import (
@@ -192,18 +193,36 @@ def test_orders_of_different_numbers_go_side_by_side() -> None:
 
 
 def test_a_replaced_order_is_told_so_and_only_of_its_own_number() -> None:
-    """Neither done nor refused, in a few words; to withdraw what is not there does nothing."""
-    ear = Ear()
-    ear.give(ARM, 0.0)
-    ear.commander.withdraw(CLIMB.number)
+    """Neither done nor refused, in a few words; only what steers is withdrawn."""
+    ear, check = Ear(), ArduPilot.check()
+    ear.give(check, 0.0)
+    ear.commander.withdraw_steering()
     ear.give(CLIMB, 0.1)
     assert ear.told == []
     ear.commander.give(CLIMB, now=0.2)
     replaced = CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
     assert ear.told == [replaced]
-    ear.commander.withdraw(CLIMB.number)
+    ear.commander.withdraw_steering()
     assert ear.commander.under_way(CLIMB.number) is None
-    assert ear.commander.under_way(ARM.number) is ARM
+    assert ear.commander.under_way(check.number) is check
+
+
+def test_what_steers_waits_until_the_vehicle_is_heard() -> None:
+    """Nothing is given up meanwhile; other orders do not wait."""
+    heard = [False]
+    sent: list[Any] = []
+    commander = Commander(sent.append, (7, 1), OURS, lambda _: heard[0])
+    outcomes: list[CommandResult] = []
+    for order in (ARM, CLIMB, ArduPilot.check()):
+        commander.give(order, outcomes.append, now=0.0)
+    for second in range(1, 20):
+        commander.turn(float(second))
+    assert {one.command for one in sent} == {mavlink.MAV_CMD_RUN_PREARM_CHECKS}
+    assert len(outcomes) == 1, "of the check, which is given up"
+    heard[0] = True
+    commander.turn(20.0)
+    assert [one.command for one in sent[-2:]] == [ARM.number, CLIMB.number]
+    assert len(outcomes) == 1
 
 
 SHOWN = [
@@ -242,14 +261,14 @@ def test_without_a_wish_the_vehicle_is_believed(shown: FlightMode, mode: Vehicle
     ("wish", "follows"),
     [
         (FlightMode.GUIDED, {FlightMode.GUIDED}),
-        (FlightMode.TAKE_OFF, {FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED}),
+        (FlightMode.TAKE_OFF, {FlightMode.TAKE_OFF, FlightMode.GUIDED}),
         (FlightMode.HOLD, {FlightMode.HOLD}),
-        (FlightMode.RETURN, {FlightMode.RETURN, FlightMode.LAND}),
+        (FlightMode.RETURN, {FlightMode.RETURN}),
         (FlightMode.LAND, {FlightMode.LAND}),
     ],
 )
 def test_what_belongs_to_a_wish(wish: FlightMode, follows: set[FlightMode]) -> None:
-    """A return ends in a landing, a take-off in holding; all else that was seen is another's."""
+    """ArduPilot takes off in guided mode; all else that was seen is another's."""
     for shown in FlightMode:
         phase = seen_in(wish, FlightMode.OTHER, wish, shown)
         assert (phase.taken is None) is (shown in follows), shown
@@ -307,8 +326,8 @@ def test_a_wish_is_not_seen_before_it_shows() -> None:
 
 
 def test_all_that_belongs_to_the_wish_before_may_show_for_a_moment() -> None:
-    """A return that is called off may already have begun to land; and what is said beforehand."""
-    for shown in (FlightMode.RETURN, FlightMode.LAND, FlightMode.TAKE_OFF):
+    """The mode of before, and what is said beforehand."""
+    for shown in (FlightMode.RETURN, FlightMode.TAKE_OFF):
         phase = seen_in(FlightMode.RETURN, FlightMode.GUIDED, FlightMode.RETURN)
         phase.ask(FlightMode.HOLD, 20.0, meanwhile=frozenset({FlightMode.TAKE_OFF}))
         phase.observe(shown, 21.0, armed=True, critical=False)

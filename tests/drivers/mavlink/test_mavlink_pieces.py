@@ -252,13 +252,15 @@ MODES = list(FlightMode)
     )
 )
 def test_who_has_taken_over_keeps_it(steps: list[tuple[Any, Any, bool, float]]) -> None:
-    """Once taken, a vehicle is ours again only after it has been disarmed."""
+    """Once taken, a vehicle is ours again only after it has been disarmed, or let rest there."""
     phase, now, taken = FlightPhase(), 0.0, False
     for wish, shown, armed, wait in steps:
         now += wait
         if wish is not None and not taken:
             phase.ask(wish, now)
         phase.observe(shown, now, armed=armed, critical=False)
+        if phase.taken is not None and not armed:
+            phase.rest()
         taken = armed and (taken or phase.taken is not None)
         assert (phase.taken is not None) == taken
         if taken:

@@ -42,7 +42,7 @@ class Told:
 
     def hear(self, now: float, *, place: bool = True, ticks: bool = True) -> None:
         """It speaks."""
-        self.telemetry.heard_at = now
+        self.telemetry.heard_at = self.telemetry.beat_at = now
         if ticks:
             self.telemetry.ticked_at = now
         if place:
@@ -104,6 +104,30 @@ def test_a_position_is_told_only_where_it_is_known() -> None:
     assert np.isnan(told.state(100.0).odometry.position).all()
     told.report.alignment = None
     assert np.isnan(told.state(100.0).odometry.position).all()
+
+
+def test_a_silence_takes_no_position_away() -> None:
+    """The last place was told a moment before the last word: it stays until the link is lost."""
+    told = Told()
+    told.telemetry.position_at = told.telemetry.attitude_at = 99.9
+    for hundredth in range(300):
+        state = told.state(100.0 + hundredth / 100)
+        assert np.isfinite(state.odometry.position).all(), hundredth
+    assert told.state(103.0).mode is VehicleMode.LOST
+
+
+@pytest.mark.parametrize("beat", [None, 94.9])
+def test_words_without_a_heartbeat_tell_no_mode(beat: float | None) -> None:
+    """None since the link is back, or none for five seconds: its mode is not known."""
+    told = Told()
+    told.hear(100.1)
+    assert told.state(100.1).mode is VehicleMode.GUIDED
+    if beat is None:
+        told.telemetry.back_at = told.telemetry.beat_at + 0.05
+    else:
+        told.telemetry.beat_at = beat
+    assert told.state(100.1).mode is VehicleMode.LOST
+    assert not told.telemetry.in_touch(100.1)
 
 
 def test_standing_motors_need_no_stamps_that_move() -> None:

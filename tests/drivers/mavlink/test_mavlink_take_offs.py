@@ -46,6 +46,7 @@ class TakeOff:
             flies=lambda: self.flies,
             words=lambda: ["compass: missing", "GPS: no fix"],
             land=self._land,
+            short=PX4.stops_short,
         )
         self.departure.begin(PX4().take_off(height, self.telemetry), height, self.now)
 
@@ -66,7 +67,8 @@ class TakeOff:
         """A HEARTBEAT comes."""
         was_armed = self.phase.armed
         self.telemetry.heard_at = self.now
-        self.phase.observe(shown, self.now, armed=armed, critical=False)
+        climbed = self.departure.climbed
+        self.phase.observe(shown, self.now, armed=armed, critical=False, climbed=climbed)
         self.departure.observe(self.now, was_armed=was_armed)
 
     def turn(self, seconds: float = 0.0, up: float | None = None, rise: float = 0.0) -> None:
@@ -87,14 +89,14 @@ class TakeOff:
 
 
 def test_each_order_waits_for_the_one_before() -> None:
-    """The mode, the motors, the climb; it is shown as a take-off from the last of them on."""
+    """The mode, the motors, the climb; each mode is expected from its order on."""
     flight = TakeOff()
     assert flight.departure.climbs
     assert flight.orders == [MODE]
-    assert (flight.departure.goal, flight.phase.wish) == (None, None)
+    assert (flight.departure.goal, flight.phase.wish) == (None, FlightMode.HOLD)
     flight.answer(MODE)
     assert flight.orders == [MODE, ARM]
-    assert (flight.departure.goal, flight.phase.wish) == (None, None)
+    assert (flight.departure.goal, flight.phase.wish) == (None, FlightMode.HOLD)
     flight.answer(ARM)
     assert flight.orders == [MODE, ARM, RISE]
     assert flight.departure.goal == 7.0, "3 m above the 4 m at which it stands"
@@ -326,7 +328,36 @@ def test_a_new_take_off_forgets_what_was_asked_before() -> None:
     flight = TakeOff()
     flight.phase.ask(FlightMode.LAND, flight.now)
     flight.departure.begin(PX4().take_off(2.0, flight.telemetry), 2.0, flight.now)
-    assert flight.phase.wish is None
+    assert flight.phase.wish is FlightMode.HOLD
+
+
+def test_a_mode_that_somebody_chooses_on_the_ground_ends_the_take_off() -> None:
+    """No order follows, and the next take-off is told why."""
+    flight = TakeOff()
+    flight.answer(MODE)
+    flight.beat(FlightMode.HOLD, armed=False)
+    flight.turn(3.0)
+    before = len(flight.sent)
+    flight.beat(FlightMode.OTHER, armed=False)
+    assert flight.departure.refusal == "its mode is 'other' now, not by us"
+    assert not flight.departure.climbs
+    assert not flight.departure.withdrawing
+    flight.turn(5.0)
+    assert len(flight.sent) == before
+    assert flight.phase.taken is None, "who takes off later is not refused for it"
+
+
+def test_a_hold_well_below_the_height_is_a_pilots() -> None:
+    """PX4 holds by itself at most 1.2 m below it."""
+    for up, taken in ((1.7, True), (1.9, False)):
+        flight = TakeOff()
+        flight.climb()
+        flight.turn(1.0, 1.0, 1.0)
+        flight.beat(FlightMode.TAKE_OFF, armed=True)
+        flight.turn(3.0, up)
+        flight.beat(FlightMode.HOLD, armed=True)
+        assert (flight.phase.taken is not None) is taken
+        assert flight.departure.climbs is not taken
 
 
 class TakenBack:

@@ -111,7 +111,7 @@ def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
     assert told(states[-1], "autopilot: it started anew in flight")
     lying = world.autopilot.truth.position
     # A moment ago it was up there; that is told with its age until it speaks again.
-    for state in states[32:]:
+    for state in states[42:]:
         position = state.odometry.position
         assert not np.isfinite(position).all() or np.allclose(position, lying, atol=1.0)
     assert states[-1].odometry.position == pytest.approx(lying, abs=1.0)

@@ -81,7 +81,7 @@ class ArduPilot(Autopilot):
     name: ClassVar[str] = "ArduPilot"
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     stream_before: ClassVar[float] = 0.0
-    stops_short: ClassVar[bool] = False
+    stops_short: ClassVar[float] = 0.0
     alone: ClassVar[str] = (
         "ArduPilot stops within 3 s and hovers until a pilot lands it; it comes home only with "
         'a "fallback" (docs/mavlink.md)'
@@ -137,6 +137,7 @@ class ArduPilot(Autopilot):
             (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height),
             "take off",
             mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+            FlightMode.TAKE_OFF,
         )
         return self.ask_mode(FlightMode.GUIDED), self.arm(), climb
 

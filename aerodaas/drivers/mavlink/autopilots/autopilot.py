@@ -93,8 +93,9 @@ class Autopilot(ABC):
     """MAV_AUTOPILOT of its HEARTBEAT."""
     stream_before: ClassVar[float]
     """Seconds of setpoints before guided flight may be commanded."""
-    stops_short: ClassVar[bool]
-    """Whether it holds before it has reached the height of a take-off."""
+    stops_short: ClassVar[float]
+    """Metres below the height of a take-off from which on it may end that and hold; 0: it never
+    holds."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
     alone: ClassVar[str]
     """Its behaviour once our process is gone, with the parameters that it is delivered with."""

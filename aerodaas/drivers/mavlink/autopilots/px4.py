@@ -72,7 +72,7 @@ class PX4(Autopilot):
     name: ClassVar[str] = "PX4"
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     stream_before: ClassVar[float] = 1.2
-    stops_short: ClassVar[bool] = True
+    stops_short: ClassVar[float] = 1.2
     home_comes_first: ClassVar[bool] = False
     turns_at_waypoints: ClassVar[bool] = True
     rates: ClassVar[dict[int, float]] = {
@@ -123,6 +123,7 @@ class PX4(Autopilot):
             (NOT_GIVEN, 0.0, 0.0, NOT_GIVEN, ANYWHERE, ANYWHERE, altitude),
             "take off",
             mavlink.MAV_FRAME_GLOBAL,
+            FlightMode.TAKE_OFF,
         )
         return self.ask_mode(FlightMode.HOLD), self.arm(), climb
 

@@ -13,6 +13,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     CommandResult,
     PendingCommand,
 )
+from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 __all__ = ["Climb"]
@@ -45,14 +46,14 @@ class Climb:
         height: float,
         armed: Callable[[], bool],
         shows: Callable[[PendingCommand], bool],
-        climbs: Callable[[float], None],
+        asks: Callable[[FlightMode, float], None],
         failed: Callable[[str], None],
         now: float,
     ) -> None:
         """Climb `height` metres to `goal`, metres up.
 
-        `shows` returns whether the vehicle's state shows that an order was executed; `climbs` is
-        called before the last order.
+        `shows` returns whether the vehicle's state shows that an order was executed; `asks` is
+        called with each mode before its order is sent.
         """
         self.goal = goal
         self.may_start = False
@@ -62,7 +63,7 @@ class Climb:
         self._orders = list(orders)
         self._armed = armed
         self._shows = shows
-        self._climbs = climbs
+        self._asks = asks
         self._failed = failed
         self._started = self._now = now
         self._doubt: _Refusal | None = None
@@ -91,12 +92,7 @@ class Climb:
         """Send no further order, and repeat none."""
         self._over = True
         self._orders.clear()
-        for number in (
-            mavlink.MAV_CMD_DO_SET_MODE,
-            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
-            mavlink.MAV_CMD_NAV_TAKEOFF,
-        ):
-            self._commander.withdraw(number)
+        self._commander.withdraw_steering()
 
     def fail(self, text: str) -> None:
         """End with a failure."""
@@ -109,8 +105,8 @@ class Climb:
             return
         order = self._orders.pop(0)
         self.may_start |= order.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-        if not self._orders:
-            self._climbs(self._now)
+        if order.mode is not None:
+            self._asks(order.mode, self._now)
         self._commander.give(
             order,
             lambda outcome: self._done(order, outcome),

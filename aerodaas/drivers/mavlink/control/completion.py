@@ -15,9 +15,6 @@ from aerodaas.types.vehicle import PositionSetpoint
 
 __all__ = ["ClimbCompletion"]
 
-_SHORT = 1.5
-"""Metres below the commanded height within which an autopilot may report a take-off as done."""
-
 
 class ClimbCompletion:
     """Setpoints from where an autopilot's take-off has ended up to the commanded height."""
@@ -39,7 +36,7 @@ class ClimbCompletion:
         odometry: Callable[[], Odometry],
         climb: float,
         *,
-        flew: bool,
+        near: bool,
     ) -> PositionSetpoint | None:
         """The setpoint that completes a climb to `goal`; None if none is due.
 
@@ -51,11 +48,10 @@ class ClimbCompletion:
             frame: The autopilot's frame.
             odometry: Where the vehicle is.
             climb: Climb rate, m/s.
-            flew: Whether it has left the ground.
+            near: Whether it flies so high that the autopilot may have ended its take-off.
         """
         phase = self._phase
         done = phase.seen and phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
-        near = flew and goal - self._telemetry.up < _SHORT
         if not ((done and near) or phase.wish is FlightMode.GUIDED):
             return None
         if self._place is None:

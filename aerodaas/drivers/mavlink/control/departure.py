@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from aerodaas.drivers.mavlink.control.climb import Climb
@@ -30,10 +31,12 @@ class Departure:
         flies: Callable[[], bool],
         words: Callable[[], list[str]],
         land: Callable[[], None],
+        short: float = 0.0,
     ) -> None:
         """`flies` returns whether it has left the ground; `land` lands a flying vehicle.
 
-        `words` returns the autopilot's own texts about its refusal.
+        `words` returns the autopilot's own texts about its refusal. `short` is how many metres
+        below the commanded height it may end a take-off by a hold; 0: it never does.
         """
         self.refusal = ""
         """Reason why the latest take-off failed."""
@@ -45,6 +48,9 @@ class Departure:
         self._flies = flies
         self._words = words
         self._land = land
+        self._short = short
+        self._top = math.inf
+        """Height of the latest take-off, metres up in the autopilot's frame."""
         self._climb: Climb | None = None
         self._withdrawal: Withdrawal | None = None
 
@@ -52,6 +58,11 @@ class Departure:
     def goal(self) -> float | None:
         """Target height in metres in the autopilot's frame, once the whole climb is commanded."""
         return self._climb.goal if self._climb is not None and self._climb.ordered else None
+
+    @property
+    def climbed(self) -> bool:
+        """Whether it is so high that the autopilot may have ended the take-off by a hold."""
+        return self._top - self._telemetry.up < self._short
 
     @property
     def climbs(self) -> bool:
@@ -67,14 +78,15 @@ class Departure:
         """Climb `height` metres by `orders`."""
         assert self._telemetry.position is not None  # noqa: S101 - checked before
         self._phase.rest()
+        self._top = height - float(self._telemetry.position[2])
         self._climb = Climb(
             self._commander,
             orders,
-            height - float(self._telemetry.position[2]),
+            self._top,
             height=height,
             armed=lambda: self._phase.armed,
             shows=self._shows,
-            climbs=lambda at: self._phase.ask(FlightMode.TAKE_OFF, at),
+            asks=self._phase.ask,
             failed=self._failed,
             now=now,
         )
@@ -87,6 +99,8 @@ class Departure:
         climb.cancel()
         if climb.may_start:
             self.withdraw(now)
+        else:
+            self._phase.rest()
 
     def withdraw(self, now: float) -> None:
         """Stop motors that turn, or may yet start, on the ground; land a flying vehicle."""
@@ -108,6 +122,7 @@ class Departure:
         if self._climb is not None:
             self._climb.cancel()
         self._climb = self._withdrawal = None
+        self._commander.withdraw_steering()
 
     def observe(self, now: float, *, was_armed: bool) -> None:
         """Handle a HEARTBEAT, after the phase's update by it."""
@@ -115,7 +130,11 @@ class Departure:
         if was_armed and not phase.armed and self._climb is not None:
             self._climb.fail("it stopped its motors again")
         if phase.taken is not None:
+            if self._climb is not None and not phase.armed:
+                self.refusal = f"its mode is {phase.shown.value!r} now, not by us"
             self.let_go()
+            if not phase.armed:
+                phase.rest()
         if self._withdrawal is not None:
             self._withdrawal.observe(now, armed=phase.armed)
             if self._withdrawal.over:

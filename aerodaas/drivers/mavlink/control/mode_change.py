@@ -40,15 +40,19 @@ class ModeChange:
         self._tell = tell
 
     def ask(self, wish: FlightMode, refused: Callable[[str], None] = _ignore) -> None:
-        """Ask for a mode, unless that is under way or done; `refused` gets the reason of a no."""
-        phase = self._phase
+        """Ask for a mode, unless that is under way or done; `refused` gets the reason of a no.
+
+        While the vehicle's mode is not known, nothing is asked: somebody else may have chosen one.
+        """
+        phase, now = self._phase, time.monotonic()
+        if not self._commander.in_touch(now):
+            return
         under_way = self._commander.under_way(mavlink.MAV_CMD_DO_SET_MODE)
         asked = under_way is not None and under_way.mode is wish
         if phase.wish is wish and (asked or phase.shown is wish):
             return
         if self._departure.climbs and wish is not FlightMode.GUIDED:
             self._departure.let_go()
-        now = time.monotonic()
         phase.ask(wish, now)
         order = self._autopilot.ask_mode(wish)
 

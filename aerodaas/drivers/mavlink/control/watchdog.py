@@ -12,6 +12,9 @@ __all__ = ["Watchdog"]
 
 _SILENT = 1.0
 """Seconds without a turn of the loop, which turns 20 times a second."""
+_STALL = 0.5
+"""Seconds between two steps, which come 20 times a second, in which the whole process stood still:
+the loop had no chance to turn."""
 _GONE = 20.0
 """Seconds without a turn after which the loop counts as dead."""
 
@@ -20,7 +23,7 @@ class Watchdog:
     """Watchdog fed by each turn of the loop."""
 
     def __init__(self) -> None:
-        self._fed_at = -math.inf
+        self._fed_at = self._stepped_at = -math.inf
         self._loop: int | None = None
         self._left_alone: FlightMode | None = None
         """What a vehicle was asked for because the loop hangs."""
@@ -44,7 +47,13 @@ class Watchdog:
         return now - self._fed_at > _GONE
 
     def step(self, now: float, phase: FlightPhase) -> FlightMode | None:
-        """What to ask a vehicle in `phase` for because the loop hangs, each mode once."""
+        """What to ask a vehicle in `phase` for because the loop hangs, each mode once.
+
+        Called 20 times a second; `now` in monotonic seconds.
+        """
+        since, self._stepped_at = now - self._stepped_at, now
+        if _STALL < since < math.inf:
+            self._fed_at = min(now, self._fed_at + since)
         if not phase.ours or self.healthy(now):
             self._left_alone = None
             return None

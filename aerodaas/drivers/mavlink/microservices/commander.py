@@ -20,6 +20,14 @@ _TRIES = 6
 _LATER = 1.0
 """Seconds after which a temporarily rejected command is repeated, such as one to arm while
 the estimator still settles."""
+_STEERING = frozenset(
+    {
+        mavlink.MAV_CMD_DO_SET_MODE,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+    }
+)
+"""Commands that would override who has taken the vehicle over while nothing was heard of it."""
 _RESULTS = {
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "rejected for now",
     mavlink.MAV_RESULT_DENIED: "denied",
@@ -65,6 +73,10 @@ def always() -> bool:
     return True
 
 
+def _always_heard(_: float) -> bool:
+    return True
+
+
 @dataclass
 class _Pending:
     order: PendingCommand
@@ -79,8 +91,23 @@ class _Pending:
 class Commander:
     """Commander with one pending command per number; the link's thread calls `take` and `turn`."""
 
-    def __init__(self, send: Callable[[Any], None], target: tuple[int, int], ours: int) -> None:
-        """Send by `send` to `target` (system, component); `ours` is our own system id."""
+    def __init__(
+        self,
+        send: Callable[[Any], None],
+        target: tuple[int, int],
+        ours: int,
+        in_touch: Callable[[float], bool] = _always_heard,
+    ) -> None:
+        """Send commands to one component.
+
+        Args:
+            send: Sends a message.
+            target: System and component.
+            ours: Our own system id.
+            in_touch: Whether the vehicle's mode is known at a monotonic second. Commands of modes,
+                motors and take-off wait until it is.
+        """
+        self.in_touch = in_touch
         self.stray = 0
         """Acknowledgements that were late, repeated, or for another sender."""
         self.answered = False
@@ -108,7 +135,8 @@ class Commander:
         with self._lock:
             before = self._pending.get(order.number)
             self._pending[order.number] = pending = _Pending(order, done, still)
-            self._transmit(pending, now)
+            if self._may_send(order, now):
+                self._transmit(pending, now)
         if before is not None:
             before.done(
                 CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
@@ -131,6 +159,14 @@ class Commander:
         """Withdraw the command of this `number`; its `done` is not called."""
         with self._lock:
             self._pending.pop(number, None)
+
+    def withdraw_steering(self) -> None:
+        """Withdraw commands of modes, motors and take-off."""
+        for number in _STEERING:
+            self.withdraw(number)
+
+    def _may_send(self, order: PendingCommand, now: float) -> bool:
+        return order.number not in _STEERING or self.in_touch(now)
 
     def under_way(self, number: int) -> PendingCommand | None:
         """The unanswered command of this `number`; None without one."""
@@ -173,7 +209,7 @@ class Commander:
                 if not pending.still():
                     del self._pending[number]
                     ended.append((pending, CommandResult(accepted=True, tries=pending.tries)))
-                elif now < pending.deadline:
+                elif now < pending.deadline or not self._may_send(pending.order, now):
                     continue
                 elif pending.tries >= _TRIES:
                     del self._pending[number]

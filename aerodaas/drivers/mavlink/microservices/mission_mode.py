@@ -50,14 +50,20 @@ def mission_items(
     autopilot: Autopilot,
     *,
     origin: GeodeticOrigin,
-    ground: float,
+    sea_level: float,
     radius: float,
 ) -> tuple[list[MissionItem], list[int]]:
     """The mission through `places`, and the number of the item that stands for each of them.
 
-    `origin` is that of the local frame, in which the vehicle's home lies `ground` metres up;
-    `radius` metres from a place count as there. After the last place it stays for a moment, and
-    then comes home.
+    After the last place it stays for a moment, and then comes home. Heights are above the sea: its
+    home, which others may move in flight, is no reference for them.
+
+    Args:
+        places: Where to fly, in order.
+        autopilot: The family of the vehicle.
+        origin: Geodetic origin of the local frame.
+        sea_level: Metres above mean sea level of the local frame's zero.
+        radius: Metres from a place that count as there.
     """
     still = (0.0, 0.0, 0.0, 0.0)
     items: list[MissionItem] = []
@@ -82,9 +88,9 @@ def mission_items(
         yaw = onwards if place.yaw is None else math.degrees(LocalFrame.heading(place.yaw))
         values = (float(math.ceil(place.hover)), radius, 0.0, yaw)
         numbers.append(len(items))
-        items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, values, place, origin, ground))
+        items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, values, place, origin, sea_level))
     values = (_STAY, 0.0, 0.0, onwards)
-    items.append(_item(mavlink.MAV_CMD_NAV_LOITER_TIME, values, places[-1], origin, ground))
+    items.append(_item(mavlink.MAV_CMD_NAV_LOITER_TIME, values, places[-1], origin, sea_level))
     items.append(
         MissionItem(
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, still, 0, 0, 0.0, mavlink.MAV_FRAME_MISSION
@@ -98,10 +104,11 @@ def _item(
     values: tuple[float, float, float, float],
     place: PlannedPlace,
     origin: GeodeticOrigin,
-    ground: float,
+    sea_level: float,
 ) -> MissionItem:
     east, north, up = (float(axis) for axis in place.position)
-    return MissionItem(command, values, *item_place(origin, east, north), round(up - ground, 2))
+    there, altitude = item_place(origin, east, north), round(sea_level + up, 2)
+    return MissionItem(command, values, *there, altitude, mavlink.MAV_FRAME_GLOBAL)
 
 
 class MavlinkMissionMode:
@@ -174,22 +181,28 @@ class MavlinkMissionMode:
             and not self._autopilot.turns_at_waypoints
         ):
             return f"{name} turns to no yaw at a waypoint"
-        if self._telemetry.home is None or self._alignment.frame is None:
+        known = self._alignment.frame is not None and self._alignment.sea_level is not None
+        if self._telemetry.home is None or not known:
             return f"{name} does not tell where it is, or where its home lies"
-        return ""
+        return self._home_fault()
+
+    def _home_fault(self) -> str:
+        """Why its way home after the plan would lead astray; empty if it would not."""
+        off = self._telemetry.home_off
+        return f"its home has moved, {off:.0f} m from where it took off" if off else ""
 
     def upload(self, places: Sequence[PlannedPlace]) -> None:
         """Begin to replace the plan on the vehicle; raises VehicleError."""
         with self._lock:
-            frame, home = self._alignment.frame, self._telemetry.home
-            if (text := self.objection(places)) or frame is None or home is None:
+            sea_level = self._alignment.sea_level
+            if (text := self.objection(places)) or sea_level is None:
                 raise VehicleError(text)
             self._forget()
             items, self._numbers = mission_items(
                 places,
                 self._autopilot,
                 origin=self._alignment.origin,
-                ground=float(frame.position(home)[2]),
+                sea_level=sea_level,
                 radius=self._robot.limits.arrival_radius,
             )
             self._count = len(items)
@@ -234,6 +247,11 @@ class MavlinkMissionMode:
                 self._phase = _P.FLYING
             elif now >= self._deadline:
                 self._fail(f"{self._autopilot.name} does not show its mission mode")
+        elif self._phase is _P.FLYING:
+            wish = self._flight.wish
+            if wish is not None and wish is not FlightMode.MISSION:
+                self._fail(f"the control loop hung, and it was commanded to {wish.value}")
+            self._fault = self._home_fault() or self._fault
 
     def _mind_upload(self, now: float) -> None:
         assert self._upload is not None  # noqa: S101 - asked before

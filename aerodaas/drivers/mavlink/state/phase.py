@@ -1,7 +1,8 @@
 """Flight phase of the vehicle: its HEARTBEAT compared with the requested action.
 
 A mode that was not requested is a pilot's, a ground station's, or the autopilot's own protection:
-from then on until it is disarmed no steering message is sent.
+from then on until it is disarmed no steering message is sent. A request is recorded only as it is
+sent, so that a mode which HEARTBEATs show after a silence is never mistaken for one of ours.
 """
 
 from __future__ import annotations
@@ -37,13 +38,13 @@ PROTECTIVE = frozenset({FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND})
 """Modes into which an autopilot's own protection changes."""
 _FOLLOWS = {
     FlightMode.GUIDED: frozenset({FlightMode.GUIDED}),
-    FlightMode.TAKE_OFF: frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED}),
+    FlightMode.TAKE_OFF: frozenset({FlightMode.TAKE_OFF, FlightMode.GUIDED}),
     FlightMode.HOLD: frozenset({FlightMode.HOLD}),
     FlightMode.MISSION: frozenset({FlightMode.MISSION}),
-    FlightMode.RETURN: frozenset({FlightMode.RETURN, FlightMode.LAND}),
+    FlightMode.RETURN: frozenset({FlightMode.RETURN}),
     FlightMode.LAND: frozenset({FlightMode.LAND}),
 }
-"""Modes that belong to each wish."""
+"""Modes that belong to each wish. Both autopilots land at the end of a return in its own mode."""
 
 _SHOWN = {
     FlightMode.GUIDED: VehicleMode.GUIDED,
@@ -64,11 +65,11 @@ class FlightPhase:
         self.shown = FlightMode.OTHER
         """The mode of the latest HEARTBEAT."""
         self.wish: FlightMode | None = None
-        """The last requested action, until it is disarmed."""
+        """The last requested action, until it is disarmed; that of a take-off before it, too."""
         self.seen = False
         """Whether a HEARTBEAT has shown that action."""
         self.taken: VehicleMode | None = None
-        """MANUAL or FAILSAFE once another pilot or the autopilot itself flies."""
+        """MANUAL or FAILSAFE once another pilot or the autopilot itself has chosen the mode."""
         self._before: frozenset[FlightMode] = frozenset()
         """Modes that HEARTBEATs may still show for a moment after the request."""
         self._asked_at = -math.inf
@@ -108,23 +109,36 @@ class FlightPhase:
 
     def rest(self) -> None:
         """Clear the request: the vehicle stands."""
-        self.wish, self.seen = None, False
+        self.wish, self.taken, self.seen = None, None, False
 
-    def observe(self, shown: FlightMode, now: float, *, armed: bool, critical: bool) -> None:
-        """Update by a HEARTBEAT."""
-        if not armed:
-            if self.armed:
-                self.wish = self.taken = None
-                self.seen = False
-            self.armed, self.shown = armed, shown
-            return
+    def observe(
+        self,
+        shown: FlightMode,
+        now: float,
+        *,
+        armed: bool,
+        critical: bool,
+        climbed: bool = False,
+    ) -> None:
+        """Update by a HEARTBEAT.
+
+        Args:
+            shown: Its mode.
+            now: Monotonic seconds.
+            armed: Whether its motors turn.
+            critical: Whether the autopilot reports its own protection at work.
+            climbed: Whether it is so high that the autopilot may have ended a take-off by a hold.
+        """
+        if self.armed and not armed:
+            self.rest()
         self.armed, self.shown = armed, shown
         if self.taken is VehicleMode.MANUAL and critical and shown is self._taken_by:
             explained = now - self._taken_at <= _EXPLAINED
             self.taken = VehicleMode.FAILSAFE if explained else self.taken
         if self.wish is None or self.taken is not None:
             return
-        if shown in _FOLLOWS[self.wish]:
+        held = climbed and (self.wish, shown) == (FlightMode.TAKE_OFF, FlightMode.HOLD)
+        if held or shown in _FOLLOWS[self.wish]:
             self.seen = True
             return
         late = now - self._asked_at <= _LAG or not self.seen

@@ -78,7 +78,7 @@ class VehicleReport:
         # A silent link is no loss of the position: the last known one stays, with its age. Only a
         # vehicle that still sends messages can have lost it.
         age = now - telemetry.position_at
-        heard = telemetry.knows_place(now - self._silence(now)) and age <= _LOST_AFTER
+        heard = telemetry.knows_place(now - self._silence(now))
         known = heard or (lost and math.isfinite(age))
         age = age if known else 0.0
         frame = self.alignment.frame if self.alignment is not None else None
@@ -185,10 +185,12 @@ class VehicleReport:
         return self._phase.mode
 
     def lost(self, now: float) -> bool:
-        """Whether it has sent nothing new for too long, or no position since then."""
+        """Whether it has sent nothing new for too long, or since then no mode or no position."""
         telemetry = self._telemetry
+        if self._silence(now) > _LOST_AFTER or not telemetry.shows_mode(now):
+            return True
         back = telemetry.armed and now - telemetry.back_at < _FINDING
-        return self._silence(now) > _LOST_AFTER or (back and not telemetry.knows_place(now))
+        return back and not telemetry.knows_place(now)
 
     def _silence(self, now: float) -> float:
         # Standing motors need no recent telemetry: HEARTBEATs report them.
@@ -208,6 +210,8 @@ class VehicleReport:
             faults.append("link: the vehicle answers nothing, it may not hear us")
         if self.alignment is not None:
             faults.append(self.alignment.fault)
+        if off := telemetry.home_off:
+            faults.append(f"home: its own return leads {off:.0f} m from where it took off")
         faults += [*telemetry.health.faults(now), *self.objections(now)]
         faults += [] if self._airspace is None else self._airspace.faults(now)
         faults += telemetry.texts.recent(now, REASONS, _GRAVE)

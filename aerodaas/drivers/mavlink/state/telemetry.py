@@ -23,12 +23,18 @@ __all__ = ["Sensors", "Telemetry"]
 
 _FRESH = 1.0
 """Seconds after which a position or an attitude is invalid."""
+_GAP = 0.9
+"""Seconds without any message that count as a silence: less than a position is valid for."""
+_BEATS = 5.0
+"""Seconds without a HEARTBEAT, of which one comes each second, after which the mode is unknown."""
 _FIX = 2
 """GPS fix types from this one on are positions."""
 _FAR = 5.0
 """Seconds by which time stamps may go back, as packets overtake each other; more is a restart."""
 _FULL = 100
 """Percent."""
+_HOME_MOVED = 2.0
+"""Metres from where its motors started at which its home has been moved."""
 _UNKNOWN_SATELLITES = 255
 _BREACHES = {
     mavlink.FENCE_BREACH_MINALT: "too low",
@@ -51,24 +57,24 @@ class Telemetry:
 
     def __init__(self, *, measures_ground: bool = False) -> None:
         """Know nothing; heed a rangefinder, and miss it, where one `measures_ground`."""
-        self.heard_at = -math.inf
-        """Any message at all."""
-        self.back_at = -math.inf
-        """The first message after the latest silence."""
+        self.heard_at = self.back_at = -math.inf
+        """Any message at all, and the first one after the latest silence."""
         self.ticked_at = -math.inf
         """The latest message whose stamp was newer than all before."""
         self.beat_at = -math.inf
         """The latest HEARTBEAT."""
-        self.custom_mode, self.armed = 0, False
-        self.critical = False
-        """Its own protection is at work."""
+        self.custom_mode = 0
+        self.armed = self.critical = False
+        """Whether its motors turn, and whether its own protection is at work."""
         self.position: Vector | None = None
         """NED metres from the autopilot's own origin."""
         self.velocity: Vector = np.zeros(3)
         self.position_at = -math.inf
         self.attitude, self.attitude_at = Attitude(), -math.inf
         self.home: Vector | None = None
-        """Position where it was armed, NED metres."""
+        """Where its own return leads, NED metres; others may move it in flight."""
+        self._armed_at: Vector | None = None
+        """Where its motors started, NED metres; its first home if it was met in the air."""
         self.altitude: float | None = None
         """Metres above mean sea level, by its own estimate."""
         self.place: tuple[float, float] | None = None
@@ -123,7 +129,7 @@ class Telemetry:
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Update by a message of the vehicle."""
-        if now - self.heard_at > _FRESH:
+        if now - self.heard_at > _GAP:
             self.back_at = now
         self.heard_at = now
         kind = message.get_type()
@@ -139,10 +145,26 @@ class Telemetry:
         """Seconds since its last new data; repeated timestamps are no new data."""
         return now - min(self.heard_at, self.ticked_at)
 
+    def shows_mode(self, now: float) -> bool:
+        """Whether its HEARTBEATs show the mode that it has: one has come since the last silence."""
+        return self.beat_at >= self.back_at and now - self.beat_at <= _BEATS
+
+    def in_touch(self, now: float) -> bool:
+        """Whether it is heard at present, and its mode is known."""
+        return now - self.heard_at <= _GAP and self.shows_mode(now)
+
     def knows_place(self, now: float) -> bool:
         """Whether position and attitude are recent, and valid by its own estimate."""
         fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
         return fresh and not self.health.lost(now)
+
+    @property
+    def home_off(self) -> float:
+        """Metres by which its own return would miss the place of take-off; 0 within 2 m."""
+        if not self.armed or self.home is None or self._armed_at is None:
+            return 0.0
+        off = float(np.linalg.norm(self.home - self._armed_at))
+        return off if off > _HOME_MOVED else 0.0
 
     @property
     def up(self) -> float:
@@ -160,13 +182,15 @@ class Telemetry:
         return place, position
 
     def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
-        self.beat_at = now
+        met, was_armed, self.beat_at = self.beat_at > -math.inf, self.armed, now
         self.custom_mode = message.custom_mode
         # A terminated autopilot reports itself as armed for ever, but no motor turns.
         self.armed = (
             bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
             and message.system_status != mavlink.MAV_STATE_FLIGHT_TERMINATION
         )
+        if self.armed and not was_armed:
+            self._armed_at = self.position if met else self.home
         self.critical = message.system_status in {
             mavlink.MAV_STATE_CRITICAL,
             mavlink.MAV_STATE_EMERGENCY,
@@ -232,6 +256,8 @@ class Telemetry:
     def _home(self, message: Any, _: float) -> None:  # noqa: ANN401
         home = np.array([message.x, message.y, message.z], dtype=np.float64)
         self.home = home if np.isfinite(home).all() else None
+        if self.armed and self._armed_at is None:
+            self._armed_at = self.home
 
     def _fence(self, message: Any, _: float) -> None:  # noqa: ANN401
         how = _BREACHES.get(message.breach_type, "left")
@@ -266,7 +292,7 @@ class Telemetry:
         self.boot_time = math.nan
         self._stamps.clear()
         self.position_at = self.attitude_at = -math.inf
-        self.home = self.place = self.altitude = self.gps = None
+        self.home = self._armed_at = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
         self.sensors, self.on_ground, self.breach = None, None, ""
         self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock()
