@@ -71,6 +71,7 @@ class SimulatedVehicle:
         )
         self._max_yaw_rate = math.radians(limits.max_yaw_rate)
         self._wind = math.hypot(*simulation.wind[:2])
+        terrain = _terrain(robot, environment)
         wind = Wind(simulation.wind, simulation.gust, f"{simulation.seed}/{robot.id}/wind", STEP)
         self._rotor = Multirotor(
             airframe,
@@ -79,11 +80,12 @@ class SimulatedVehicle:
             max_yaw_rate=self._max_yaw_rate,
             start=robot.start,
             yaw=math.remainder(math.radians(robot.start_yaw), math.tau),
+            terrain=None if terrain is None else terrain.height,
         )
         self._noise = SensorNoise(simulation.sensor_noise, f"{simulation.seed}/{robot.id}/noise")
         self._autopilot = Autopilot(airframe, self._rotor, self._noise, self._limits)
         self._measures_ground = limits.rangefinder_clearance > 0.0
-        self._rangefinder = _rangefinder(robot, environment, airframe)
+        self._rangefinder = _rangefinder(robot, environment, airframe, terrain)
         self._now = 0
         self._steps = 0
         self._connected = False
@@ -303,23 +305,29 @@ class SimulatedVehicle:
             raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
 
 
-def _rangefinder(
-    robot: RobotConfig, environment: EnvironmentConfig, airframe: Airframe
-) -> SimulatedRangefinder | None:
-    """Its rangefinder; None without one, and where the robot's limits need none.
+def _terrain(robot: RobotConfig, environment: EnvironmentConfig) -> Ground | None:
+    """The ground around its start; None for a flat one.
 
     Raises ConfigError for a terrain that cannot be read.
     """
+    home, terrain = environment.home, environment.terrain
+    if home is None or terrain is None:
+        return None
+    return Ground.of(terrain, home.origin, np.array(robot.start), robot.limits.max_range)
+
+
+def _rangefinder(
+    robot: RobotConfig, environment: EnvironmentConfig, airframe: Airframe, terrain: Ground | None
+) -> SimulatedRangefinder | None:
+    """Its rangefinder; None without one, and where the robot's limits need none."""
     if airframe.rangefinder is None or robot.limits.rangefinder_clearance <= 0.0:
         return None
-    simulation, home, terrain = environment.simulation, environment.home, environment.terrain
-    ground = None
-    if home is not None and terrain is not None:
-        takeoff, reach = np.array(robot.start), robot.limits.max_range
-        ground = Ground.of(terrain, home.origin, takeoff, reach).heights
+    simulation = environment.simulation
     return SimulatedRangefinder(
         airframe.rangefinder,
-        Surface(World.load(simulation), robot.start[2], ground),
+        Surface(
+            World.load(simulation), robot.start[2], None if terrain is None else terrain.heights
+        ),
         simulation.sensor_noise,
         f"{simulation.seed}/{robot.id}/rangefinder",
     )

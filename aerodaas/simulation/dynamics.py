@@ -15,6 +15,7 @@ than numpy.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -29,6 +30,8 @@ STEP_NS = 10_000_000
 """Fixed time step in nanoseconds; steps lie on the grid of its multiples."""
 
 STEP = STEP_NS / 1e9
+_GROUND_STEPS = 9
+"""Steps for which a height of the ground is good: a tenth of a second less one."""
 """Fixed time step in seconds."""
 
 _VELOCITY_GAIN = 2.5
@@ -72,7 +75,8 @@ class Multirotor:
     """Vehicle with velocity controller, advanced by steps of `STEP` seconds.
 
     `max_acceleration` in m/s^2 limits the controller's demand; `max_yaw_rate` is in rad/s, `start`
-    in ENU metres, `yaw` in radians. The ground is flat, at the height of `start`.
+    in ENU metres, `yaw` in radians. The ground is flat, at the height of `start`, or as high as
+    `terrain` says at a place in ENU metres; where that is not known (NaN), as high as before.
     """
 
     __slots__ = (
@@ -82,6 +86,8 @@ class Multirotor:
         "_max_thrust",
         "_max_yaw_rate",
         "_rotor_drag",
+        "_steps_to_ground",
+        "_terrain",
         "_tilt_slope",
         "_wind",
         "acceleration",
@@ -104,8 +110,12 @@ class Multirotor:
         max_yaw_rate: float,
         start: Triple,
         yaw: float,
+        terrain: Callable[[float, float], float] | None = None,
     ) -> None:
         """Start on the ground at `start` with the motors off."""
+        self._terrain = terrain
+        self._steps_to_ground = 0
+        """Steps until the ground is looked up again."""
         self._rotor_drag = airframe.rotor_drag
         self._body_drag = airframe.body_drag
         self._tilt_slope = math.tan(math.radians(airframe.max_tilt))
@@ -124,7 +134,7 @@ class Multirotor:
         self.ground = start[2]
         self.on_ground = True
         self.impact = 0.0
-        """Downward speed at the latest touchdown, m/s."""
+        """Downward speed at the latest touchdown, or the speed into a slope, m/s."""
 
     @property
     def airspeed(self) -> Triple:
@@ -204,12 +214,22 @@ class Multirotor:
         wanted = min(max(yaw_rate, -self._max_yaw_rate), self._max_yaw_rate)
         self.yaw_rate += _YAW_RATE_SHARE * (wanted - self.yaw_rate)
         self.yaw = math.remainder(self.yaw + self.yaw_rate * STEP, math.tau)
-        if z <= self.ground and self.velocity[2] < 0.0:
-            self.impact = -self.velocity[2]
+        slope = self._terrain is not None and self._look_below(self._terrain)
+        if z <= self.ground and (self.velocity[2] < 0.0 or slope):
+            self.impact = math.hypot(*self.velocity) if slope else -self.velocity[2]
             self.position = (self.position[0], self.position[1], self.ground)
             self.velocity = self.acceleration = (0.0, 0.0, 0.0)
             self.yaw_rate = 0.0
             self.on_ground = True
+
+    def _look_below(self, terrain: Callable[[float, float], float]) -> bool:
+        """Take the ground's height from `terrain`; returns whether the drone is in a slope."""
+        self._steps_to_ground -= 1
+        if self._steps_to_ground < 0:
+            self._steps_to_ground = _GROUND_STEPS
+            height = terrain(self.position[0], self.position[1])
+            self.ground = self.ground if math.isnan(height) else height
+        return self.position[2] < self.ground
 
     def motion(self, ahead: float = 0.0) -> KinematicState:
         """State of motion, extrapolated by `ahead` seconds (less than a step).
