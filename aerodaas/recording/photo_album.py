@@ -119,8 +119,7 @@ def _row(name: str, photo: Photo) -> list[object]:
         else [
             f"{place.latitude:.8f}",
             f"{place.longitude:.8f}",
-            f"{place.altitude:.3f}",
-            place.datum,
+            *(("", "") if place.altitude is None else (f"{place.altitude:.3f}", place.datum)),
         ]
     )
     heading, pitch, roll = _look(photo)
@@ -160,14 +159,20 @@ def _exif(photo: Photo) -> Image.Exif:
 
 
 def _gps_tags(place: PhotoPlace) -> dict[int, object]:
+    altitude = place.altitude
+    height: dict[int, object] = {}
+    if altitude is not None:
+        height = {
+            GPS.GPSAltitudeRef: _BELOW if altitude < 0.0 else _ABOVE,
+            GPS.GPSAltitude: abs(altitude),
+        }
     return {
         GPS.GPSVersionID: b"\x02\x03\x00\x00",
         GPS.GPSLatitudeRef: "N" if place.latitude >= 0.0 else "S",
         GPS.GPSLatitude: _sexagesimal(place.latitude),
         GPS.GPSLongitudeRef: "E" if place.longitude >= 0.0 else "W",
         GPS.GPSLongitude: _sexagesimal(place.longitude),
-        GPS.GPSAltitudeRef: _BELOW if place.altitude < 0.0 else _ABOVE,
-        GPS.GPSAltitude: abs(place.altitude),
+        **height,
         GPS.GPSMapDatum: "WGS-84",
     }
 

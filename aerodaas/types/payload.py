@@ -78,7 +78,8 @@ class PhotoPlace:
 
     latitude: float
     longitude: float
-    altitude: float
+    altitude: float | None
+    """None where it is not known."""
     datum: Literal["ellipsoid", "sea"] = "ellipsoid"
     """What the altitude is counted from."""
 

@@ -69,6 +69,21 @@ def test_a_simulated_picture_has_its_place_in_it(tmp_path: Path, south: float) -
     assert float(tags[GPS.GPSImgDirection]) == pytest.approx(45.0)
 
 
+def test_a_picture_of_unknown_altitude_has_its_place_alone(tmp_path: Path) -> None:
+    """Neither the file nor the table says the level of the sea."""
+    album = PhotoAlbum(tmp_path / "photos", ENVIRONMENT)
+    album.add("drone", photo(PhotoPlace(47.5, 8.5, None, "sea")))
+    album.close()
+    with Image.open(tmp_path / "photos" / "drone-0001.jpg") as image:
+        tags = image.getexif().get_ifd(IFD.GPSInfo)
+    assert GPS.GPSLatitude in tags
+    assert GPS.GPSAltitude not in tags
+    assert GPS.GPSAltitudeRef not in tags
+    (row,) = rows(tmp_path / "photos")
+    assert row["latitude"] == "47.50000000"
+    assert (row["altitude"], row["altitude_above"]) == ("", "")
+
+
 def test_the_table_has_place_and_attitude(tmp_path: Path) -> None:
     """A row for each picture, with units as documented."""
     album = PhotoAlbum(tmp_path / "photos", ENVIRONMENT)

@@ -59,6 +59,8 @@ class EmulatedPayload:
         self.lens_refuses = False
         self.mute = False
         """Pictures are taken, and not told."""
+        self.knows_height = True
+        """Pictures have an altitude, and not zero in its place."""
         self.interval: float | None = None
         """Seconds between pictures that it says that it takes by itself."""
         self.recording: float | None = None
@@ -147,12 +149,12 @@ class EmulatedPayload:
         self.taken.append(self.pitch)
         lat, lon, _ = flight.origin.to_geodetic(flight.believed.position)
         stamp, place = round(self._firmware.now * 1e3), (round(lat * 1e7), round(lon * 1e7))
-        index = len(self.taken)
+        index, altitude = len(self.taken), flight.altitude if self.knows_height else 0.0
         if self.mute:
             return
         if self.by_itself or self._firmware.number == mavlink.MAV_AUTOPILOT_PX4:
             name = f"DCIM/{index:04d}.JPG".encode()
-            height = (round(flight.altitude * 1e3), 0)
+            height = (round(altitude * 1e3), 0)
             self._say(
                 mavlink.MAVLink_camera_image_captured_message(
                     stamp, 0, 1, *place, *height, self._quaternion(), index - 1, 1, name
@@ -161,7 +163,7 @@ class EmulatedPayload:
             return
         self._say(
             mavlink.MAVLink_camera_feedback_message(
-                *(stamp * 1000, 0, 0, index, *place, flight.altitude, 0.0),
+                *(stamp * 1000, 0, 0, index, *place, altitude, 0.0),
                 *(0.0, math.degrees(self.pitch), 0.0, 0.0, 0),
             )
         )

@@ -84,6 +84,19 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
         assert len(carried(ends).taken) == 2
 
 
+def test_an_altitude_of_zero_with_a_place_is_not_known(ends: Stepped) -> None:
+    """Cameras without one send zero, which is not the level of the sea."""
+    with ends:
+        found(ends)
+        carried(ends).knows_height = False
+        take(ends)
+        photo = outcome(ends)
+        assert isinstance(photo, Photo)
+        assert photo.place is not None
+        assert photo.place.latitude == pytest.approx(47.397742, abs=1e-6)
+        assert photo.place.altitude is None
+
+
 def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
     """Such as one by the pilot's switch, or by the autopilot's own distance trigger."""
     with ends:

@@ -185,10 +185,13 @@ class MavlinkCamera:
 
 
 def _place(latitude: float, longitude: float, altitude: float) -> PhotoPlace | None:
-    """A place in 1e-7 degrees; None where the camera had none, which says zero or nonsense."""
+    """A place in 1e-7 degrees; None where the camera had none, which says zero or nonsense.
+
+    Its altitude is not known where it is exactly zero.
+    """
     known = (latitude or longitude) and math.isfinite(altitude)
     north_pole, date_line = 90.0, 180.0
     lat, lon = latitude / 1e7, longitude / 1e7
     if not known or abs(lat) > north_pole or abs(lon) > date_line:
         return None
-    return PhotoPlace(lat, lon, float(altitude), "sea")
+    return PhotoPlace(lat, lon, float(altitude) or None, "sea")
