@@ -6,6 +6,7 @@ import uuid
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
@@ -55,6 +56,8 @@ class Session:
     """Sorted timestamps in nanoseconds at which sources without a rate are due."""
     edge: EdgeShare | None = None
     """Share of an edge that other flights use, too; None in lockstep, which waits for all work."""
+    locks: Path | None = None
+    """Folder of a provider's locks, which the drones' actors on its machine hold."""
     application: Application = field(default_factory=Application)
     """Definitions from the application's own files."""
     epoch: HostEpoch = field(default_factory=HostEpoch)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,6 +28,7 @@ from aerodaas.actors.session import (
     next_due,
 )
 from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
+from aerodaas.config.file_lock import actor_lock, exclusive
 from aerodaas.drivers.loading import link_of
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
@@ -72,6 +74,7 @@ class DroneActor(StreamActor):
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
         """Newest report of each robot: replaced by the loop, never mutated."""
+        self._locks = ExitStack()
         self._changes = ChangeSignal()
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
@@ -92,6 +95,7 @@ class DroneActor(StreamActor):
         nice = raise_niceness()
         if nice > 0:
             self._warn_of_niceness(nice)
+        self._hold_locks()
         controllers = [self._controller(spec) for spec in self._specs]
         try:
             _at_once(VehicleController.connect, controllers)
@@ -106,6 +110,17 @@ class DroneActor(StreamActor):
         if self._neighbours:
             self.publisher(whereabouts_stream(self.name))
         self._publish_reports()
+
+    def _hold_locks(self) -> None:
+        """Hold the drones' locks; raises MissionError where another flight's actor holds one."""
+        folder = self.session.locks
+        # On another machine than the provider's there are none.
+        if folder is None or not folder.is_dir():
+            return
+        for spec in self._specs:
+            path = actor_lock(folder, spec.robot.id)
+            refusal = f"the actor of another flight still flies {spec.robot.id}"
+            self._locks.enter_context(exclusive(path, refusal))
 
     def _controller(self, spec: RobotSpec) -> VehicleController:
         return VehicleController(spec, self.session, self._publisher)
@@ -345,6 +360,7 @@ class DroneActor(StreamActor):
     def _close(self) -> None:
         self._calls.close("the drone's actor has been stopped")
         _at_once(VehicleController.disconnect, list(self._controllers.values()))
+        self._locks.close()
 
 
 def _at_once(

@@ -86,6 +86,8 @@ class RunOptions:
     """Ray cluster to join."""
     edge: EdgeShare | None = None
     """Share the edge with other flights of a provider."""
+    locks: Path | None = None
+    """Folder of a provider's locks, which the drones' actors hold; None without a provider."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True

@@ -333,6 +333,7 @@ class Run:
             speed,
             timetables=self._timetables(),
             edge=None if self.lockstep else self.options.edge,
+            locks=self.options.locks,
             application=application,
         )
         compute = self._environment.compute()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from pathlib import Path
 from typing import Any
 
 from flying import robot
@@ -68,6 +69,7 @@ def drone_by_hand(
     speed: float | None,
     navigation: tuple[str, ...] = (),
     requesters: tuple[str, ...] = (),
+    locks: Path | None = None,
     **settings: Any,  # noqa: ANN401
 ) -> DroneByHand:
     """An actor that flies one simulated robot called `drone` and is ready to start."""
@@ -79,7 +81,7 @@ def drone_by_hand(
     environment = EnvironmentConfig.model_validate(content)
     (only,) = environment.robots
     spec = spec_by_hand(only, *initial, navigation=navigation, requesters=requesters)
-    session, name = Session(environment, speed), "drone/drone"
+    session, name = Session(environment, speed, locks=locks), "drone/drone"
     actor: DroneByHand
     if speed is None:
         schedule = LockstepSchedule({}, {}, windows={state_stream("drone"): 0})

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from drone_by_hand import DroneByHand, LockstepDroneByHand, drone_by_hand, spec_by_hand
@@ -21,6 +22,7 @@ from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import state_stream
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
+from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
 
@@ -269,3 +271,19 @@ def test_alerts_of_drones_on_one_link_say_whose_they_are() -> None:
     told = [one for one in actor.report().alerts if one.kind == "takeoff_refused"]
     actor.stop()
     assert {one.header.source for one in told} == {"drone/west", "drone/east"}
+
+
+def test_a_drone_is_held_by_the_actor_that_brings_it_home(tmp_path: Path) -> None:
+    """Where the process of its flight was killed: no other flight begins until it is over."""
+    folder = tmp_path / "locks"
+    folder.mkdir()
+    locks = RobotLocks(folder)
+    actor = drone_by_hand(speed=1.0, locks=folder)
+    assert locks.held(["drone", "other"]) == {"drone"}
+    with pytest.raises(MissionError, match="still flies drone"), locks.hold(["drone"]):
+        pass
+    with pytest.raises(MissionError, match="still flies drone"):
+        drone_by_hand(speed=1.0, locks=folder)
+    actor.stop()
+    with locks.hold(["drone"]):
+        assert locks.held(["drone"]) == {"drone"}

@@ -223,7 +223,11 @@ def test_a_lost_flight_takes_its_drone_out_of_service(provider: Served) -> None:
     """Nobody knows where it is, so nobody gets it before an operator has looked."""
     id_ = submitted(provider, "two", *((one[0] + 10, one[1]) for one in FAR))
     flying(provider, id_, "two")
-    os.kill(process_of(provider, id_).pid, signal.SIGKILL)
+    flight = process_of(provider, id_)
+    [actor] = [
+        one for one in flight.children(recursive=True) if "DroneActor" in "".join(one.cmdline())
+    ]
+    os.kill(flight.pid, signal.SIGKILL)
     ended = provider.until_phase(id_)
     assert ended["phase"] == "failed"
     assert "out of service until an operator has looked" in ended["reason"]
@@ -231,6 +235,11 @@ def test_a_lost_flight_takes_its_drone_out_of_service(provider: Served) -> None:
     assert refused[0] == 409
     assert provider.send("PATCH", "/v1/robots/two", {"enabled": True})[0] == 204
     again = submitted(provider, "two", (12.0, 0.0))
+    # Whoever has looked too soon: its actor brings it home, and nobody else flies it meanwhile.
+    assert actor.is_running()
+    provider.until(lambda: "two" in provider.mission(again)["reason"])
+    assert provider.until_phase(again, "flying")["phase"] == "flying"
+    assert not actor.is_running()
     assert provider.until_phase(again)["phase"] == "landed"
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from aerodaas.config.file_lock import exclusive, is_locked
 from aerodaas.config.private_file import write_private
-from aerodaas.service.flights.locks import exclusive, is_locked
 from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
 from aerodaas.service.unix_server import fits_a_socket
 from aerodaas.types.errors import MissionError

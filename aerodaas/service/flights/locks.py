@@ -1,64 +1,19 @@
-"""Locks of flights and drones: files that a living process holds, and the kernel frees at its end.
+"""Locks of a provider's drones, which hold whatever its database says.
 
-They hold whatever a database says, and whatever has become of the service.
+The process of a flight holds the lock of each of its drones; so does the actor that flies it, which
+brings it home where that process is killed.
 """
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
-import time
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import IO
 
+from aerodaas.config.file_lock import actor_lock, exclusive, is_locked
 from aerodaas.types.errors import MissionError
 
-__all__ = ["RobotLocks", "exclusive", "is_locked"]
-
-_PATIENCE = 1.0
-"""Seconds to wait for a lock: whoever looks at it holds it for a moment, too."""
-_AGAIN_SECONDS = 0.02
-
-
-@contextlib.contextmanager
-def exclusive(path: Path, refusal: str) -> Iterator[None]:
-    """Hold the lock in the file `path`.
-
-    Args:
-        path: The file, which need not exist.
-        refusal: What the error says.
-
-    Raises:
-        MissionError: If another process holds it.
-    """
-    until = time.monotonic() + _PATIENCE
-    with path.open("w") as lock:
-        while not _taken(lock):
-            if time.monotonic() > until:
-                raise MissionError(refusal)
-            time.sleep(_AGAIN_SECONDS)
-        yield
-
-
-def _taken(lock: IO[str]) -> bool:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def is_locked(path: Path) -> bool:
-    """Whether a living process holds the lock in the file `path`; a killed one holds none."""
-    try:
-        with path.open("r") as lock:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except BlockingIOError:
-        return True
-    return False
+__all__ = ["RobotLocks"]
 
 
 class RobotLocks:
@@ -79,8 +34,14 @@ class RobotLocks:
                     "flight is over"
                 )
                 held.enter_context(exclusive(self._folder / robot, refusal))
+                if is_locked(actor_lock(self._folder, robot)):
+                    raise MissionError(refusal)
             yield
 
     def held(self, robots: Collection[str]) -> set[str]:
         """Those of `robots` whose lock a living process holds."""
-        return {robot for robot in robots if is_locked(self._folder / robot)}
+        return {
+            robot
+            for robot in robots
+            if is_locked(self._folder / robot) or is_locked(actor_lock(self._folder, robot))
+        }

@@ -134,6 +134,7 @@ class Flying:
                 seed=order.seed,
                 record=self._folder.recording,
                 address=order.address,
+                locks=None if order.rehearsal else order.locks,
                 edge=None if order.edge is None else EdgeShare(**dict(order.edge)),
                 view=False,
                 report=None if order.rehearsal or order.attached else "page",
