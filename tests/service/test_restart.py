@@ -137,6 +137,9 @@ def test_no_flight_begins_on_a_drone_that_a_living_process_flies(
         mission, other = desk.submit("one"), desk.submit("two")
         desk.turns()
         assert desk.phase(mission) is MissionPhase.QUEUED
+        lease = desk.desk.shown(mission.id).lease
+        assert lease is not None
+        assert desk.bookings.lease(lease).state is LeaseState.QUEUED
         assert desk.phase(other) is MissionPhase.FLYING
         flight.kill()
         flight.wait()
