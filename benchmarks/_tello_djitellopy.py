@@ -12,7 +12,7 @@ from djitellopy.tello import BackgroundFrameRead
 
 _WARM_UP = 2.0
 """Seconds: FFmpeg looks at the stream first, and then has a queue to work off."""
-_STAMP = Path(__file__).resolve().parent.parent / "aerodaas/testing/tello/stamp.py"
+_STAMP = Path(__file__).resolve().parent.parent / "tools/tello_vehicle/stamp.py"
 
 
 def main() -> None:

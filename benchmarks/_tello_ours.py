@@ -8,8 +8,8 @@ import time
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.camera import TelloCamera
-from aerodaas.testing.tello.stamp import read_age
 from aerodaas.types.clock import NANOSECONDS
+from tools.tello_vehicle.stamp import read_age
 
 _WARM_UP = 2.0
 """Seconds, as for the other reader."""

@@ -91,7 +91,7 @@ def _measure(
 ) -> dict[str, dict[str, Any]]:
     tello = _start(
         [
-            *(sys.executable, "-m", "aerodaas.testing.tello", "--port", "0", "--source", "clock"),
+            *(sys.executable, "-m", "tools.tello_vehicle", "--port", "0", "--source", "clock"),
             *("--width", str(size[0]), "--height", str(size[1]), "--copy-to", str(theirs)),
         ]
     )

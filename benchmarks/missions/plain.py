@@ -27,8 +27,6 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.simulation.phone import write_log
 from aerodaas.simulation.world import World
-from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
-from aerodaas.testing.tello.video import VideoStream
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import GeodeticOrigin
 from missions.catalogue import ADDED, APPS, MISSIONS
@@ -36,6 +34,8 @@ from missions.criteria import Check
 from missions.evidence import Evidence
 from missions.witness import Witness
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.tello_vehicle import EmulatedTello, TelloOptions, VideoOptions
+from tools.tello_vehicle.video import VideoStream
 
 __all__ = ["BASELINES", "Baseline", "PlainFlight", "fly"]
 

@@ -16,11 +16,11 @@ from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.testing.tello import EmulatedTello
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import MeasuredVehicle
 from aerodaas.types.vehicle import Vehicle, VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.tello_vehicle import EmulatedTello
 
 LOOPBACK = "127.0.0.1"
 SETTING = {"fallback": "set", "failsafes": "set", "fence": "land", "role": "ground_station"}

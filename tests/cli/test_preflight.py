@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from aerodaas.cli.app import main
-from aerodaas.testing.tello import EmulatedTello
+from tools.tello_vehicle import EmulatedTello
 
 DRONE: dict[str, Any] = {"id": "drone"}
 

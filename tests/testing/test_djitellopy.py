@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 from required import needs_peer, peer
 
-from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
 from aerodaas.types.vehicle import VehicleMode
+from tools.tello_vehicle import EmulatedTello, TelloOptions, VideoOptions
 
 PYTHON = peer("AERODAAS_DJITELLOPY")
 

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.testing.channel import Channel
-from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
-from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.sdk import TelloSdk
 from aerodaas.types.vehicle import VehicleMode
+from tools.tello_vehicle import EmulatedTello, Impairment, TelloOptions, VideoOptions
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.sdk import TelloSdk
 
 pytestmark = pytest.mark.wall_clock
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.testing.emulated import watch
+from tools.emulated import watch
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot, Impairment
 from tools.mavlink_vehicle.aircraft import EmulatedAircraft
 

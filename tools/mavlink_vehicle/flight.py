@@ -11,10 +11,10 @@ from aerodaas.simulation.autopilot import FlightLimits, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
 from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
-from aerodaas.testing.emulated import EmulatedFlight
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import GeodeticOrigin, Vector, enu_to_ned, wrap_angle
 from aerodaas.types.vehicle import VehicleMode
+from tools.emulated import EmulatedFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 
 __all__ = ["GuidedTarget", "MavFlight"]

@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from aerodaas.testing.tello import EmulatedTello
+from tools.tello_vehicle import EmulatedTello
 
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
 

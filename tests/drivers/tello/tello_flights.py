@@ -12,8 +12,8 @@ from typing import Any
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.testing.tello import EmulatedTello, TelloOptions
 from aerodaas.types.vehicle import VehicleMode, VehicleState
+from tools.tello_vehicle import EmulatedTello, TelloOptions
 
 __all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of", "wait_for"]
 

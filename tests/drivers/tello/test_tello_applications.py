@@ -13,7 +13,7 @@ from tello_evidence import TelloWitness
 from tello_flights import free_port
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
+from tools.tello_vehicle import EmulatedTello, TelloOptions, VideoOptions
 
 from missions.catalogue import MISSIONS  # isort: skip - found by tello_evidence
 

@@ -10,8 +10,8 @@ from tello_flights import flight
 
 from aerodaas.drivers.tello.phase import FlightPhase
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.testing.tello import Impairment, TelloOptions
 from aerodaas.types.vehicle import FlightEnd, VehicleMode
+from tools.tello_vehicle import Impairment, TelloOptions
 
 
 def standing(motor_time: float = 0.0) -> TelloState:

@@ -19,8 +19,8 @@ from aerodaas.drivers.tello.commands import (
     ports,
 )
 from aerodaas.drivers.tello.state import parse_state
-from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import TelloOptions
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.options import TelloOptions
 
 WHOLE = (
     b"mid:-1;x:-100;y:-100;z:-100;mpry:0,0,0;pitch:-5;roll:2;yaw:-90;vgx:3;vgy:-2;vgz:-10;"

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from aerodaas.drivers.tello.commands import BodyMotion, Sticks, StickScale
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.state import parse_state
-from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import TelloOptions
 from aerodaas.types.geometry import wrap_angle
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.options import TelloOptions
 
 SCALE = StickScale(speed=1.0, climb=1.0, turn=math.radians(100))
 TICK = 0.05

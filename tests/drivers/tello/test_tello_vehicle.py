@@ -12,7 +12,6 @@ from tello_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions
 from aerodaas.types.clock import ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import Vector
@@ -25,6 +24,7 @@ from aerodaas.types.vehicle import (
     VehicleMode,
     VelocitySetpoint,
 )
+from tools.tello_vehicle import EmulatedTello, Impairment, TelloOptions
 
 pytestmark = pytest.mark.wall_clock
 

@@ -13,8 +13,8 @@ from av import logging as av_logging
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.tello.camera import TelloCamera
-from aerodaas.testing.tello.video import packets
 from tools.fuzz.flight import require
+from tools.tello_vehicle.video import packets
 
 __all__ = ["mutate", "run", "seeds"]
 

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import TelloOptions
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.options import TelloOptions
 
 __all__ = ["Outcome", "TelloSdk"]
 

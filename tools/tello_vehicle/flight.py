@@ -10,10 +10,10 @@ from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
 from aerodaas.simulation.wind import Wind
-from aerodaas.testing.emulated import EmulatedFlight
-from aerodaas.testing.tello.options import TelloOptions
 from aerodaas.types.geometry import enu_to_body, wrap_angle
 from aerodaas.types.vehicle import VehicleMode
+from tools.emulated import EmulatedFlight
+from tools.tello_vehicle.options import TelloOptions
 
 __all__ = ["TelloFlight"]
 

@@ -10,13 +10,13 @@ import time
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
-from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
-from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import TelloOptions
-from aerodaas.testing.tello.sdk import Outcome, TelloSdk
-from aerodaas.testing.tello.video import VideoStream
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle import VehicleMode
+from tools.emulated import LONGEST_LEAP, EmulatedVehicle
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.options import TelloOptions
+from tools.tello_vehicle.sdk import Outcome, TelloSdk
+from tools.tello_vehicle.video import VideoStream
 
 __all__ = ["EmulatedTello"]
 

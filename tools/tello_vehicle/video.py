@@ -15,9 +15,9 @@ import av
 from av.video.codeccontext import VideoCodecContext
 
 from aerodaas.testing.channel import Channel
-from aerodaas.testing.tello.options import TelloOptions, VideoOptions
-from aerodaas.testing.tello.pictures import picture_source
 from aerodaas.types.data import Odometry
+from tools.tello_vehicle.options import TelloOptions, VideoOptions
+from tools.tello_vehicle.pictures import picture_source
 
 __all__ = ["VideoStream", "packets"]
 

@@ -1,7 +1,7 @@
 """An emulated Tello with the SDK's protocol on loopback, flight dynamics and video."""
 
 from aerodaas.testing.channel import Impairment
-from aerodaas.testing.tello.emulator import EmulatedTello
-from aerodaas.testing.tello.options import TelloOptions, VideoOptions
+from tools.tello_vehicle.emulator import EmulatedTello
+from tools.tello_vehicle.options import TelloOptions, VideoOptions
 
 __all__ = ["EmulatedTello", "Impairment", "TelloOptions", "VideoOptions"]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from aerodaas.cameras.simulated import SimulatedCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
-from aerodaas.testing.tello.options import VideoOptions
-from aerodaas.testing.tello.stamp import write_stamp
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Odometry
+from tools.tello_vehicle.options import VideoOptions
+from tools.tello_vehicle.stamp import write_stamp
 
 __all__ = ["PictureSource", "picture_source"]
 

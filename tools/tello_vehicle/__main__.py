@@ -1,4 +1,4 @@
-"""Switch an emulated Tello on: `python -m aerodaas.testing.tello --port 8889`."""
+"""Switch an emulated Tello on: `python -m tools.tello_vehicle --port 8889`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import typer
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located
-from aerodaas.testing.emulated import watch
-from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
 from aerodaas.types.errors import AeroDaaSError
+from tools.emulated import watch
+from tools.tello_vehicle import EmulatedTello, Impairment, TelloOptions, VideoOptions
 
 
 def main(
