@@ -2,7 +2,8 @@
 
 The application's process creates all actors at once, then calls on each `prepare` (open models
 and cameras, join the streams), `start` (run in a thread of the actor's own), any number of
-`report`, and `stop`. An actor restarted by Ray begins again with `prepare`.
+`report`, and `stop`. An actor restarted by Ray begins again with `prepare`, and one that joins in
+flight begins there; both get the mission's time before, by `set_origin`.
 """
 
 from __future__ import annotations
@@ -177,10 +178,14 @@ class StreamActor:
                 RemoteReader(actor, self.most_under_way) for actor in actors
             ]
 
-    def start(self, origin_ns: int) -> None:
-        """Start the actor's thread; mission time is zero at host time `origin_ns`."""
+    def set_origin(self, origin_ns: int) -> None:
+        """Count mission time from host time `origin_ns`; until then it stands at zero."""
         self.session = self.session.starting_at(origin_ns)
         self.clock = self.session.clock()
+
+    def start(self, origin_ns: int) -> None:
+        """Start the actor's thread; mission time is zero at host time `origin_ns`."""
+        self.set_origin(origin_ns)
         self._phase = "running"
         self._thread = threading.Thread(target=self._guard, name=self.name, daemon=True)
         self._thread.start()

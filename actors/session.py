@@ -11,14 +11,7 @@ from pathlib import Path
 from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
-from aerodaas.types.clock import (
-    NANOSECONDS,
-    Clock,
-    HostEpoch,
-    LockstepClock,
-    ScaledClock,
-    host_time_ns,
-)
+from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, LockstepClock, ScaledClock
 
 __all__ = [
     "CONTROL_PERIOD_NS",
@@ -50,8 +43,8 @@ class Session:
     """Mission seconds per wall second; None for lockstep."""
     id: str = field(default_factory=lambda: f"aerodaas/{uuid.uuid4().hex[:12]}")
     """Prefix of the run's stream names; unique on a host."""
-    origin_ns: int = field(default_factory=host_time_ns)
-    """Host time at which mission time is zero."""
+    origin_ns: int | None = None
+    """Host time at which mission time is zero; None before the start, while it stands at zero."""
     timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     """Sorted timestamps in nanoseconds at which sources without a rate are due."""
     edge: EdgeShare | None = None
@@ -98,7 +91,7 @@ class Session:
 
     def clock(self) -> Clock:
         """New mission clock for a process of this run."""
-        if self.speed is None:
+        if self.speed is None or self.origin_ns is None:
             return LockstepClock()
         return ScaledClock(self.speed, self.origin_ns)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -191,6 +191,8 @@ class VehicleController:
         """Start the mission with the time of `clock`."""
         if isinstance(self.vehicle, ClockedVehicle):
             self.vehicle.use_clock(clock)
+            # It was read while connecting, by the vehicle's own clock.
+            self.state = replace(self.state, stamp=clock.now())
         self._publish_takeoff(clock.now())
         self.handle(Start(), clock.now())
 

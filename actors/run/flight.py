@@ -474,6 +474,9 @@ class Flight:
     def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
         # Before the calls: on a busy machine the first is done before the last is made.
         began = host_time_ns()
+        if self._origin:
+            for member in members:
+                member.handle.set_origin.remote(self._origin)
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
         deadline = time.monotonic() + _PREPARE_TIMEOUT
         while waiting:
@@ -575,6 +578,7 @@ class Flight:
                         # It knows what was there at the start.
                         self._inform_reaper()
                     ray.get(actor.learn.remote(self.plan.session.application))
+                    ray.get(actor.set_origin.remote(self._origin))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:
                         member.info = ray.get(actor.listen.remote(member.further))

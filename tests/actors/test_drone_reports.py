@@ -23,6 +23,7 @@ from aerodaas.actors.stream_names import state_stream
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
 
@@ -46,7 +47,7 @@ def test_reading_never_meets_a_mission_that_changes(speed: float | None) -> None
     Reports are whole: the target is not among what is pending, nothing is visited twice.
     """
     actor = drone_by_hand(AddNavigation(_square("first")), speed=speed, mission=_HOLD)
-    actor.start(actor.session.origin_ns)
+    actor.start(host_time_ns())
     done = threading.Event()
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-5)
@@ -91,7 +92,7 @@ def test_a_report_says_what_a_command_did_as_soon_as_it_is_answered() -> None:
     """Who commands and then reads sees its own command's effect."""
     actor = drone_by_hand(AddNavigation(hop((5, 0), hover=900)), speed=1.0, mission=_HOLD)
     assert actor.robots()["drone"].status.state is MissionState.IDLE
-    actor.start(actor.session.origin_ns)
+    actor.start(host_time_ns())
     assert actor.command("drone", AddNavigation(_square("more"))).accepted
     assert len(actor.robots()["drone"].status.pending) == 5
     assert actor.command("drone", ClearNavigation()).accepted
@@ -185,7 +186,7 @@ def test_latencies_kept_do_not_grow_with_the_flight() -> None:
 def test_a_change_is_told_to_a_call_that_waits() -> None:
     """A command's effect answers the call, which otherwise waits; the end answers it, too."""
     actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0, mission=_HOLD)
-    actor.start(actor.session.origin_ns)
+    actor.start(host_time_ns())
     known = 0
     while actor.robots()["drone"].status.state is not MissionState.TAKING_OFF:
         known = actor.await_change(known, 60.0)
@@ -227,6 +228,28 @@ def test_an_alert_in_the_same_words_is_told_again_only_after_a_while() -> None:
     told = [one for one in actor.report().alerts if one.text == "the same"]
     assert [one.header.stamp // second for one in told] == [0, 5, 10]
     assert len(actor.report().alerts) == 15
+    actor.stop()
+
+
+def test_what_is_told_while_connecting_has_the_missions_time() -> None:
+    """Mission time stands at zero before the start, however long that takes."""
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0)
+    actor.alert("kind", "before")
+    actor.start(host_time_ns())
+    actor.alert("kind", "after")
+    before, after = (one for one in actor.report().alerts if one.kind == "kind")
+    assert before.header.stamp == 0
+    assert after.header.stamp > 0
+    _land(actor)
+
+
+def test_what_joins_in_flight_has_the_missions_time_before_it_starts() -> None:
+    """An actor that is restarted opens its work in the middle of a mission."""
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=2.0)
+    actor.set_origin(host_time_ns() - 30 * NANOSECONDS)
+    actor.alert("kind", "while opening")
+    (alert,) = (one for one in actor.report().alerts if one.kind == "kind")
+    assert alert.header.stamp >= 60 * NANOSECONDS
     actor.stop()
 
 
