@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
 import threading
 import time
@@ -10,13 +9,15 @@ from collections.abc import Callable
 
 from aerodaas.actors.cluster.handshake import listener_of
 
-__all__ = ["HeadWatch"]
+__all__ = ["HeadWatch", "answers"]
 
-_EVERY = 2.0
-_PATIENCE = 3.0
-"""Timeout of a connection in seconds."""
-_LOST_AFTER = 10.0
-"""Seconds without an answer before the alert."""
+_EVERY = 0.5
+_PATIENCE = 2.0
+"""Timeout of an answer in seconds: enough for a packet that is lost once."""
+_LOST_AFTER = 4.0
+"""Seconds without an answer before the alert, which is told within five."""
+_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+"""First bytes of an HTTP/2 client, which a gRPC server answers."""
 
 
 class HeadWatch:
@@ -43,7 +44,7 @@ class HeadWatch:
     def _watch(self, listener: tuple[str, int]) -> None:
         answered = time.monotonic()
         while not self._ended.wait(_EVERY):
-            if _answers(listener):
+            if answers(listener):
                 if self.lost:
                     away = time.monotonic() - answered
                     self.lost = False
@@ -58,8 +59,17 @@ class HeadWatch:
                 )
 
 
-def _answers(listener: tuple[str, int]) -> bool:
-    with contextlib.suppress(OSError):
-        socket.create_connection(listener, timeout=_PATIENCE).close()
-        return True
-    return False
+def answers(listener: tuple[str, int]) -> bool:
+    """Whether a gRPC server answers at this host and port, with or without TLS.
+
+    A connection alone is no answer: of a process that hangs, the kernel accepts it.
+    """
+    try:
+        with socket.create_connection(listener, timeout=_PATIENCE) as link:
+            link.sendall(_PREFACE)
+            link.recv(1)
+    except ConnectionResetError:
+        return True  # a server that expects TLS hangs up
+    except OSError:
+        return False
+    return True

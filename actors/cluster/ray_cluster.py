@@ -14,7 +14,8 @@ from typing import Any, Literal
 import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from aerodaas.actors.cluster.handshake import greet, hushed
+from aerodaas.actors.cluster.handshake import greet, hushed, listener_of
+from aerodaas.actors.cluster.head_watch import answers
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_internals import forbid_start, silence_nodes
 from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES, VARIABLES
@@ -159,12 +160,19 @@ def _require_edge(address: str) -> None:
 
 def disconnect() -> None:
     """Leave Ray; a local one ends at once or after the last drone has landed."""
-    global _local  # noqa: PLW0603 - one Ray for each process
-    ray.shutdown()
-    if _local is not None:
-        atexit.unregister(disconnect)
-        _local.end()
-        _local = None
+    global _local
+    local, _local = _local, None
+    if local is None:
+        ray.shutdown()
+        return
+    atexit.unregister(disconnect)
+    ends = [ray.shutdown, local.end]
+    listener = listener_of(local.address) if ray.is_initialized() else None
+    if listener is not None and not answers(listener):
+        # Ray waits without end for a head that hangs, but not for one that has ended.
+        ends.reverse()
+    for end in ends:
+        end()
 
 
 def discover() -> list[ComputeConfig]:

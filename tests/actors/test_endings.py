@@ -153,6 +153,22 @@ def test_a_signal_in_its_own_code(
     assert reasons == [reason]
 
 
+def test_a_head_that_hangs_keeps_nobody_waiting(tmp_path: Path) -> None:
+    """It is told in flight; after the landing the application ends, and no process is left."""
+    ending = "time.sleep(10); drone.end_mission(); drone.wait()"
+    with running(tmp_path, ending, "--no-view") as process:
+        airborne(process)
+        processes = everyone(process)
+        (head,) = (one for one in processes if one.name() == "gcs_server")
+        head.suspend()
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+    assert "the flight goes on without it" in said
+    assert str(tmp_path / "out" / "flight.mcap") in said
+    landed(tmp_path)
+    require_gone(processes, 20.0)
+
+
 def test_a_second_interrupt_leaves_the_drone_to_itself(tmp_path: Path) -> None:
     """The application returns at once and says so; the drone lands, and then nothing is left."""
     with running(tmp_path, "drone.wait()") as process:
