@@ -182,7 +182,9 @@ class RecorderActor(ReaperHost, StreamActor):
                 self._lost[stream] = dropped
 
     def _close(self) -> None:
-        self._summary = self._recorder.close()
+        summary = self._recorder.close()
+        if summary.stopped and self._error is None:
+            self._error = RecordingError(summary.stopped)
         self._album.close()
         if self._live is not None:
             self._live.close()

@@ -33,7 +33,13 @@ from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.environment_options import environment_options
 from aerodaas.actors.run.flight_state import FlightState
 from aerodaas.actors.run.growth import Growth, growth
-from aerodaas.actors.run.losses import DeadError, SilentError, SuspensionMonitor, drone_lost
+from aerodaas.actors.run.losses import (
+    DeadError,
+    SilentError,
+    SuspensionMonitor,
+    actor_silent,
+    drone_lost,
+)
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.actors.run.shutdown import end_actors, may_fly
@@ -43,6 +49,7 @@ from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["Flight"]
@@ -50,8 +57,13 @@ __all__ = ["Flight"]
 _PREPARE_TIMEOUT = 90.0
 _GROWING = 10.0
 """Timeout in wall seconds of a change in flight, and of holding mission time for it."""
+_LOOK_TIMEOUT = 1.0
+"""Timeout in seconds of a drone's actor that has answered before, so that others are looked at."""
+_SILENT_AFTER = 3.0
+"""Seconds without a report of an actor before the alert, which is told within five."""
 _SILENT_FOR = 30.0
 """Seconds without an answer of a drone's actor after which the run has failed; it flies on."""
+_NOTES_KEPT = 50
 _REPORT_INTERVAL = 0.5
 _HELD = 10.0
 """Wall seconds for which a drone's actor holds a call that waits for a change."""
@@ -107,6 +119,11 @@ class Flight:
         else:
             self._reaper = self._create_reaper()
         self._origin = 0
+        self._notes: list[Alert] = []
+        """Alerts of the application's process; appended to by any thread."""
+        self._recordings: list[Path] = [] if self.recording is None else [self.recording]
+        self._changing = False
+        """Whether a change keeps actors from answering."""
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
@@ -147,6 +164,7 @@ class Flight:
         for member in reversed(members):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
+            member.answered_at = time.monotonic()
         mortal = {member.name: member.handle for member in members if member.restarts}
         self._liveness_monitor.append(LivenessMonitor(mortal, self._life_of))
 
@@ -167,7 +185,17 @@ class Flight:
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         if not self._drones:
             over = self._sensed or self._cameras_finished()
-        return FlightState(robots, self.reports(), over)
+        return FlightState(robots, self.reports(), over, self.notes)
+
+    @property
+    def notes(self) -> tuple[Alert, ...]:
+        """The newest alerts of the application's process."""
+        return tuple(self._notes[-_NOTES_KEPT:])
+
+    @property
+    def recordings(self) -> tuple[Path, ...]:
+        """Files of the recording, in their order: a recorder that was restarted begins another."""
+        return tuple(self._recordings)
 
     def end_sensing(self) -> None:
         """End a run without drones, which otherwise goes on as long as its cameras."""
@@ -198,14 +226,20 @@ class Flight:
 
     def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
         """Reports of a drone's actor; the last ones while it is too busy to answer."""
-        before = self._answers.get(name)
+        member, before = self._members[name], self._answers.get(name)
+        asked = member.handle.robots.remote(newest)
         try:
-            robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
+            robots: dict[str, RobotReport] = (
+                ask(asked) if before is None else ask(asked, _LOOK_TIMEOUT)
+            )
         except DeadError:
-            raise self._drone_lost(self._members[name]) from None
+            raise self._drone_lost(member) from None
         except SilentError:
-            if before is None or time.monotonic() - before[0] > _SILENT_FOR:
+            if before is None:
                 raise
+            silent = time.monotonic() - before[0]
+            if silent > _SILENT_FOR:
+                raise actor_silent(name, member.report, silent) from None
             return before[1]
         self._answers[name] = time.monotonic(), robots
         return robots
@@ -248,19 +282,31 @@ class Flight:
         drones = [self._members[name].handle for name in sorted(self._ids())]
         held = drones if plan.conduct is not None else []
         try:
+            self._changing = True
             if not all(ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
                 raise MissionError("the mission did not come to rest, so nothing can join it")
             self._join(change, plan)
         finally:
             for drone in held:
                 drone.release.remote()
+            self._end_change()
         self.plan = plan
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
         """Use the trajectory scheduler `scheduler` for all robots from now on."""
-        for name in sorted(self._ids()):
-            handle = self._members[name].handle
-            ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
+        self._changing = True
+        try:
+            for name in sorted(self._ids()):
+                handle = self._members[name].handle
+                ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
+        finally:
+            self._end_change()
+
+    def _end_change(self) -> None:
+        """Expect reports of all actors again, from now on."""
+        for member in self._members.values():
+            member.answered_at = time.monotonic()
+        self._changing = False
 
     def _join(self, change: Growth, plan: FlightPlan) -> None:
         known = set(self._members)
@@ -345,7 +391,20 @@ class Flight:
         last = end_actors([self._ended_first(), [self._reaper]], self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
+            self._note_file(member)
+        recorder = self._members.get("recorder")
+        if recorder is not None and recorder.handle not in last and recorder.report.error is None:
+            files = ", ".join(map(str, self._recordings))
+            error = MissionError(
+                f"the recorder did not answer at the end: {files} may lack the end of the flight"
+            )
+            recorder.report = replace(recorder.report, error=error)
         return self.reports()
+
+    def _note_file(self, member: Member) -> None:
+        path = member.report.values.get("path") if member.name == "recorder" else None
+        if path is not None and Path(path) not in self._recordings:
+            self._recordings.append(Path(path))
 
     def leave(self) -> None:
         """Leave the drones and all other actors to the orphan reaper."""
@@ -505,10 +564,12 @@ class Flight:
                 member.pending = member.handle.report.remote()
             ready, _ = ray.wait([member.pending], timeout=0.05)
             if not ready:
+                self._report_silence(member)
                 continue
             member.pending = None
             try:
                 member.report = ray.get(ready[0])
+                self._note_answer(member)
             except RayActorError:
                 if member.name in self._ids():
                     raise self._drone_lost(member) from None
@@ -519,6 +580,26 @@ class Flight:
                 # A failed report of an actor must not end the supervision of the drones.
                 reason = MissionError(f"no report from {member.name}: {error.cause}")
                 member.report = replace(member.report, error=reason)
+
+    def _report_silence(self, member: Member) -> None:
+        """Raise an alert, once, for an actor that lives and has not answered for too long."""
+        silence = time.monotonic() - member.answered_at
+        expected = member.report.phase == "running" and not self._changing
+        if member.silent or member.lost_at is not None or not expected or silence < _SILENT_AFTER:
+            return
+        # An application that was suspended itself has not had the time to hear it.
+        if ray.wait([member.pending], timeout=_LOOK_TIMEOUT / 2)[0]:
+            return
+        member.silent = True
+        self.note("actor_silent", str(actor_silent(member.name, member.report, silence)))
+
+    def _note_answer(self, member: Member) -> None:
+        if member.silent:
+            member.silent = False
+            absence = time.monotonic() - member.answered_at
+            self.note("actor_back", f"{member.name} answers again after {absence:.1f} s")
+        member.answered_at = time.monotonic()
+        self._note_file(member)
 
     def _record_vitals(self) -> None:
         """Send the vitals of all processes to the recorder, which cannot query other nodes."""
@@ -553,7 +634,8 @@ class Flight:
     def _back(self, member: Member) -> None:
         if member.lost_at is not None:
             absence = time.monotonic() - member.lost_at
-            member.lost_at = None
+            member.lost_at, member.silent = None, False
+            member.answered_at = time.monotonic()
             member.report = ActorReport("running")
             self._wait_no_longer()
             self.note("actor_back", f"{member.name} is back after {absence:.1f} s")
@@ -564,7 +646,19 @@ class Flight:
                 self._members[name].handle.wait_no_longer.remote()
 
     def note(self, kind: str, text: str) -> None:
-        """Publish an alert of the application's process."""
+        """Publish an alert of the application's process; in any thread.
+
+        It is told here at once, and recorded by way of the drones' actors, which may hang.
+        """
+        stamps = [
+            report.status.stamp
+            for _, reports in tuple(self._answers.values())
+            for report in reports.values()
+        ]
+        # In lockstep, time follows the drones; else it goes on by itself.
+        clock = self.plan.session.starting_at(self._origin).clock()
+        header = Header(len(self._notes), max([clock.now(), *stamps]), "application")
+        self._notes.append(Alert(header, kind, text))
         for name in self._ids():
             self._members[name].handle.note.remote(kind, text)
 

@@ -19,9 +19,18 @@ class FlightState:
     reports: dict[str, ActorReport]
     over: bool
     """True after every mission has ended."""
+    notes: tuple[Alert, ...] = ()
+    """The newest alerts of the application's own process."""
 
     @property
     def alerts(self) -> list[Alert]:
-        """The newest alerts of all actors, oldest first."""
-        alerts = [alert for report in self.reports.values() for alert in report.alerts]
-        return sorted(alerts, key=lambda alert: alert.header.stamp)
+        """The newest alerts of all actors and of the application's process, oldest first."""
+        noted = {(note.kind, note.text) for note in self.notes}
+        alerts = [
+            alert
+            for report in self.reports.values()
+            for alert in report.alerts
+            # The drones' actors repeat the application's, so that they are recorded.
+            if (alert.kind, alert.text) not in noted
+        ]
+        return sorted([*self.notes, *alerts], key=lambda alert: alert.header.stamp)

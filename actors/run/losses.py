@@ -7,7 +7,14 @@ import time
 from aerodaas.actors.base import ActorReport
 from aerodaas.types.errors import MissionError
 
-__all__ = ["ALONE", "DeadError", "SilentError", "SuspensionMonitor", "drone_lost"]
+__all__ = [
+    "ALONE",
+    "DeadError",
+    "SilentError",
+    "SuspensionMonitor",
+    "actor_silent",
+    "drone_lost",
+]
 
 ALONE = "alone"
 """Key of a drone actor's report: each vehicle's behaviour without its actor, by robot."""
@@ -47,6 +54,16 @@ class SuspensionMonitor:
         self._last = now
 
 
+def actor_silent(name: str, report: ActorReport, seconds: float) -> MissionError:
+    """Error for the actor `name`, which has not answered for so many seconds, but has not died."""
+    hence = "its work is not done meanwhile"
+    if name == "recorder":
+        hence = "what happens meanwhile may be missing in the recording"
+    elif ALONE in report.values:
+        hence = f"it obeys no command, take over by other means; {_behaviour(report)}"
+    return MissionError(f"the actor {name} has not answered for {seconds:.0f} s: {hence}")
+
+
 def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
     """Error for the lost drone actor `name`; `report` is its last one, `frozen` in seconds."""
     robots = ", ".join(name.rpartition("/")[2].split("+"))
@@ -55,6 +72,10 @@ def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
             f"{robots}: this application did not run for {frozen:.0f} s, after which a drone comes "
             "home by itself; its processes have ended"
         )
+    return MissionError(f"the actor of {robots} died: {_behaviour(report)}")
+
+
+def _behaviour(report: ActorReport) -> str:
+    """What vehicles do without their actor."""
     alone = report.values.get(ALONE, {})
-    what = "; ".join(dict.fromkeys(alone.values())) or "its own failsafe is what remains"
-    return MissionError(f"the actor of {robots} died: {what}")
+    return "; ".join(dict.fromkeys(alone.values())) or "its own failsafe is what remains"

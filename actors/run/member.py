@@ -36,6 +36,10 @@ class Member:
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
+    answered_at: float = 0.0
+    """Host's monotonic seconds of its last report."""
+    silent: bool = False
+    """Whether it was reported that it does not answer."""
     lost_at: float | None = None
     """Host's monotonic seconds at which its death was detected; None while it is alive."""
 

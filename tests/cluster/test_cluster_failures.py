@@ -16,6 +16,7 @@ from flying import Flyer
 from required import needs_root
 
 from aerodaas.actors.cluster import ray_cluster as cluster
+from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
 from tools.namespaces import EdgeCloud, Shape
 
@@ -256,7 +257,7 @@ def test_the_object_store_is_full(watched: Watched) -> None:
 
 
 def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
-    """The recording stops and says so; the flight does not."""
+    """The recording stops and says so; the flight does not, and then the run has failed."""
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
@@ -266,14 +267,19 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
     try:
         record = watched.flyer.folder / "flight"
         record.symlink_to(disk)
-        with watched.flying(settle=0.0):
-            eventually(lambda: bool(watched.run.look().reports["recorder"].values["failure"]))
-            watched.goes_on()
+        with pytest.raises(MissionError, match="No space left"):
+            _fly_until_full(watched)
         assert watched.run.state is not None
         assert watched.run.state.robots["drone"].status.state is MissionState.LANDED
         assert "No space left" in watched.run.reports()["recorder"].values["failure"]
     finally:
         subprocess.run(["umount", str(disk)], check=True)  # noqa: S607
+
+
+def _fly_until_full(watched: Watched) -> None:
+    with watched.flying(settle=0.0):
+        eventually(lambda: bool(watched.run.look().reports["recorder"].values["failure"]))
+        watched.goes_on()
 
 
 def test_a_cloud_node_is_killed(watched: Watched) -> None:
