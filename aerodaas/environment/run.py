@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aerodaas.actors.run.checks import check_served
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+    from aerodaas.terminal.console import FlightView
 
 __all__ = ["Run"]
 
@@ -52,7 +55,7 @@ _LOOK_SECONDS = 1.0
 """Wall seconds between two looks at missions in which nothing changes."""
 _VIEW_SECONDS = 0.25
 """The same where a terminal shows them move."""
-_BEAT_SECONDS = 1.0
+_BEAT_SECONDS = 0.5
 _BEAT_AGE = 1.5
 """Wall seconds after the last look at which a heartbeat needs one of its own."""
 _LANDING_SECONDS = 60.0
@@ -77,7 +80,8 @@ class Run:
         self._console: ConsoleServer | None = None
         self._environment = environment
         self._flight: Flight | None = None
-        self._over = False
+        self._view: FlightView
+        self._over = self._awaited = False
         self._finished = threading.Event()
         self._polling = threading.Lock()
         self._began = time.monotonic()
@@ -100,7 +104,7 @@ class Run:
         )
         from aerodaas.actors.run.live import LiveReader  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
-        from aerodaas.terminal.console import StartupView  # noqa: PLC0415
+        from aerodaas.terminal.console import FlightView, StartupView  # noqa: PLC0415
 
         # Before Ray, which takes seconds to start: errors of the graph should appear at once.
         self._check_served()
@@ -117,7 +121,7 @@ class Run:
         from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
 
         with StartupView(self.options) as starting:
-            starting.step("starting Ray")
+            starting.begin("starting Ray")
             cluster.connect(self.options.address)
             raise_on_signals()
             provenance = Provenance.collect(
@@ -128,6 +132,7 @@ class Run:
             )
             options = self.options
             flight = Flight(plan, self.recording, provenance, LiveViews(options.live, options.ros2))
+            starting.begin("opening vehicles, cameras and models")
             try:
                 flight.launch(starting.step)
             except BaseException:
@@ -135,6 +140,7 @@ class Run:
                 if console is not None:
                     console.close()
                 raise
+        self._view = FlightView(self.options, self.config)
         self._flight = flight
         self._launched = time.monotonic()
         session = plan.session
@@ -264,19 +270,23 @@ class Run:
         with self._polling:
             self._looked = time.monotonic()
             self.state = self._flight.poll(newest)
+            self._view.print_alerts(self.state)
         self._over = self.state.over
         return self.state
 
     def _keep_alive(self) -> None:
-        """Send the drones heartbeats, also while the application is busy."""
+        """Send the drones heartbeats and print alerts, also while the application is busy."""
+        said = ""
         while not self._finished.wait(_BEAT_SECONDS):
             if time.monotonic() - self._looked < _BEAT_AGE:
                 continue
             try:
                 self.look()
-            except AeroDaaSError:
-                # The thread that waits for the run meets the same error and handles it.
-                continue
+            except AeroDaaSError as error:
+                # A thread that waits for the run meets the same error and raises it.
+                if not self._awaited and str(error) != said:
+                    said = str(error)
+                    self._view.say(said)
             except Exception:
                 assert self._flight is not None  # noqa: S101 - launched
                 if self._flight.reachable:
@@ -298,6 +308,7 @@ class Run:
         if self._finished.is_set():
             return
         assert self._flight is not None  # noqa: S101 - launched
+        self._awaited = True
         try:
             self._watch(float("inf"))
         except KeyboardInterrupt:
@@ -418,10 +429,8 @@ class Run:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"
 
     def _watch(self, until: float) -> None:
-        from aerodaas.terminal.console import FlightView  # noqa: PLC0415
-
         assert self._flight is not None  # noqa: S101 - launched
-        with FlightView(self.options, self.config) as watching:
+        with self._view as watching:
             while time.monotonic() < until:
                 state = self.look()
                 watching.update(state)
@@ -432,12 +441,12 @@ class Run:
     def _land(self, reason: str) -> None:
         """Land every drone, and wait for a limited time."""
         assert self._flight is not None  # noqa: S101 - launched
-        try:
-            for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):
+        for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):
+            # One that does not answer keeps no other one in the air.
+            with contextlib.suppress(AeroDaaSError):
                 self._flight.command(robot, End(reason))
+        with contextlib.suppress(AeroDaaSError):
             self._watch(time.monotonic() + _LANDING_SECONDS)
-        except AeroDaaSError:
-            return
 
     def _finish(self) -> None:
         from aerodaas.terminal.console import (  # noqa: PLC0415
@@ -458,9 +467,13 @@ class Run:
         with self._polling:
             if self._flight.flying:
                 self._flight.leave()
-                show_left(self._flight.recording)
+                show_left(self._flight.recordings)
                 return
-            self._flight.stop()
+            reports = self._flight.stop()
+        if self.state is not None:
+            # What was told at the very end.
+            self.state = replace(self.state, reports=reports, notes=self._flight.notes)
+            self._view.print_alerts(self.state)
         for hook in self.on_end:
             hook()
         stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
@@ -468,9 +481,9 @@ class Run:
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
         source = self.config.recording.application_source
-        show_results(self.options, self._flight.recording, source_recorded=source)
+        show_results(self.options, self._flight.recordings, source_recorded=source)
         if self._flight.headless:
-            show_headless(self._flight.headless, self._flight.recording)
+            show_headless(self._flight.headless, self._flight.recordings)
 
     def abandon(self) -> None:
         """Land and stop: the application has ended without waiting."""

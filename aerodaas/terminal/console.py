@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -36,16 +37,19 @@ __all__ = [
 ]
 
 _ALERTS_SHOWN = 4
+_NAMES = len("recording")
+"""Columns of the names of a run's files."""
 
 
 class StartupView:
-    """Shows the progress of a run's start."""
+    """Shows the progress of a run's start: on a terminal each step, in a pipe those that last."""
 
     def __init__(self, options: RunOptions) -> None:
         self._console = Console(highlight=False)
         self._shown = options.view
         self._stack = ExitStack()
         self._status: Status | None = None
+        self._begun = ""
 
     def __enter__(self) -> Self:
         if self._shown and self._console.is_terminal:
@@ -55,14 +59,22 @@ class StartupView:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
+    def begin(self, text: str) -> None:
+        """Show that a step has begun that may take long."""
+        if self._status is not None:
+            self._status.update(text)
+        elif self._shown and text != self._begun:
+            self._begun = text
+            self._console.print(f"{text} …", markup=False)
+
     def step(self, text: str) -> None:
-        """Show that a part is ready, or a step has begun."""
+        """Show that a part is ready."""
         if self._status is not None:
             self._status.update(text)
 
 
 class FlightView:
-    """View of a flight in progress."""
+    """View of a flight in progress: its alerts at any time, the rest while it is entered."""
 
     def __init__(self, options: RunOptions, config: EnvironmentConfig) -> None:
         self._title = options.application.stem if options.application else config.name
@@ -93,10 +105,23 @@ class FlightView:
         """Whether it is redrawn on a terminal, rather than printed line by line."""
         return self._view is not None and self._view.live
 
+    def say(self, text: str) -> None:
+        """Print a line on standard error."""
+        self._errors.print(text, markup=False)
+
+    def print_alerts(self, state: FlightState) -> None:
+        """Print a line for each new alert, unless they are shown on the terminal anyway."""
+        before, self._printed = self._printed, set()
+        for alert in state.alerts:
+            key = alert.header.source, alert.header.id, alert.header.stamp
+            self._printed.add(key)
+            if key not in before and not self.moves:
+                time_text = f"{seconds(alert.header.stamp):.1f} s"
+                self.say(f"{time_text} {alert.header.source}: {alert.text}")
+
     def update(self, state: FlightState) -> None:
-        """Show the flight's present state."""
+        """Show the flight's present state, but for its alerts in a pipe."""
         if self._view is None:
-            self._print_alerts(state)
             return
         stamps = [robot.status.stamp for robot in state.robots.values()]
         now = seconds(max(stamps, default=0))
@@ -115,16 +140,6 @@ class FlightView:
                 scheduler=_scheduler_text(state),
             )
         )
-
-    def _print_alerts(self, state: FlightState) -> None:
-        """Without a view, a line for each alert as it comes."""
-        before, self._printed = self._printed, set()
-        for alert in state.alerts:
-            key = alert.header.source, alert.header.id, alert.header.stamp
-            self._printed.add(key)
-            if key not in before:
-                time_text = f"{seconds(alert.header.stamp):.1f} s"
-                self._errors.print(f"{time_text} {alert.header.source}: {alert.text}", markup=False)
 
     def _measure_rates(self, state: FlightState, now: float) -> None:
         counts = {
@@ -206,16 +221,16 @@ def show_speed(options: RunOptions, mission: float, wall: float, start: float) -
         Console(highlight=False, soft_wrap=True).print(line)
 
 
-def show_left(recording: Path | None) -> None:
+def show_left(recordings: Sequence[Path]) -> None:
     """Print the fate of drones that still fly when the application ends."""
-    where = f"; its recording: {_shown(recording)}" if recording else ""
+    where = _recorded_in(recordings)
     line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
     Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 
-def show_headless(head: str, recording: Path | None) -> None:
+def show_headless(head: str, recordings: Sequence[Path]) -> None:
     """Print the end of a run whose cluster has lost its head, at the address `head`."""
-    where = f"; its recording: {_shown(recording)}" if recording else ""
+    where = _recorded_in(recordings)
     line = (
         f"the cluster's head at {head} is out of reach: what runs here for this flight ends by "
         f"itself within half a minute{where}"
@@ -224,17 +239,25 @@ def show_headless(head: str, recording: Path | None) -> None:
 
 
 def show_results(
-    options: RunOptions, recording: Path | None, *, source_recorded: bool = False
+    options: RunOptions, recordings: Sequence[Path], *, source_recorded: bool = False
 ) -> None:
-    """Write what `options` ask for of a closed recording; print the places of a report's files."""
-    if recording is None or options.report is None:
+    """Write what `options` ask for of a closed recording; print the places of all files.
+
+    Args:
+        options: Those of the run.
+        recordings: Files of the recording in their order, of which the report shows the first.
+        source_recorded: Whether the recording holds the application's source.
+    """
+    if not recordings or options.report is None:
         return
+    recording = recordings[0]
     from aerodaas.recording.report.report import (  # noqa: PLC0415 - matplotlib is slow to load
         write_report,
         write_summary,
     )
 
     console = Console(highlight=False, soft_wrap=True)
+    places = [("recording", path) for path in recordings]
     try:
         if options.report == "figures":
             write_summary(recording, recording.parent)
@@ -242,22 +265,37 @@ def show_results(
         report = write_report(recording, recording.parent)
     except RecordingError as error:
         console.print(f"no report: {error}", markup=False)
+        _print_places(console, places)
         return
     if options.view:
         console.print(str(report.summary), markup=False)
-    places = {"recording": recording, "report": report.page, "summary": report.summary_text}
-    width = max(map(len, places))
-    for name, path in places.items():
-        console.print(f"{name:>{width}}  {_shown(path)}", markup=False)
+    _print_places(console, [*places, ("report", report.page), ("summary", report.summary_text)])
+    for other in recordings[1:]:
+        console.print(
+            f"the report shows {recording.name} only; write one of the rest with\n"
+            f"  aerodaas report {_shown(other)} --out {_shown(other.with_suffix(''))}",
+            markup=False,
+        )
     if options.application is not None:
         said = (
             "recorded (recording.application_source)"
             if source_recorded
             else "not recorded but for its name and SHA-256; see recording.application_source"
         )
-        console.print(f"{'source':>{width}}  {said}", markup=False)
+        console.print(f"{'source':>{_NAMES}}  {said}", markup=False)
     if not has_extra("plots"):
-        console.print(f"{'plots':>{width}}  pip install 'aerodaas[plots]'", markup=False)
+        console.print(f"{'plots':>{_NAMES}}  pip install 'aerodaas[plots]'", markup=False)
+
+
+def _print_places(console: Console, places: Iterable[tuple[str, Path]]) -> None:
+    for name, path in places:
+        console.print(f"{name:>{_NAMES}}  {_shown(path)}", markup=False)
+
+
+def _recorded_in(recordings: Sequence[Path]) -> str:
+    """Where the recording is, to end a line with; empty without one."""
+    places = ", ".join(_shown(path) for path in recordings)
+    return f"; its recording: {places}" if places else ""
 
 
 def _shown(path: Path) -> str:

@@ -32,6 +32,7 @@ class MissionView:
 
     On a terminal it draws a panel in place; into a pipe or a file it prints one line for each
     robot every few seconds and whenever a mission's state changes, unless it would be the same.
+    Alerts are in the panel only: a pipe gets them on standard error, by whoever updates the view.
     """
 
     def __init__(self, console: Console | None = None) -> None:
@@ -43,7 +44,6 @@ class MissionView:
         self._lines: list[str] = []
         """What was told last of the robots."""
         self._states: dict[str, MissionState] = {}
-        self._alerts = 0
         self._paths: dict[str, list[tuple[float, float]]] = {}
 
     def __enter__(self) -> Self:
@@ -63,6 +63,7 @@ class MissionView:
             if self._last is not None:
                 self._live.update(self.render(self._last), refresh=True)
             self._live.stop()
+            self._live = None
         elif self._last is not None:
             self._print(self._last)
 
@@ -130,6 +131,3 @@ class MissionView:
             self._lines = lines
             for line in lines:
                 self._console.print(line, markup=False, soft_wrap=True)
-        for alert in snapshot.alerts[self._alerts :]:
-            self._console.print(f"alert: {alert}", markup=False, soft_wrap=True)
-        self._alerts = max(self._alerts, len(snapshot.alerts))

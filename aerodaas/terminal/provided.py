@@ -74,15 +74,23 @@ class ProvidedView:
         if self._view is None or not self._view.live:
             self._errors.print(text, markup=False)
 
+    def print_alerts(self, mission: MissionOut) -> None:
+        """Print a line for each new alert, unless they are shown anyway; in any thread."""
+        with self._lock:
+            before, self._told = self._told, Counter(mission.alerts)
+            new = self._told - before
+        if self._view is None or not self._view.live:
+            for text in new.elements():
+                self._errors.print(text, markup=False)
+
     def update(self, mission: MissionOut) -> None:
         """Show the mission's present state."""
+        self.print_alerts(mission)
         if self._view is None:
-            self._print_alerts(mission)
             return
         times = [status.time for status in mission.status.values()]
         with self._lock:
-            notes = self._notes if self._view.live else []
-            alerts = (*mission.alerts, *notes)
+            alerts = (*mission.alerts, *self._notes)
         self._view.update(
             Snapshot(
                 title=f"{mission.name} ({mission.id})",
@@ -92,11 +100,6 @@ class ProvidedView:
                 alerts=alerts,
             )
         )
-
-    def _print_alerts(self, mission: MissionOut) -> None:
-        before, self._told = self._told, Counter(mission.alerts)
-        for text in (self._told - before).elements():
-            self._errors.print(text, markup=False)
 
     def _robot(self, name: str, status: StatusOut) -> RobotSnapshot:
         return RobotSnapshot(name, self._mission(name, status), _vehicle(status))

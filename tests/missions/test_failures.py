@@ -25,6 +25,7 @@ from scripted import RemoteUser, free_port
 from aerodaas import AeroNavigation, Environment, NavigationType, TrajectoryScheduler
 from aerodaas.actors.cluster.ray_process import VARIABLE
 from aerodaas.analytics import RemoteAnalytics
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.types.errors import MissionError
@@ -201,6 +202,101 @@ def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
             MissionError, match="the actor of drone died: a simulated drone ends with its process"
         ):
             run.wait()
+
+
+@pytest.mark.slow
+def test_a_drone_that_hangs_is_told_though_nobody_waits(
+    flyer: Flyer, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its process stands still: the terminal says so before `wait`, and says when it is back."""
+    told: list[str] = []
+
+    def heard(words: str) -> bool:
+        told.append(capsys.readouterr().err)
+        return words in "".join(told)
+
+    with flyer.options(speed=2.0, lockstep=False):
+        env = Environment(flyer.write(environment()))
+        drone = env.get_robot_by_id("drone")
+        drone.navigate(hop((300, 0)))
+        env.start_mission(wait=False)
+        run = env.run
+        assert run is not None
+        assert run._flight is not None
+        assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
+        pid = run._flight.infos()["drone/drone"].pid
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            assert wait_for(lambda: heard("drone/drone has not answered for"), 30.0)
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        assert wait_for(lambda: heard("drone/drone answers again after"), 30.0)
+        drone.end_mission()
+        env.wait()
+    silent = alerts(recorded(run))["actor_silent"]
+    assert "take over by other means" in silent
+
+
+@pytest.mark.slow
+def test_a_recorder_that_is_killed_and_then_hangs(flyer: Flyer) -> None:
+    """Each is told, what was recorded is named, and a recording that is cut is a failed run."""
+    with flyer.options(speed=2.0, lockstep=False):
+        env = Environment(flyer.write(environment()))
+        drone = env.get_robot_by_id("drone")
+        drone.navigate(hop((300, 0)))
+        run = env.launch()
+        flight = run._flight
+        assert flight is not None
+        assert wait_for(lambda: bool(run.look().reports["recorder"].values), 20.0)
+        os.kill(first := flight.infos()["recorder"].pid, signal.SIGKILL)
+        assert wait_for(lambda: flight.infos()["recorder"].pid != first, 60.0)
+        assert wait_for(lambda: told(run, "recorder is back after"), 20.0)
+        assert wait_for(lambda: run.look().reports["recorder"].phase == "running", 20.0)
+        os.kill(second := flight.infos()["recorder"].pid, signal.SIGSTOP)
+        try:
+            assert wait_for(lambda: told(run, "recorder has not answered for"), 30.0)
+            drone.end_mission()
+            with pytest.raises(MissionError, match="the recorder did not answer") as failed:
+                run.wait()
+        finally:
+            os.kill(second, signal.SIGKILL)
+    folder = flyer.folder / "flight"
+    assert flight.recordings == (folder / "flight.mcap", folder / "flight.2.mcap")
+    assert all(path.exists() and str(path) in str(failed.value) for path in flight.recordings)
+
+
+def told(run: Run, words: str) -> bool:
+    """Whether an alert of the flight has these words by now."""
+    return any(words in alert.text for alert in run.look().alerts)
+
+
+@pytest.mark.slow
+def test_a_drone_whose_actor_died_keeps_no_other_in_the_air(flyer: Flyer) -> None:
+    """The run has failed: every drone that can still be told lands."""
+    limits = {"cruise_speed": 3.0, "takeoff_height": 2.0}
+    robots = [robot(name, limits=limits) for name in ("first", "second")]
+    with flyer.options(speed=2.0, lockstep=False):
+        env = Environment(flyer.write({**environment(), "robots": robots}))
+        for drone in env.get_env_robots():
+            drone.navigate(hop((300, 0)))
+        run = env.launch()
+        assert run._flight is not None
+        assert wait_for(lambda: bool(run.look().reports["drone/first"].values), 20.0)
+        os.kill(run._flight.infos()["drone/first"].pid, signal.SIGKILL)
+        with pytest.raises(MissionError, match="the actor of first died"):
+            run.wait()
+    path = flyer.folder / "flight" / "flight.mcap"
+    assert wait_for(lambda: closed(path), 60.0)
+    with Recording.open(path) as recording:
+        flight = RecordedFlight.read(recording)
+    reasons = [band.reason for band in flight.robots["second"].bands if band.state == "landing"]
+    assert reasons == ["the run failed"]
+
+
+def closed(path: Path) -> bool:
+    """Whether a recording was closed properly."""
+    with Recording.open(path) as recording:
+        return recording.complete
 
 
 @pytest.fixture

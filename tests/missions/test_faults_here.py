@@ -286,7 +286,7 @@ drone.start_mission()
 
 @needs_root
 def test_a_full_disk_is_told_without_a_view(tmp_path: Path) -> None:
-    """On standard error, as it happens; the drone flies on and lands."""
+    """On standard error, as it happens; the drone flies on and lands, and the run has failed."""
     content = with_camera(recording={"images": "png"})
     content["simulation"] = {**content["simulation"], "world": "field"}
     (tmp_path / "environment.json").write_text(json.dumps(content))
@@ -312,4 +312,6 @@ def test_a_full_disk_is_told_without_a_view(tmp_path: Path) -> None:
     assert "No space left on device" in flown.stderr
     assert "Traceback" not in flown.stderr
     assert flight.robots["drone"].position[:, 2].max() > 0.0
-    assert flown.returncode == 0, flown.stderr
+    assert flown.returncode == 1, flown.stderr
+    assert str(disk / "out" / "flight.mcap") in flown.stdout
+    assert "what it holds so far can be read" in flown.stderr.partition("error: ")[2]

@@ -128,13 +128,12 @@ def test_pipe_gets_a_line_at_each_change_of_state() -> None:
     with MissionView(Console(file=out, width=80)) as view:
         for time in range(50):
             view.update(snapshot(time / 10))
-        view.update(snapshot(5.0, MissionState.LOITERING, ("battery_low: at 20 %",)))
+        view.update(snapshot(5.0, MissionState.LOITERING))
     lines = out.getvalue().splitlines()
     assert "\x1b" not in out.getvalue()
-    assert len(lines) == 3
+    assert len(lines) == 2
     assert lines[0].startswith("[    0.0 s] tello enroute: to [north], E 0.0  N 0.0  up 1.5 m")
     assert "loitering" in lines[1]
-    assert lines[2] == "alert: battery_low: at 20 %"
 
 
 def test_nothing_known_yet() -> None:

@@ -17,7 +17,7 @@ def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -
         view.note("the connection is lost")
     captured = capsys.readouterr()
     assert "drone enroute: flying to a, E 1.0  N 0.0  up 2.0 m, battery 90 %" in captured.out
-    assert captured.out.count("low battery") == 1
+    assert captured.err.count("low battery") == 1
     assert "the connection is lost" in captured.err
 
 
@@ -61,6 +61,21 @@ def test_without_a_view_new_alerts_alone_are_told(capsys: pytest.CaptureFixture[
     captured = capsys.readouterr()
     assert captured.err.split() == ["one", "two", "two"]
     assert captured.out == ""
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_alerts_are_told_before_the_view_and_beyond_the_newest_fifty(
+    capsys: pytest.CaptureFixture[str], *, shown: bool
+) -> None:
+    """A provider sends the newest fifty each time; each is told once, whoever looks."""
+    texts = [f"alert {number}" for number in range(120)]
+    view = ProvidedView(shown=shown)
+    for end in range(1, 61):
+        view.print_alerts(mission(alerts=texts[max(0, end - 50) : end]))
+    with view:
+        for end in range(60, 121):
+            view.update(mission(alerts=texts[max(0, end - 50) : end]))
+    assert capsys.readouterr().err.splitlines() == texts
 
 
 def test_a_phase_is_told_with_its_reason() -> None:

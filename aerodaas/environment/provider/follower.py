@@ -28,14 +28,21 @@ class MissionFollower:
         mission: MissionOut,
         say: Callable[[str], None] = lambda _: None,
         rate: float = 5.0,
+        on_state: Callable[[MissionOut], None] = lambda _: None,
     ) -> None:
-        """Follow `mission`; `say` is told, in the thread, of lost and found connections.
+        """Follow a mission.
 
-        `rate` is the most states a second.
+        Args:
+            client: Connection to its provider.
+            mission: Its state so far.
+            say: Called in the thread with a line for each lost and found connection.
+            rate: Most states a second.
+            on_state: Called in the thread with each new state.
         """
         self._client = client
         self._say = say
         self._rate = rate
+        self._on_state = on_state
         self._mission = mission
         self._changes = 0
         self._changed = threading.Condition()
@@ -118,6 +125,7 @@ class MissionFollower:
             self._mission = mission
             self._changes += 1
             self._changed.notify_all()
+        self._on_state(mission)
 
     def await_end(self, timeout: float) -> bool:
         """Wait until the mission is over, `timeout` seconds at most; whether it is."""

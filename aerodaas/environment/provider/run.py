@@ -99,6 +99,7 @@ class ProvidedRun:
         MissionError with the provider's reason for a mission that is refused.
         """
         from aerodaas.terminal.console import StartupView  # noqa: PLC0415 - slow to load
+        from aerodaas.terminal.provided import ProvidedView  # noqa: PLC0415
 
         self._require_possible()
         written = self._written()
@@ -107,13 +108,16 @@ class ProvidedRun:
         raise_on_signals()
         with StartupView(self.options) as starting:
             mission = submit(
-                self._client, written.document, written.models, self.options, starting.step
+                self._client, written.document, written.models, self.options, starting.begin
             )
-            follower = self._follower = MissionFollower(self._client, mission, self._say)
+            view = self._view = ProvidedView(shown=self.options.view, places=self._places())
+            follower = self._follower = MissionFollower(
+                self._client, mission, self._say, on_state=view.print_alerts
+            )
             try:
                 follower.start()
                 self._connect_here(written)
-                self._await_flight(starting.step)
+                self._await_flight(starting.begin)
             except BaseException:
                 self._give_up()
                 raise
@@ -257,19 +261,14 @@ class ProvidedRun:
             mission = follower.await_change(follower.changes, _LOOK_SECONDS)
 
     def _watch(self, until: float) -> None:
-        from aerodaas.terminal.provided import ProvidedView  # noqa: PLC0415 - slow to load
-
         follower = self._following
-        with ProvidedView(shown=self.options.view, places=self._places()) as view:
-            self._view = view
-            try:
-                while time.monotonic() < until:
-                    mission = follower.await_change(follower.changes, _LOOK_SECONDS)
-                    view.update(mission)
-                    if mission.phase.over:
-                        return
-            finally:
-                self._view = None
+        assert self._view is not None  # noqa: S101 - started
+        with self._view as view:
+            while time.monotonic() < until:
+                mission = follower.await_change(follower.changes, _LOOK_SECONDS)
+                view.update(mission)
+                if mission.phase.over:
+                    return
 
     def _places(self) -> dict[str, Waypoint]:
         """The application's own waypoints by id, in local ENU; the map shows them."""
@@ -336,8 +335,8 @@ class ProvidedRun:
             hook()
         times = [status.time for status in mission.status.values()]
         show_speed(self.options, max(times, default=0.0), flown, self._flying_since - self._began)
-        if here:
-            show_results(self.options, self.recording)
+        if here and self.recording is not None:
+            show_results(self.options, [self.recording])
         self._report()
 
     def _fetch(self, mission: MissionOut) -> bool:
