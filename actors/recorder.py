@@ -93,9 +93,11 @@ class RecorderActor(ReaperHost, StreamActor):
             live=self._live,
         )
 
-    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
+    def tell(
+        self, kind: str, text: str, stamp: int, values: dict[str, Any], source: str = ""
+    ) -> None:
         """Publish an alert and record it directly: the recorder does not read its own alerts."""
-        super().tell(kind, text, stamp, values)
+        super().tell(kind, text, stamp, values, source)
         if self._phase == "new":
             return
         with self._alerting:
