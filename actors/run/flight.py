@@ -391,7 +391,7 @@ class Flight:
         last = end_actors([self._ended_first(), [self._reaper]], self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
-            self._note_file(member)
+            self._note_file(member.name, member.report)
         recorder = self._members.get("recorder")
         if recorder is not None and recorder.handle not in last and recorder.report.error is None:
             files = ", ".join(map(str, self._recordings))
@@ -401,8 +401,8 @@ class Flight:
             recorder.report = replace(recorder.report, error=error)
         return self.reports()
 
-    def _note_file(self, member: Member) -> None:
-        path = member.report.values.get("path") if member.name == "recorder" else None
+    def _note_file(self, name: str, report: ActorReport) -> None:
+        path = report.values.get("path") if name == "recorder" else None
         if path is not None and Path(path) not in self._recordings:
             self._recordings.append(Path(path))
 
@@ -599,7 +599,7 @@ class Flight:
             absence = time.monotonic() - member.answered_at
             self.note("actor_back", f"{member.name} answers again after {absence:.1f} s")
         member.answered_at = time.monotonic()
-        self._note_file(member)
+        self._note_file(member.name, member.report)
 
     def _record_vitals(self) -> None:
         """Send the vitals of all processes to the recorder, which cannot query other nodes."""
@@ -678,6 +678,8 @@ class Flight:
                         member.info = ray.get(actor.listen.remote(member.further))
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
+                    # It may hang before its next report.
+                    self._note_file(member.name, ray.get(actor.report.remote()))
             except ActorUnavailableError:
                 pass  # it has not restarted yet, or died again
             except RayTaskError as error:
