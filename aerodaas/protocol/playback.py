@@ -74,6 +74,8 @@ class TrackOut(AnswerModel):
     """Metres east, north and up of home, by row."""
     velocity: list[tuple[float | None, float | None, float | None]]
     yaw: list[float | None]
+    roll: list[float | None]
+    pitch: list[float | None]
     battery: list[float | None]
     distance: list[float]
     outlook: list[OutlookOut | None]
@@ -97,6 +99,8 @@ class RecordedOut(AnswerModel):
     begin: float
     end: float
     """Mission time of its first and last message, seconds."""
+    pictured: float | None = None
+    """Mission time at which its first picture was captured, seconds; null without any."""
     remark: str
     """What of the recording could not be read; empty if all could."""
     environment: dict[str, Any]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 from aerodaas.config.actuators import permitted
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import FleetOut, LinkState, RobotOut
 from aerodaas.service.access import Principal, sees
 from aerodaas.service.bookings import Bookings
@@ -36,6 +38,11 @@ class FleetView:
         self._garage = garage
         self._bookings = bookings
         self._desk = desk
+
+    @cached_property
+    def scenery(self) -> SceneryOut:
+        """What lies below the fleet on a map; raises ConfigError if its world cannot be read."""
+        return SceneryOut.of(self._config)
 
     def seen_by(self, principal: Principal) -> FleetOut:
         """The fleet as this account may see it."""

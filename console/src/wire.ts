@@ -182,6 +182,7 @@ export interface StatusOut {
   outlook: OutlookOut | null;
   pending: string[];
   pilot: string;
+  pitch: number | null;
   places: {
     /**
      * @minItems 3
@@ -192,6 +193,7 @@ export interface StatusOut {
   position: (number | null)[] | null;
   position_sigma: number | null;
   reason: string;
+  roll: number | null;
   satellites: number | null;
   state: string;
   target: string | null;
@@ -303,6 +305,7 @@ export interface RecordedOut {
     [k: string]: unknown;
   };
   name: string;
+  pictured: number | null;
   remark: string;
   scenery: SceneryOut;
   streams: {
@@ -358,8 +361,10 @@ export interface TrackOut {
   distance: number[];
   gps: (GpsOut | null)[];
   outlook: (OutlookOut | null)[];
+  pitch: (number | null)[];
   places: PlaceOut[];
   position: [number | null, number | null, number | null][];
+  roll: (number | null)[];
   statuses: StatusOut[];
   time: number[];
   traffic: HeardOut[];

@@ -14,6 +14,7 @@ from synthetic_flight import SyntheticFlight, record
 
 from aerodaas.protocol.playback import RecordedOut
 from aerodaas.protocol.scenery import ShapeOut
+from aerodaas.recording.pictures import shots
 from aerodaas.recording.playback import decisions, track
 from aerodaas.recording.playback.decisions import DecisionSums
 from aerodaas.recording.playback.flight import read_flight
@@ -56,9 +57,20 @@ def test_figures_are_those_of_the_recording(path: Path) -> None:
         assert told.position[row] == tuple(state.odometry.position)
         assert told.velocity[row] == tuple(state.odometry.velocity)
         assert (told.yaw[row], told.battery[row]) == (state.odometry.yaw, state.battery.fraction)
+        assert (told.roll[row], told.pitch[row]) == (state.odometry.roll, state.odometry.pitch)
     gaps = [later - time for time, later in pairwise(told.time)]
     assert 0.99 * track.ROW_SECONDS < min(gaps) <= max(gaps) < 2 * track.ROW_SECONDS
     assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
+
+
+def test_the_first_picture_is_told(path: Path) -> None:
+    """By when it was captured; a flight without a camera has none."""
+    with Recording.open(path) as recording:
+        captured = min(shot.header.stamp for shot in shots(recording))
+    assert read(path).pictured == seconds(captured)
+    blind = path.with_name("blind.mcap")
+    record(blind, SyntheticFlight())
+    assert read(blind).pictured is None
 
 
 def test_rows_tell_how_far_the_battery_lasts_and_of_satellites(path: Path) -> None:

@@ -137,13 +137,17 @@ class StatusOut(BaseModel):
     mode: str | None = None
     """One of `VehicleMode`: what the vehicle itself says that it does."""
     measured: float | None = None
-    """Mission time of position, velocity and yaw, seconds."""
+    """Mission time of position, velocity and attitude, seconds."""
     position: list[float | None] | None = None
     """Metres east, north and up of home."""
     velocity: list[float | None] | None = None
     """m/s east, north and up."""
     yaw: float | None = None
     """Radians counter-clockwise from east."""
+    roll: float | None = None
+    """Radians, positive with the right side down."""
+    pitch: float | None = None
+    """Radians, positive with the nose down."""
     battery: float | None = None
     """Charge left, 0 to 1."""
     outlook: OutlookOut | None = None
@@ -187,6 +191,8 @@ class StatusOut(BaseModel):
                 "position": [_known(float(axis)) for axis in odometry.position],
                 "velocity": [_known(float(axis)) for axis in odometry.velocity],
                 "yaw": _known(odometry.yaw),
+                "roll": _known(odometry.roll),
+                "pitch": _known(odometry.pitch),
                 "battery": _known(vehicle.battery.fraction),
                 "latitude": _known(fix.latitude) if fix else None,
                 "longitude": _known(fix.longitude) if fix else None,

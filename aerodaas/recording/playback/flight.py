@@ -121,11 +121,14 @@ class _Reading:
 
     def _told_of(self, first: int, last: int) -> RecordedOut:
         recording = self._recording
+        captures = [self._captures[topic].captured for topic in self._pictures.values()]
+        pictured = [seconds(one[0]) for one in captures if one]
         return RecordedOut(
             name=recording.provenance.get("name") or recording.path.stem,
             began=seconds(recording.epoch_ns),
             begin=max(0.0, seconds(first)),
             end=seconds(last),
+            pictured=min(pictured, default=None),
             remark=_remark(recording, last, self._room.untold),
             **_surroundings(recording),
             tracks={name: one.track for name, one in self._robots.items()},

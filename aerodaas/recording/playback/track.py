@@ -61,8 +61,8 @@ class TrackBuilder:
         """Take as much as there is `room` for, which all robots share."""
         self._room = room
         self._track = TrackOut(
-            time=[], position=[], velocity=[], yaw=[], battery=[], distance=[],
-            outlook=[], gps=[], statuses=[], places=[],
+            time=[], position=[], velocity=[], yaw=[], roll=[], pitch=[], battery=[],
+            distance=[], outlook=[], gps=[], statuses=[], places=[],
         )  # fmt: skip
         self._interval = ROW_SECONDS
         self._flown = 0.0
@@ -89,14 +89,17 @@ class TrackBuilder:
         track.position.append(_vector(odometry["position"]))
         track.velocity.append(_vector(odometry["velocity"]))
         track.yaw.append(odometry["yaw"])
+        track.roll.append(odometry.get("roll"))
+        track.pitch.append(odometry.get("pitch"))
         track.battery.append(value["battery"]["fraction"])
         track.distance.append(self._flown)
         track.outlook.append(self._outlook)
         track.gps.append(_gps(value.get("gps")))
         if len(track.time) > _MOST_ROWS:
             self._interval *= 2
-            for rows in (track.time, track.position, track.velocity, track.yaw, track.battery,
-                         track.distance, track.outlook, track.gps):  # fmt: skip
+            for rows in (track.time, track.position, track.velocity, track.yaw, track.roll,
+                         track.pitch, track.battery, track.distance, track.outlook,
+                         track.gps):  # fmt: skip
                 del rows[1::2]
 
     def _hear(self, now: float, told: object) -> None:

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict
 
 from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, Role, Scope
 from aerodaas.service.access import Accounts, Audit
 from aerodaas.service.errors import RefusedError
@@ -54,6 +55,7 @@ class FleetRoutes:
         none: dict[str, Any] = {"status_code": 204, "response_class": Response}
         router.add_api_route("/me", self.me)
         router.add_api_route("/fleet", self.fleet)
+        router.add_api_route("/fleet/scenery", self.scenery)
         router.add_api_route("/robots/{robot}", self.enable, methods=["PATCH"], **none)
         router.add_api_route("/robots/{robot}/preflight", self.preflight)
         router.add_api_route("/models/{sha256}", self.has_model, methods=["HEAD"], **none)
@@ -68,6 +70,11 @@ class FleetRoutes:
     def fleet(self, request: Request) -> FleetOut:
         """The drones, and the environment that applications are built against."""
         return self._fleet.seen_by(self._admission.require(request, Role.VIEWER))
+
+    def scenery(self, request: Request) -> SceneryOut:
+        """What lies below the fleet on a map."""
+        self._admission.require(request, Role.VIEWER)
+        return self._fleet.scenery
 
     def preflight(self, robot: str, request: Request) -> PreflightOut:
         """A drone's health before take-off, to whoever sees its charge and place."""
