@@ -27,7 +27,7 @@ _IMAGES = _ROOT / "docs" / "images"
 _APPLICATION = "apps/vehicle_tracking.py"
 _WAIT_SECONDS = 180.0
 _FOUND = "document.querySelector('[data-testid=video]')?.dataset.boxes > 0"
-_LATE = "Number(document.querySelectorAll('.state dd')[5].innerText.split(' ')[0]) > 45"
+_LATE = "Number(document.querySelectorAll('.state .figure dd')[5].innerText.split(' ')[0]) > 45"
 """The drone has left the first waypoint, and follows."""
 _SETTLED = 1.0
 

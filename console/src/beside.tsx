@@ -125,7 +125,7 @@ function Half({ title, flight, recorded, robot, theme, onRobot, onAlone }: HalfP
       <StatePanel flight={flight} robot={robot} />
       <Charts flight={flight} robot={robot} theme={theme} />
       <AnalyticsCharts flight={flight} theme={theme} />
-      <Alerts flight={flight} />
+      <Alerts log={flight.log} recorded onAcknowledge={() => undefined} />
     </section>
   );
 }

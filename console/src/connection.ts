@@ -44,12 +44,17 @@ export class Refused extends Error {
   }
 }
 
-/** Ask the server; throws Refused with its reason. */
-export async function ask<T>(path: string, token: string, body?: unknown): Promise<T> {
-  return (await (await answered(path, token, body)).json()) as T;
+/** Ask the server; throws Refused with its reason. `signal` gives the request up. */
+export async function ask<T>(
+  path: string,
+  token: string,
+  body?: unknown,
+  signal?: AbortSignal,
+): Promise<T> {
+  return (await (await answered(path, token, body, signal)).json()) as T;
 }
 
-/** As `ask`, for an answer of any kind; `signal` gives the request up. */
+/** As `ask`, for an answer of any kind. */
 export async function answered(
   path: string,
   token: string,

@@ -24,8 +24,18 @@ const STALE = 2500;
 /** States of a drone that is not in the air. */
 export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
 const CONFIRMING = 30000;
+/** Milliseconds after which a command counts as one without an answer. */
+const ANSWER = 20000;
 
 export type Word = CommandIn["command"];
+/** What the buttons call the commands. */
+export const NAMES: Record<Word, string> = {
+  pause: "Hold",
+  resume: "Resume",
+  "return-home": "Return",
+  clear: "Stop",
+  land: "Land",
+};
 
 export interface Sample {
   time: number;
@@ -38,8 +48,9 @@ export interface Order {
   id: number;
   robot: string;
   what: string;
-  /** asked, accepted by the drone, done as seen in its state, or refused with a reason. */
-  stage: "asked" | "accepted" | "done" | "refused" | "unconfirmed";
+  /** asked, accepted by the drone, done as seen in its state, refused with a reason, or without an
+   *  answer. */
+  stage: "asked" | "accepted" | "done" | "refused" | "unconfirmed" | "unanswered";
   text: string;
   at: number;
   took: number | null;
@@ -48,20 +59,69 @@ export interface Order {
 
 export interface Alert {
   id: number;
+  /** Whose it is, where several flights are shown; empty for the one that is. */
+  source: string;
   kind: string;
   text: string;
   count: number;
   acknowledged: boolean;
 }
 
-const GOING_HOME = ["returning", "landing", "landed"];
-const SEEN: Record<Word, (status: StatusOut) => boolean> = {
+/** States in which no waypoint is flown to any more: the mission's state machine leaves them for the
+ *  ground alone. */
+const ENDING = new Set(["returning", "landing", "landed", "aborted"]);
+/** Whether a drone was seen to obey. */
+export const SEEN: Record<Word, (status: StatusOut) => boolean> = {
   pause: (status) => status.state === "paused",
   resume: (status) => status.state !== "paused",
   clear: (status) => status.pending.length === 0 && status.target === null,
-  "return-home": (status) => GOING_HOME.includes(status.state),
+  "return-home": ({ state }) => ENDING.has(state) && state !== "aborted",
   land: (status) => ["landing", "landed", "aborted"].includes(status.state),
 };
+
+/** Alerts by which a flight records the commands that it was given. */
+export const COMMAND_KIND = "console_command";
+export const MOST_ALERTS = 100;
+
+/** Alerts, newest first; the commands that a flight was given are a list of their own. */
+export class AlertLog {
+  alerts: Alert[] = [];
+  commands: string[] = [];
+  private told = new Map<string, string[]>();
+
+  /** Take the newest alerts that a server tells of a source, oldest first; those that it told before
+   *  are known by where they overlap. */
+  take(texts: string[], source = ""): void {
+    const told = this.told.get(source) ?? [];
+    let shared = Math.min(texts.length, told.length);
+    const same = (count: number): boolean =>
+      told.slice(-count).every((text, place) => text === texts[place]);
+    while (shared > 0 && !same(shared)) shared -= 1;
+    for (const line of texts.slice(shared)) {
+      const [kind = "", ...rest] = line.split(": ");
+      this.add(kind, rest.join(": ") || line, source);
+    }
+    this.told.set(source, texts);
+  }
+
+  private add(kind: string, text: string, source: string): void {
+    if (kind === COMMAND_KIND) {
+      this.commands = [text, ...this.commands].slice(0, MOST_ALERTS);
+      return;
+    }
+    const before = this.alerts.find(
+      (one) => one.kind === kind && one.text === text && one.source === source,
+    );
+    const id = (this.alerts[0]?.id ?? 0) + 1;
+    const newest: Alert = { id, source, kind, text, count: 1, acknowledged: false };
+    if (before && !before.acknowledged) before.count += 1;
+    else this.alerts = [newest, ...this.alerts].slice(0, MOST_ALERTS);
+  }
+
+  acknowledge(id: number | null): void {
+    for (const one of this.alerts) if (id === null || one.id === id) one.acknowledged = true;
+  }
+}
 
 /** Milliseconds by which the viewer's clock is ahead of the server's, as far as messages tell. */
 export class ClockOffset {
@@ -84,13 +144,12 @@ export class Flight {
   trails = new Map<string, Spot[]>();
   history = new Map<string, Sample[]>();
   orders: Order[] = [];
-  alerts: Alert[] = [];
+  log = new AlertLog();
   /** What the analytics scheduler had done by each time. */
   analytics: AnalyticsOut[] = [];
   readonly clock = new ClockOffset();
   /** Where what was seen stands. */
   readonly marks = new GroundMarks();
-  private told: string[] = [];
   private orderCount = 0;
 
   constructor(
@@ -154,7 +213,7 @@ export class Flight {
 
   command(robot: string, command: Word): void {
     const body: CommandIn = { robot, command };
-    this.give(robot, command, "commands", body, (status) =>
+    this.give(robot, NAMES[command], "commands", body, (status) =>
       SEEN[command](status) ? status.state.replace("_", " ") : null,
     );
   }
@@ -188,7 +247,7 @@ export class Flight {
   }
 
   acknowledge(id: number | null): void {
-    for (const one of this.alerts) if (id === null || one.id === id) one.acknowledged = true;
+    this.log.acknowledge(id);
     this.changed();
   }
 
@@ -211,14 +270,16 @@ export class Flight {
     };
     this.orders = [order, ...this.orders].slice(0, 20);
     this.changed();
-    ask<AnswerOut>(`v1/missions/${this.mission.id}/${route}`, this.token, body)
+    const path = `v1/missions/${this.mission.id}/${route}`;
+    ask<AnswerOut>(path, this.token, body, AbortSignal.timeout(ANSWER))
       .then((answer) => {
         if (order.stage === "asked") order.stage = answer.accepted ? "accepted" : "refused";
         const each = Object.entries(answer.refused).map(([id, why]) => `${id}: ${why}`);
         order.text = [answer.text, ...each].filter(Boolean).join("; ");
       })
       .catch((error: unknown) => {
-        order.stage = "refused";
+        const lost = error instanceof Refused && error.status === 0;
+        order.stage = lost ? "unanswered" : "refused";
         order.text = error instanceof Refused ? error.message : String(error);
       })
       .finally(() => this.changed());
@@ -240,7 +301,7 @@ export class Flight {
     if (sums && sums.time >= (this.analytics.at(-1)?.time ?? -SUMS) + SUMS) {
       this.analytics = [...this.analytics, sums].slice(-HISTORY);
     }
-    this.takeAlerts(mission.alerts);
+    this.log.take(mission.alerts);
     for (const order of this.orders) this.confirm(order);
   }
 
@@ -274,24 +335,6 @@ export class Flight {
     this.history.set(robot, samples.slice(-HISTORY));
   }
 
-  /** The server tells the newest alerts; those that it told before are known by where they overlap. */
-  private takeAlerts(texts: string[]): void {
-    let shared = Math.min(texts.length, this.told.length);
-    const same = (count: number): boolean =>
-      this.told.slice(-count).every((text, place) => text === texts[place]);
-    while (shared > 0 && !same(shared)) shared -= 1;
-    for (const line of texts.slice(shared)) {
-      const [kind = "", ...rest] = line.split(": ");
-      const id = (this.alerts[0]?.id ?? 0) + 1;
-      const text = rest.join(": ") || line;
-      const before = this.alerts.find((one) => one.kind === kind && one.text === text);
-      if (before && !before.acknowledged) before.count += 1;
-      else this.alerts.unshift({ id, kind, text, count: 1, acknowledged: false });
-    }
-    this.told = texts;
-    this.alerts = this.alerts.slice(0, 100);
-  }
-
   private confirm(order: Order): void {
     const status = this.mission.status[order.robot];
     if (!status || order.stage !== "accepted") return;
@@ -311,8 +354,14 @@ export function shifted(last: Spot | undefined, [east, north, up]: Spot): boolea
   return !last || Math.hypot(last[0] - east, last[1] - north, last[2] - up) >= STEP;
 }
 
+/** Whether a drone goes home, lands or has landed: its plan is over, whatever is left of it. */
+export function ending({ state }: StatusOut): boolean {
+  return ENDING.has(state);
+}
+
 /** Waypoints that lie ahead, the one being flown to first. */
 export function aheadOf(status: StatusOut): string[] {
+  if (ending(status)) return [];
   return status.target === null ? status.pending : [status.target, ...status.pending];
 }
 

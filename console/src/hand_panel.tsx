@@ -1,6 +1,7 @@
 // The panel to fly by hand: who has the controls, the keys, and how fast.
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import { useEscape } from "./escape";
 import type { Flight } from "./flight";
 import { Hand, KEYS } from "./hand";
 import type { Abilities } from "./place";
@@ -36,6 +37,7 @@ export function HandPanel(props: {
 
   const status = flight.status(robot);
   const holds = hand !== null && !hand.over;
+  useEscape(holds ? () => hand.release("let go") : null);
   const others = !holds && status?.pilot ? status.pilot : "";
   const take = () => {
     const climb = abilities?.maxClimb ?? 1.5;
@@ -68,7 +70,6 @@ export function HandPanel(props: {
       data-testid="hand"
       onKeyDown={(event) => {
         if (!holds || event.ctrlKey || event.metaKey || event.altKey) return;
-        if (event.key === "Escape") hand.release("let go");
         if (!(event.code in KEYS) || event.target instanceof HTMLInputElement) return;
         event.preventDefault();
         press(event.code);

@@ -1,16 +1,18 @@
 // The console: signs in, chooses a mission, and lays out the panels.
 
 import { render } from "preact";
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { SideBySide } from "./beside";
 import { AnalyticsCharts, Charts } from "./charts";
-import { Refused, ask, keepToken, readFragment, takeToken, writeFragment } from "./connection";
-import { type Flight, GROUNDED } from "./flight";
+import { Refused, answered, ask, keepToken, readFragment, takeToken, writeFragment } from "./connection";
+import { Fleet } from "./fleet";
+import { ClockOffset, type Flight, GROUNDED } from "./flight";
+import { FlightBar } from "./flight_bar";
 import { FlightMap } from "./map";
-import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
+import { Alerts, CommandLog, StatePanel, WaypointForm } from "./panels";
 import { type LeasedArea, type Place, type Point, areasOf, placeOf } from "./place";
 import { Playback } from "./playback";
-import { Garage, PreflightPanel } from "./preflight";
+import { PreflightPanel } from "./preflight";
 import { Recorded } from "./recorded";
 import { useScenery } from "./scenery";
 import { LiveSource } from "./source";
@@ -27,7 +29,13 @@ import "./preflight.css";
 
 const THEMES = ["auto", "light", "dark"] as const;
 type Theme = (typeof THEMES)[number];
+/** Milliseconds between two looks at the list of missions, and at the fleet while that is shown. */
 const LOOK = 2000;
+const FLEET_LOOK = 1000;
+/** Milliseconds after which a request for the list of missions counts as unanswered. */
+const ANSWER = 10000;
+/** Milliseconds since the server's last answer after which it counts as out of reach. */
+const REACH = 5000;
 /** Tenant of a flight of one's own. */
 const OWN = "own";
 const DARK = matchMedia("(prefers-color-scheme: dark)");
@@ -50,7 +58,12 @@ function App() {
   /** The mission whose recording is played beside the chosen one's. */
   const [beside, setBeside] = useState(() => readFragment("beside"));
   const [problem, setProblem] = useState("");
+  /** When the server answered last, by this machine's clock. */
+  const [answeredAt, setAnsweredAt] = useState(0);
+  const clock = useRef(new ClockOffset()).current;
+  const overview = useRef(false);
   const { choice, setChoice, theme } = useTheme();
+  const [, tick] = useState(0);
 
   useEffect(() => {
     if (!token) return;
@@ -58,12 +71,18 @@ function App() {
     let timer = 0;
     const look = async () => {
       try {
-        const [account, fleet, all] = await Promise.all([
-          ask<AccountOut>("v1/me", token),
-          ask<FleetOut>("v1/fleet", token),
-          ask<MissionOut[]>("v1/missions", token),
+        const signal = AbortSignal.timeout(ANSWER);
+        const [account, answer, all] = await Promise.all([
+          ask<AccountOut>("v1/me", token, undefined, signal),
+          answered("v1/fleet", token, undefined, signal),
+          ask<MissionOut[]>("v1/missions", token, undefined, signal),
         ]);
+        const fleet = (await answer.json()) as FleetOut;
         if (gone) return;
+        setAnsweredAt(Date.now());
+        const date = Date.parse(answer.headers.get("Date") ?? "");
+        if (!Number.isNaN(date)) clock.take(date * 1e6);
+
         setKnown((before) => before ?? { account, place: placeOf(fleet), name: fleet.name });
         setMissions(all);
         setRobots(fleet.robots);
@@ -77,7 +96,7 @@ function App() {
           return;
         }
       }
-      timer = setTimeout(() => void look(), LOOK);
+      timer = setTimeout(() => void look(), overview.current ? FLEET_LOOK : LOOK);
     };
     void look();
     return () => {
@@ -86,10 +105,19 @@ function App() {
     };
   }, [token]);
 
-  const flying = missions.filter((one) => one.phase === "flying");
-  const only = flying.length === 1 ? flying[0] : missions.length === 1 ? missions[0] : undefined;
+  /** Whether this is a provider's page, with a fleet and other missions than one's own. */
+  const provided = known !== null && known.account.tenant !== OWN;
+  // A provider's first page is its fleet; elsewhere the only mission is shown at once.
+  const only = !provided && missions.length === 1 ? missions[0] : undefined;
   const shown = chosen ?? (only?.phase === "flying" || only?.recording ? only.id : null);
   const mission = missions.find((one) => one.id === shown);
+  overview.current = provided && mission === undefined;
+  // Silence has to show, too.
+  useEffect(() => {
+    if (!overview.current) return;
+    const timer = setInterval(() => tick((count) => count + 1), 1000);
+    return () => clearInterval(timer);
+  }, [overview.current]);
   // A mission that is shown stays shown after it is over.
   useEffect(() => {
     if (chosen === null && shown !== null) setChosen(shown);
@@ -123,7 +151,7 @@ function App() {
   if (!token) return <SignIn problem={problem} onToken={setToken} />;
   if (known && mission) {
     const shared = {
-      ...{ first: mission, missions, known, areas, token, theme, themes },
+      ...{ first: mission, missions, known, areas, answeredAt, token, theme, themes },
       onMission: choose,
       onBeside: compare,
     };
@@ -153,14 +181,68 @@ function App() {
       </Recorded>
     );
   }
+  if (known && provided) {
+    const now = Date.now();
+    const reached = now - answeredAt < REACH;
+    return (
+      <div class="page">
+        <header class="top">
+          <h1>AeroDaaS</h1>
+          <MissionChoice chosen="" fleet missions={missions} onMission={choose} />
+          <span class="grow" />
+          <span class="badge who">
+            {known.account.name}, {known.account.role}
+          </span>
+          <span class={`badge ${reached ? "good" : "bad"}`} data-testid="connection">
+            {reached ? "live" : "not connected"}
+          </span>
+          {themes}
+        </header>
+        {!reached && (
+          <p class="banner bad" role="alert" data-testid="banner">
+            No word from the service for {((now - answeredAt) / 1000).toFixed(0)} s: what is shown is
+            old, and commands cannot reach the drones. Connecting again…
+          </p>
+        )}
+        <Fleet
+          account={known.account}
+          place={known.place}
+          {...{ robots, missions, clock, reached, token }}
+          onMission={choose}
+        />
+      </div>
+    );
+  }
   return (
     <main class="start">
       <h1>AeroDaaS console</h1>
       {problem && <p class="banner bad">{problem}</p>}
       {known ? <Missions missions={missions} onMission={choose} /> : <p>connecting…</p>}
-      {known && <Garage robots={robots} token={token} />}
       {themes}
     </main>
+  );
+}
+
+function MissionChoice(props: {
+  missions: MissionOut[];
+  chosen: string;
+  /** Whether there is a fleet to choose, too. */
+  fleet: boolean;
+  onMission(id: string): void;
+}) {
+  return (
+    <select
+      aria-label="Mission"
+      value={props.chosen}
+      onChange={(event) => props.onMission(event.currentTarget.value)}
+    >
+      {props.fleet && <option value="">the fleet</option>}
+      {props.missions.map((one) => (
+        <option key={one.id} value={one.id}>
+          {one.name} · {one.phase.replaceAll("_", " ")}
+        </option>
+      ))}
+    </select>
   );
 }
 
@@ -215,6 +297,7 @@ interface ConsoleProps {
   missions: MissionOut[];
   known: Known;
   areas: LeasedArea[];
+  answeredAt: number;
   token: string;
   theme: string;
   themes: preact.ComponentChildren;
@@ -234,11 +317,13 @@ function Console(props: ConsoleProps) {
     () => first.robots[0] ?? Object.keys(recorded?.tracks ?? {})[0] ?? "",
   );
   const [marked, setMarked] = useState<Point | null>(null);
+  /** Whether the camera is large, and the map small in its corner. */
+  const [large, setLarge] = useState(false);
   const place = useMemo(
     () => (recorded ? placeOf({ ...recorded, robots: [] }) : known.place),
     [recorded, known],
   );
-  const scenery = useScenery(first.id, token, recorded?.scenery);
+  const scenery = useScenery(`v1/missions/${first.id}/scenery`, token, recorded?.scenery);
   const abilities = place.robots.get(robot);
   const up = flight?.status(robot)?.position?.[2] ?? 0;
   const height = up > 0.5 ? up : place.takeoffHeight;
@@ -246,6 +331,9 @@ function Console(props: ConsoleProps) {
   if (!flight) return null;
 
   const may = !recorded && known.account.role !== "viewer" && known.account.scopes.includes("fly");
+  // A live view may be lost while commands still arrive: only silence on both ways is out of reach.
+  const reached = !flight.stale || Date.now() - props.answeredAt < REACH;
+  const mayCommand = may && reached && !flight.over;
   const sees = known.account.scopes.includes("sense");
   const fence = place.fences.find((one) => one.robot === robot);
   /** Whether this is a provider's page, with a fleet and other missions than one's own. */
@@ -257,18 +345,7 @@ function Console(props: ConsoleProps) {
       <header class="top">
         <h1>AeroDaaS</h1>
         {missions.length > 1 || provided ? (
-          <select
-            aria-label="Mission"
-            value={first.id}
-            onChange={(event) => onMission(event.currentTarget.value)}
-          >
-            {provided && <option value="">the fleet</option>}
-            {missions.map((one) => (
-              <option key={one.id} value={one.id}>
-                {one.name} · {one.phase.replaceAll("_", " ")}
-              </option>
-            ))}
-          </select>
+          <MissionChoice chosen={first.id} fleet={provided} {...{ missions, onMission }} />
         ) : (
           <strong class="name">{flight.mission.name}</strong>
         )}
@@ -306,6 +383,7 @@ function Console(props: ConsoleProps) {
         <p class="banner bad" role="alert" data-testid="banner">
           No word from the flight for {((Date.now() - flight.heard) / 1000).toFixed(0)} s: what is
           shown is old.{!flight.connected && " Connecting again…"}
+          {may && !reached && " Commands cannot reach the drone until then."}
         </p>
       )}
       {flight.over && (
@@ -319,62 +397,78 @@ function Console(props: ConsoleProps) {
           )}
         </p>
       )}
+      {!recorded && <FlightBar flight={flight} robot={robot} mayFly={mayCommand} />}
       <main class="panels">
         <div class="wide">
-        <FlightMap
-          flight={flight}
-          place={place}
-          scenery={scenery}
-          areas={recorded ? [] : props.areas}
-          robot={robot}
-          mayFly={may && !flight.over}
-          marked={marked}
-          onMark={setMarked}
-          drawn={survey}
-          onDraw={() => {
-            setMarked(null);
-            begin();
-          }}
-        />
-        <Charts flight={flight} robot={robot} theme={theme} />
+          <div class={`stage ${large ? "filming" : ""}`}>
+            {large && <Video flight={flight} large onLarge={setLarge} />}
+            <FlightMap
+              flight={flight}
+              place={place}
+              scenery={scenery}
+              areas={recorded ? [] : props.areas}
+              robot={robot}
+              mayFly={mayCommand}
+              marked={marked}
+              onMark={setMarked}
+              drawn={survey}
+              onDraw={() => {
+                setMarked(null);
+                begin();
+              }}
+            />
+            {large && (
+              <button
+                type="button"
+                class="swap"
+                aria-label="Show the map large"
+                onClick={() => setLarge(false)}
+              />
+            )}
+          </div>
+          <Charts flight={flight} robot={robot} theme={theme} />
         </div>
         <div class="side">
-        {survey && (
-          <SurveyPanel
-            survey={survey}
-            ceiling={fence?.ceiling ?? 120}
-            zones={(fence?.noFly.length ?? 0) > 0}
+          {survey && (
+            <SurveyPanel
+              survey={survey}
+              ceiling={fence?.ceiling ?? 120}
+              zones={(fence?.noFly.length ?? 0) > 0}
+            />
+          )}
+          {marked && (
+            <WaypointForm
+              key={marked.join()}
+              flight={flight}
+              robot={robot}
+              point={marked}
+              height={height}
+              ceiling={fence?.ceiling ?? 120}
+              onDone={() => setMarked(null)}
+            />
+          )}
+          {sees && !large && <Video flight={flight} onLarge={setLarge} />}
+          <StatePanel flight={flight} robot={robot} />
+          <Alerts
+            log={flight.log}
+            recorded={flight.recorded}
+            onAcknowledge={(id) => flight.acknowledge(id)}
           />
-        )}
-        {marked && (
-          <WaypointForm
-            key={marked.join()}
-            flight={flight}
-            robot={robot}
-            point={marked}
-            height={height}
-            ceiling={fence?.ceiling ?? 120}
-            onDone={() => setMarked(null)}
-          />
-        )}
-        {sees && <Video flight={flight} />}
-        <StatePanel flight={flight} robot={robot} />
-        {!recorded && (
-          <PreflightPanel robot={robot} token={token} live={!flight.over} open={grounded} />
-        )}
-        {!recorded && <Commands flight={flight} robot={robot} mayFly={may} />}
-        <Plan key={`plan ${robot}`} flight={flight} robot={robot} mayFly={may} />
-        {!recorded && (
-          <HandPanel
-            key={`hand ${robot}`}
-            flight={flight}
-            robot={robot}
-            mayFly={may}
-            abilities={abilities}
-          />
-        )}
-        <Alerts flight={flight} />
-        <AnalyticsCharts flight={flight} theme={theme} />
+          {!recorded && (
+            <PreflightPanel robot={robot} token={token} live={!flight.over} open={grounded} />
+          )}
+          <Plan key={`plan ${robot}`} flight={flight} robot={robot} mayFly={mayCommand} />
+          {!recorded && (
+            <HandPanel
+              key={`hand ${robot}`}
+              flight={flight}
+              robot={robot}
+              mayFly={mayCommand}
+              abilities={abilities}
+            />
+          )}
+          <CommandLog flight={flight} robot={robot} mayFly={may} />
+          <AnalyticsCharts flight={flight} theme={theme} />
         </div>
       </main>
       {recorded && flight.source instanceof Playback && (

@@ -1,6 +1,8 @@
 // The map: a metric grid in the environment's local frame, north up, drawn as SVG.
 
+import type { ComponentChildren, RefObject } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useEscape } from "./escape";
 import type { Flight } from "./flight";
 import { MarkLayer, nameOf } from "./ground";
 import { Drone, Grid, Plan, Scale } from "./map_layers";
@@ -15,30 +17,34 @@ import { TrafficLayer, heightOf, headingOf, trafficOf } from "./traffic";
 import type { SceneryOut } from "./wire";
 import "./map.css";
 
-export interface MapProps {
-  flight: Flight;
-  place: Place;
-  scenery: SceneryOut;
-  areas: LeasedArea[];
-  robot: string;
-  mayFly: boolean;
-  marked: Point | null;
-  onMark(point: Point): void;
-  /** The survey that is being drawn; a click is a corner then. */
-  drawn: Drawn | null;
-  onDraw(): void;
-}
-
 const ZOOM = 1.25;
 
-export function FlightMap(props: MapProps) {
+interface MapViewProps {
+  /** What it shows and which keys it has, for who does not see it. */
+  label: string;
+  scenery: SceneryOut;
+  token: string;
+  /** The points that are in sight at first. */
+  fitted: readonly Point[];
+  /** Where the drone is that the view may follow; null while that is not known. */
+  followed: Point | null;
+  /** What a key does, beside those that move the view. */
+  keys: Record<string, () => void>;
+  /** A click, or Enter at the cross. */
+  onPoint(point: Point, sight: Sight): void;
+  buttons: ComponentChildren;
+  below: ComponentChildren;
+  /** What is drawn above grid and scenery. */
+  children(sight: Sight, box: RefObject<HTMLDivElement | null>): ComponentChildren;
+}
+
+/** A map that is moved, zoomed and tilted, over scenery and tiles. */
+export function MapView(props: MapViewProps) {
   const box = useRef<HTMLDivElement>(null);
   const [size, setSize] = useState({ width: 600, height: 400 });
   const [view, setView] = useState<View | null>(null);
   const [follow, setFollow] = useState(false);
   const [tilted, setTilted] = useState(false);
-  /** The points that are measured between. */
-  const [ruler, setRuler] = useState<Point[] | null>(null);
   const drag = useRef<{ x: number; y: number; moved: boolean } | null>(null);
 
   useEffect(() => {
@@ -51,15 +57,12 @@ export function FlightMap(props: MapProps) {
     return () => watch.disconnect();
   }, []);
 
-  const whole = useMemo(() => fit(props, size), [size, props.place, planKey(props.flight)]);
-  const position = props.flight.status(props.robot)?.position;
+  const whole = useMemo(() => fit(props.fitted, size), [size, props.fitted]);
   let shown = view ?? whole;
-  if (follow && position?.[0] != null && position[1] != null) {
-    shown = { ...shown, east: position[0], north: position[1] };
+  if (follow && props.followed) {
+    shown = { ...shown, east: props.followed[0], north: props.followed[1] };
   }
   const sight = new Sight(shown, size, tilted);
-  const x = (east: number) => sight.x(east);
-  const y = (north: number) => sight.y(north);
   const zoom = (factor: number) => {
     const scale = Math.min(400, Math.max(0.05, shown.scale * factor));
     setView({ ...shown, scale });
@@ -72,39 +75,24 @@ export function FlightMap(props: MapProps) {
       north: shown.north + dy / shown.scale / sight.lies,
     });
   };
-
-  const own = props.flight.status(props.robot)?.position?.[2] ?? null;
-  const marks = props.flight.marks.at(props.flight.now, props.flight.recorded);
-  const map = useArchive(props.scenery.tiles, props.flight.token);
-  const traffic = trafficOf(props.flight.mission.status, props.robot);
-
+  const all = () => {
+    setFollow(false);
+    setView(null);
+  };
+  const map = useArchive(props.scenery.tiles, props.token);
   const keys: Record<string, () => void> = {
     "+": () => zoom(ZOOM),
     "=": () => zoom(ZOOM),
     "-": () => zoom(1 / ZOOM),
-    "0": () => (setFollow(false), setView(null)),
+    "0": all,
     f: () => setFollow(!follow),
     t: () => setTilted(!tilted),
-    m: () => measure(),
     ArrowLeft: () => pan(40, 0),
     ArrowRight: () => pan(-40, 0),
     ArrowUp: () => pan(0, 40),
     ArrowDown: () => pan(0, -40),
-    Enter: () => place([shown.east, shown.north]),
-  };
-  const drawing = props.drawn;
-  const measure = () => setRuler(ruler ? null : []);
-  if (ruler) {
-    keys["Backspace"] = () => setRuler(ruler.slice(0, -1));
-    keys["Escape"] = () => setRuler(null);
-  } else if (drawing) {
-    keys["Backspace"] = () => drawing.undo();
-    keys["Escape"] = () => drawing.cancel();
-  }
-  const place = (point: Point) => {
-    if (ruler) setRuler([...ruler, point]);
-    else if (drawing) drawing.add(point);
-    else if (props.mayFly) props.onMark(point);
+    Enter: () => props.onPoint([shown.east, shown.north], sight),
+    ...props.keys,
   };
 
   return (
@@ -114,7 +102,7 @@ export function FlightMap(props: MapProps) {
         ref={box}
         tabIndex={0}
         role="application"
-        aria-label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, T tilts the view, M measures, Enter sets a waypoint, a corner of the survey that is drawn, or a point that is measured, at the cross."
+        aria-label={props.label}
         data-testid="map"
         data-scale={shown.scale}
         data-east={shown.east}
@@ -148,58 +136,14 @@ export function FlightMap(props: MapProps) {
           drag.current = null;
           if (!from || from.moved) return;
           const at = event.currentTarget.getBoundingClientRect();
-          place(sight.metres(event.clientX - at.left, event.clientY - at.top));
+          props.onPoint(sight.metres(event.clientX - at.left, event.clientY - at.top), sight);
         }}
       >
         <svg width={size.width} height={size.height} aria-hidden="true">
           {map.tiles && <TileLayer tiles={map.tiles} archive={map.archive} sight={sight} />}
           <Grid sight={sight} />
           <SceneryLayer shapes={props.scenery.shapes} sight={sight} />
-          {props.place.fences.map((fence) => (
-            <g key={fence.robot}>
-              {fence.polygon.length > 2 && <polygon class="fence" points={sight.line(fence.polygon)} />}
-              {fence.noFly.map((zone, number) => (
-                <polygon key={number} class="nofly" points={sight.line(zone)} />
-              ))}
-            </g>
-          ))}
-          {props.areas.map(({ lease, polygon, title }) => (
-            <g key={lease} class="area" data-lease={lease}>
-              <polygon points={sight.line(polygon)} />
-              <text {...middle(polygon, sight)}>{title}</text>
-            </g>
-          ))}
-          <g class="home" transform={`translate(${x(0)} ${y(0)})`}>
-            <circle r="9" />
-            <text dy="4">H</text>
-          </g>
-          <MarkLayer marks={marks} now={props.flight.now} stale={props.flight.stale} sight={sight} />
-          {props.flight.mission.robots.map((robot, number) => {
-            const status = props.flight.status(robot);
-            if (!status) return null;
-            return (
-              <g key={robot} class={`robot r${number % 6}`}>
-                <polyline class="trail" points={sight.line(props.flight.trails.get(robot) ?? [])} />
-                <Plan status={status} sight={sight} />
-                <Drone
-                  name={robot}
-                  status={status}
-                  sight={sight}
-                  chosen={robot === props.robot}
-                  stale={props.flight.stale}
-                />
-              </g>
-            );
-          })}
-          <TrafficLayer traffic={traffic} own={own} stale={props.flight.stale} sight={sight} />
-          {drawing && <SurveyLayer drawn={drawing} sight={sight} box={box} />}
-          {ruler && <RulerLayer points={ruler} sight={sight} />}
-          {props.marked && (
-            <g class="marked" transform={`translate(${x(props.marked[0])} ${y(props.marked[1])})`}>
-              <circle r="10" />
-              <path d="M-15 0H15M0-15V15" />
-            </g>
-          )}
+          {props.children(sight, box)}
           <path class="cross" d={`M${size.width / 2 - 6} ${size.height / 2}h12m-6-6v12`} />
         </svg>
         <Scale scale={shown.scale} />
@@ -216,25 +160,7 @@ export function FlightMap(props: MapProps) {
         </div>
       </div>
       <div class="mapkeys">
-        {props.mayFly && (
-          <button
-            type="button"
-            class="draw"
-            title="Draw an area to survey"
-            aria-pressed={drawing !== null}
-            onClick={drawing ? drawing.cancel : props.onDraw}
-          >
-            Survey
-          </button>
-        )}
-        <button
-          type="button"
-          title="Measure distances (M)"
-          aria-pressed={ruler !== null}
-          onClick={measure}
-        >
-          Measure
-        </button>
+        {props.buttons}
         <button
           type="button"
           title="Look from the south, and see heights (T)"
@@ -254,14 +180,7 @@ export function FlightMap(props: MapProps) {
         >
           −
         </button>
-        <button
-          type="button"
-          title="Show all (0)"
-          onClick={() => {
-            setFollow(false);
-            setView(null);
-          }}
-        >
+        <button type="button" title="Show all (0)" onClick={all}>
           All
         </button>
         <button
@@ -273,40 +192,181 @@ export function FlightMap(props: MapProps) {
           Follow
         </button>
       </div>
-      {ruler && (
-        <p class="measured" role="status" data-testid="measured">
-          {measured(ruler)}
-        </p>
-      )}
-      <ul class="legend" aria-label="Legend">
-        <li class="visited">visited</li>
-        <li class="current">current</li>
-        <li class="coming">coming</li>
-        <li class="fenced">fence</li>
-        <li class="forbidden">no-fly</li>
-        {marks.length > 0 && (
-          <li class="sighted">
-            seen<span class="unseen">: {[...marks].reverse().map((one) => nameOf(one.what)).join(", ")}</span>
-          </li>
-        )}
-        {traffic.length > 0 && (
-          <li class="aircraft">
-            aircraft
-            <span class="unseen">
-              :{" "}
-              {traffic
-                .map((one) => `${one.callsign} ${heightOf(one, own)}, ${headingOf(one)}`)
-                .join("; ")}
-            </span>
-          </li>
-        )}
-        {props.areas.length > 0 && (
-          <li class="leased">
-            lease<span class="unseen">: {props.areas.map((one) => one.title).join("; ")}</span>
-          </li>
-        )}
-      </ul>
+      {props.below}
     </section>
+  );
+}
+
+/** Home, the fences and no-fly zones of an environment, and the areas of leases. */
+export function PlaceLayer(props: { place: Place; areas: LeasedArea[]; sight: Sight }) {
+  const { place, areas, sight } = props;
+  // Drones that share a fence have it drawn once.
+  const fences = useMemo(() => {
+    const shapes = place.fences.map((one) => [JSON.stringify([one.polygon, one.noFly]), one] as const);
+    return [...new Map(shapes).values()];
+  }, [place]);
+  return (
+    <>
+      {fences.map((fence) => (
+        <g key={fence.robot}>
+          {fence.polygon.length > 2 && <polygon class="fence" points={sight.line(fence.polygon)} />}
+          {fence.noFly.map((zone, number) => (
+            <polygon key={number} class="nofly" points={sight.line(zone)} />
+          ))}
+        </g>
+      ))}
+      {areas.map(({ lease, polygon, title }) => (
+        <g key={lease} class="area" data-lease={lease}>
+          <polygon points={sight.line(polygon)} />
+          <text {...middle(polygon, sight)}>{title}</text>
+        </g>
+      ))}
+      <g class="home" transform={`translate(${sight.x(0)} ${sight.y(0)})`}>
+        <circle r="9" />
+        <text dy="4">H</text>
+      </g>
+    </>
+  );
+}
+
+export interface MapProps {
+  flight: Flight;
+  place: Place;
+  scenery: SceneryOut;
+  areas: LeasedArea[];
+  robot: string;
+  mayFly: boolean;
+  marked: Point | null;
+  onMark(point: Point | null): void;
+  /** The survey that is being drawn; a click is a corner then. */
+  drawn: Drawn | null;
+  onDraw(): void;
+}
+
+/** The map of one flight. */
+export function FlightMap(props: MapProps) {
+  const { flight, place, marked } = props;
+  const drawing = props.drawn;
+  /** The points that are measured between. */
+  const [ruler, setRuler] = useState<Point[] | null>(null);
+  const fitted = useMemo(() => pointsOf(props), [place, planKey(flight)]);
+  const position = flight.status(props.robot)?.position;
+  const own = position?.[2] ?? null;
+  const marks = flight.marks.at(flight.now, flight.recorded);
+  const traffic = trafficOf(flight.mission.status, props.robot);
+  const measure = () => setRuler(ruler ? null : []);
+  const keys: Record<string, () => void> = { m: measure };
+  if (ruler) keys["Backspace"] = () => setRuler(ruler.slice(0, -1));
+  else if (drawing) keys["Backspace"] = () => drawing.undo();
+  const unmark = marked ? () => props.onMark(null) : null;
+  useEscape(ruler ? () => setRuler(null) : drawing ? () => drawing.cancel() : unmark);
+  return (
+    <MapView
+      label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, T tilts the view, M measures, Enter sets a waypoint, a corner of the survey that is drawn, or a point that is measured, at the cross."
+      scenery={props.scenery}
+      token={flight.token}
+      fitted={fitted}
+      followed={position?.[0] != null && position[1] != null ? [position[0], position[1]] : null}
+      keys={keys}
+      onPoint={(point) => {
+        if (ruler) setRuler([...ruler, point]);
+        else if (drawing) drawing.add(point);
+        else if (props.mayFly) props.onMark(point);
+      }}
+      buttons={
+        <>
+          {props.mayFly && (
+            <button
+              type="button"
+              class="draw"
+              title="Draw an area to survey"
+              aria-pressed={drawing !== null}
+              onClick={drawing ? drawing.cancel : props.onDraw}
+            >
+              Survey
+            </button>
+          )}
+          <button
+            type="button"
+            title="Measure distances (M)"
+            aria-pressed={ruler !== null}
+            onClick={measure}
+          >
+            Measure
+          </button>
+        </>
+      }
+      below={
+        <>
+          {ruler && (
+            <p class="measured" role="status" data-testid="measured">
+              {measured(ruler)}
+            </p>
+          )}
+          <ul class="legend" aria-label="Legend">
+            <li class="visited">visited</li>
+            <li class="current">current</li>
+            <li class="coming">coming</li>
+            <li class="fenced">fence</li>
+            <li class="forbidden">no-fly</li>
+            {marks.length > 0 && (
+              <li class="sighted">
+                seen<span class="unseen">: {[...marks].reverse().map((one) => nameOf(one.what)).join(", ")}</span>
+              </li>
+            )}
+            {traffic.length > 0 && (
+              <li class="aircraft">
+                aircraft
+                <span class="unseen">
+                  :{" "}
+                  {traffic
+                    .map((one) => `${one.callsign} ${heightOf(one, own)}, ${headingOf(one)}`)
+                    .join("; ")}
+                </span>
+              </li>
+            )}
+            {props.areas.length > 0 && (
+              <li class="leased">
+                lease<span class="unseen">: {props.areas.map((one) => one.title).join("; ")}</span>
+              </li>
+            )}
+          </ul>
+        </>
+      }
+    >
+      {(sight, box) => (
+        <>
+          <PlaceLayer place={place} areas={props.areas} sight={sight} />
+          <MarkLayer marks={marks} now={flight.now} stale={flight.stale} sight={sight} />
+          {flight.mission.robots.map((robot, number) => {
+            const status = flight.status(robot);
+            if (!status) return null;
+            return (
+              <g key={robot} class={`robot r${number % 6}`}>
+                <polyline class="trail" points={sight.line(flight.trails.get(robot) ?? [])} />
+                <Plan status={status} sight={sight} />
+                <Drone
+                  name={robot}
+                  status={status}
+                  sight={sight}
+                  chosen={robot === props.robot}
+                  stale={flight.stale}
+                />
+              </g>
+            );
+          })}
+          <TrafficLayer traffic={traffic} own={own} stale={flight.stale} sight={sight} />
+          {drawing && <SurveyLayer drawn={drawing} sight={sight} box={box} />}
+          {ruler && <RulerLayer points={ruler} sight={sight} />}
+          {marked && (
+            <g class="marked" transform={`translate(${sight.x(marked[0])} ${sight.y(marked[1])})`}>
+              <circle r="10" />
+              <path d="M-15 0H15M0-15V15" />
+            </g>
+          )}
+        </>
+      )}
+    </MapView>
   );
 }
 
@@ -323,13 +383,18 @@ function planKey(flight: Flight): string {
     .join();
 }
 
-/** The view that shows home, starts, waypoints and the fences that are not far beyond them. */
-function fit({ flight, place }: MapProps, size: Size): View {
+/** Home, starts, waypoints and fences. */
+function pointsOf({ flight, place }: MapProps): Point[] {
   const points: Point[] = [[0, 0], ...place.starts];
   for (const status of Object.values(flight.mission.status)) {
     for (const [east, north] of Object.values(status.places)) points.push([east, north]);
   }
   for (const fence of place.fences) points.push(...fence.polygon);
+  return points;
+}
+
+/** The view that shows some points. */
+function fit(points: readonly Point[], size: Size): View {
   const easts = points.map(([east]) => east);
   const norths = points.map(([, north]) => north);
   const [left, right] = [Math.min(...easts), Math.max(...easts)];

@@ -10,19 +10,24 @@ const LABELS = 24;
 /** Standard deviations of the circle around a drone that says how well its place is known. */
 const SIGMAS = 2;
 
-export function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
+/** The line from a drone along the waypoints that lie ahead of it. */
+export function Way({ status, sight }: { status: StatusOut; sight: Sight }) {
   const ahead = aheadOf(status);
-  const known = Object.entries(status.places);
-  const way: Spot[] = [];
   const [east, north, up] = status.position ?? [];
-  if (east != null && north != null) way.push([east, north, up ?? 0]);
+  const way: Spot[] = east != null && north != null ? [[east, north, up ?? 0]] : [];
   for (const id of ahead) {
     const place = status.places[id];
     if (place) way.push(place);
   }
+  return ahead.length > 0 ? <polyline class="way" points={sight.line(way)} /> : null;
+}
+
+export function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
+  const ahead = aheadOf(status);
+  const known = Object.entries(status.places);
   return (
     <g>
-      {ahead.length > 0 && <polyline class="way" points={sight.line(way)} />}
+      <Way status={status} sight={sight} />
       {sight.tilted && known.map(([id, place]) => <Stem key={id} place={place} sight={sight} />)}
       {known.map(([id, [east, north, up]]) => {
         const number = ahead.indexOf(id);
@@ -58,13 +63,15 @@ function Stem({ place, sight }: { place: Spot; sight: Sight }) {
 
 interface DroneProps {
   name: string;
-  status: StatusOut;
+  status: Pick<StatusOut, "position" | "velocity" | "yaw" | "position_sigma">;
   sight: Sight;
   chosen: boolean;
   stale: boolean;
+  /** Whether its name stands below it: names of drones side by side would cover each other. */
+  below?: boolean;
 }
 
-export function Drone({ name, status, sight, chosen, stale }: DroneProps) {
+export function Drone({ name, status, sight, chosen, stale, below = false }: DroneProps) {
   const [east, north, up] = status.position ?? [];
   if (east == null || north == null) return null;
   const turn = 90 - ((status.yaw ?? Math.PI / 2) * 180) / Math.PI;
@@ -87,7 +94,7 @@ export function Drone({ name, status, sight, chosen, stale }: DroneProps) {
           d="M0-14L9 10L0 5L-9 10Z"
           transform={`scale(1 ${sight.lies}) rotate(${turn})`}
         />
-        <text y="-20">
+        <text y={below ? 26 : -20}>
           {name}
           {up != null && <tspan class="small"> {up.toFixed(1)} m</tspan>}
         </text>

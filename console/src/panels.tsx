@@ -1,7 +1,7 @@
 // The panels beside the map: state, commands, alerts.
 
-import { useEffect, useState } from "preact/hooks";
-import { type Flight, type Order, type Word, speedOf } from "./flight";
+import { Attitude } from "./attitude";
+import { type AlertLog, type Flight, type Order, speedOf } from "./flight";
 import type { Point } from "./place";
 import { Sound } from "./sound";
 import type { NavigationIn, StatusOut } from "./wire";
@@ -32,6 +32,7 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
       <p class="why" data-testid="why">
         {status.reason || UNSAID[status.state] || "as planned"}
       </p>
+      <Attitude status={status} />
       <dl>
         <Figure name="Height" unit="m" value={height?.toFixed(1)} />
         <Figure name="Speed" unit="m/s" value={speed?.toFixed(1)} />
@@ -119,74 +120,52 @@ function Figure(props: {
   );
 }
 
-function tone(status: StatusOut): string {
+/** The colour of a state. */
+export function tone(status: StatusOut): string {
   if (status.state === "aborted" || status.mode === "lost") return "bad";
   return ["paused", "returning", "diverted"].includes(status.state) ? "warn" : "good";
 }
 
-const BUTTONS: { word: Word; name: string; title: string; sure: boolean }[] = [
-  { word: "pause", name: "Pause", title: "Hover until told to resume", sure: false },
-  { word: "resume", name: "Resume", title: "Go on where it was paused", sure: false },
-  { word: "return-home", name: "Return", title: "Fly back to take-off and land", sure: false },
-  { word: "clear", name: "Stop", title: "Drop the plan and hover here", sure: true },
-  { word: "land", name: "Land", title: "Land at once, where the drone is", sure: true },
-];
-const SURE = 4000;
-
-export function Commands(props: { flight: Flight; robot: string; mayFly: boolean }) {
+/** The commands given from this page with what became of them, and all that the flight records. */
+export function CommandLog(props: { flight: Flight; robot: string; mayFly: boolean }) {
   const { flight, robot, mayFly } = props;
-  const [asked, setAsked] = useState<Word | null>(null);
-  useEffect(() => {
-    if (asked === null) return;
-    const timer = setTimeout(() => setAsked(null), SURE);
-    return () => clearTimeout(timer);
-  }, [asked]);
-  const state = flight.status(robot)?.state;
-  const senseless = (word: Word) =>
-    (word === "pause" && state === "paused") || (word === "resume" && state !== "paused");
+  const { commands } = flight.log;
+  if (flight.recorded && commands.length === 0) return null;
   return (
-    <section class="card commands" aria-label="Commands">
+    <section class="card commandlog" aria-label="Commands">
       <header>
         <h2>Commands</h2>
-        {!mayFly && <span class="badge">you may watch</span>}
+        {!mayFly && !flight.recorded && <span class="badge">you may watch</span>}
       </header>
-      <div class="buttons">
-        {BUTTONS.map(({ word, name, title, sure }) => (
-          <button
-            key={word}
-            type="button"
-            class={`command ${word}`}
-            title={title}
-            disabled={!mayFly || flight.over || senseless(word)}
-            onClick={() => {
-              if (sure && asked !== word) {
-                setAsked(word);
-                return;
-              }
-              setAsked(null);
-              flight.command(robot, word);
-            }}
-          >
-            {asked === word ? `${name}: sure?` : name}
-          </button>
-        ))}
-      </div>
       {mayFly && !flight.over && <p class="hint">Click the map to send {robot} there.</p>}
-      <ol class="orders" aria-live="polite" data-testid="orders">
-        {flight.orders.map((order) => (
-          <OrderLine key={order.id} order={order} />
-        ))}
-      </ol>
+      {!flight.recorded && (
+        <ol class="orders" aria-live="polite" data-testid="orders">
+          {flight.orders.map((order) => (
+            <OrderLine key={order.id} order={order} />
+          ))}
+        </ol>
+      )}
+      {commands.length > 0 && (
+        <details open={flight.recorded}>
+          <summary>All commands of this flight: {commands.length}</summary>
+          <ol class="given" data-testid="given">
+            {commands.map((text, place) => (
+              <li key={commands.length - place}>{text}</li>
+            ))}
+          </ol>
+        </details>
+      )}
     </section>
   );
 }
 
-const STAGES: Record<Order["stage"], string> = {
+export const STAGES: Record<Order["stage"], string> = {
   asked: "asking…",
   accepted: "accepted, under way",
   done: "done",
   refused: "refused",
   unconfirmed: "accepted, not seen done",
+  unanswered: "no answer: look whether it is carried out",
 };
 
 function OrderLine({ order }: { order: Order }) {
@@ -237,12 +216,7 @@ export function WaypointForm(props: {
     onDone();
   };
   return (
-    <form
-      class="card waypointform"
-      aria-label="New waypoint"
-      onSubmit={send}
-      onKeyDown={(event) => event.key === "Escape" && onDone()}
-    >
+    <form class="card waypointform" aria-label="New waypoint" onSubmit={send}>
       <h2>Send {robot} here</h2>
       <Field name="east" label="East, m" value={point[0].toFixed(1)} />
       <Field name="north" label="North, m" value={point[1].toFixed(1)} />
@@ -304,30 +278,37 @@ export function Field(props: {
   );
 }
 
-export function Alerts({ flight }: { flight: Flight }) {
-  const open = flight.alerts.filter((one) => !one.acknowledged);
+export function Alerts(props: {
+  log: AlertLog;
+  recorded: boolean;
+  /** Of one of them, or of all for null. */
+  onAcknowledge(id: number | null): void;
+}) {
+  const { log, recorded, onAcknowledge } = props;
+  const open = log.alerts.filter((one) => !one.acknowledged);
   return (
     <section class="card alerts" aria-label="Alerts">
       <header>
         <h2>Alerts</h2>
         <span class={`badge ${open.length ? "warn" : "good"}`} data-testid="alerts">
-          {flight.recorded
-            ? `${flight.alerts.length} so far`
+          {recorded
+            ? `${log.alerts.length} so far`
             : open.length
               ? `${open.length} new`
               : "none new"}
         </span>
-        {!flight.recorded && <Sound flight={flight} />}
+        {!recorded && <Sound log={log} />}
         {open.length > 1 && (
-          <button type="button" class="plain" onClick={() => flight.acknowledge(null)}>
+          <button type="button" class="plain" onClick={() => onAcknowledge(null)}>
             Acknowledge all
           </button>
         )}
       </header>
       <ul aria-live="polite">
-        {flight.alerts.map((one) => (
-          <li key={one.id} class={one.acknowledged && !flight.recorded ? "old" : "new"}>
+        {log.alerts.map((one) => (
+          <li key={one.id} class={one.acknowledged && !recorded ? "old" : "new"}>
             <span>
+              {one.source && <span class="muted">{one.source}: </span>}
               <strong>{one.kind.replaceAll("_", " ")}</strong> {one.text}
               {one.count > 1 && <em> ×{one.count}</em>}
             </span>
@@ -336,14 +317,14 @@ export function Alerts({ flight }: { flight: Flight }) {
                 type="button"
                 class="plain"
                 aria-label={`Acknowledge: ${one.text}`}
-                onClick={() => flight.acknowledge(one.id)}
+                onClick={() => onAcknowledge(one.id)}
               >
                 OK
               </button>
             )}
           </li>
         ))}
-        {flight.alerts.length === 0 && <li class="empty">Nothing so far</li>}
+        {log.alerts.length === 0 && <li class="empty">Nothing so far</li>}
       </ul>
     </section>
   );

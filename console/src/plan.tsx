@@ -1,7 +1,7 @@
 // The coming waypoints: dragged or moved by keys into another order, or left out.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { type Flight, aheadOf } from "./flight";
+import { type Flight, aheadOf, ending } from "./flight";
 import type { StatusOut } from "./wire";
 
 /** Milliseconds after the last key before the order is asked for. */
@@ -18,7 +18,8 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   const [dragged, setDragged] = useState<string | null>(null);
   const list = useRef<HTMLOListElement>(null);
   const timer = useRef(0);
-  const mayFly = props.mayFly && !flight.over;
+  const over = status !== undefined && ending(status);
+  const mayFly = props.mayFly && !over;
   useEffect(() => () => clearTimeout(timer.current), []);
   if (!status || (target === null && coming.length === 0)) return null;
 
@@ -66,12 +67,15 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
     }
   };
 
+  const left = coming.length + (target === null ? 0 : 1);
   return (
-    <section class="card plan" aria-label="Plan">
+    <section class={`card plan ${over ? "over" : ""}`} aria-label="Plan">
       <header>
         <h2>Plan</h2>
-        <span class="badge">
-          {aheadOf(status).length} to go{target !== null && `, now ${target}`}
+        <span class="badge" data-testid="to-go">
+          {over
+            ? `${status.state}: ${left} left out`
+            : `${left} to go${target !== null ? `, now ${target}` : ""}`}
         </span>
       </header>
       {mayFly && shown.length > 0 && (
@@ -79,9 +83,9 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
       )}
       <ol ref={list} data-testid="plan">
         {target !== null && (
-          <li class="current" data-plan={target}>
+          <li class={over ? "" : "current"} data-plan={target}>
             <span class="handle" aria-hidden="true">
-              ▶
+              {over ? "○" : "▶"}
             </span>
             <Place status={status} id={target} />
             {mayFly && <Remove id={target} word="Skip" onRemove={remove} />}

@@ -1,7 +1,15 @@
 // A recorded flight as a source: the same words as from the live socket, at any moment asked for.
 
 import { answered } from "./connection";
-import { type Alert, type Sample, shifted, speedOf } from "./flight";
+import {
+  type Alert,
+  AlertLog,
+  COMMAND_KIND,
+  MOST_ALERTS,
+  type Sample,
+  shifted,
+  speedOf,
+} from "./flight";
 import type { Spot } from "./place";
 import type { FlightEars, ItemEars, Past, Source, Wanted } from "./source";
 import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
@@ -11,9 +19,16 @@ const STEP = 50;
 const TRAIL = 3000;
 const LONGEST_STEP = 0.25;
 const NEWLINE = 10;
-const MOST_ALERTS = 100;
 /** Seconds after which another aircraft is forgotten, as a vehicle forgets it. */
 const FORGOTTEN = 10;
+
+/** Seconds of its beginning that a recording may be opened after, so that its camera shows something. */
+const OPENING = 10;
+
+/** Where a recording is opened: at its first picture, if that comes early. */
+function openingOf({ begin, pictured }: RecordedOut): number {
+  return pictured !== null && pictured < begin + OPENING ? pictured : begin;
+}
 
 /** Place of the last of some times at or before `time`; -1 for none. */
 export function lastBefore<T>(items: readonly T[], time: number, of: (item: T) => number): number {
@@ -47,7 +62,7 @@ export class Playback implements Source {
     begin: number | null,
   ) {
     this.tracks = Object.entries(flight.tracks).map(([robot, one]) => [robot, new Track(one)]);
-    this.time = this.within(begin ?? flight.begin);
+    this.time = this.within(begin ?? openingOf(flight));
   }
 
   follow(ears: FlightEars): void {
@@ -184,7 +199,7 @@ export class Playback implements Source {
     const past: Past = {
       trails: new Map<string, Spot[]>(),
       history: new Map<string, Sample[]>(),
-      alerts: this.alerts(),
+      log: this.log(),
       analytics: this.flight.analytics,
     };
     for (const [robot, track] of this.tracks) {
@@ -200,18 +215,27 @@ export class Playback implements Source {
     this.led?.show(this.time);
   }
 
-  /** Alerts until now, the newest first; one that repeats itself counts up. */
-  private alerts(): Alert[] {
+  /** Commands and alerts until now, the newest first; an alert that repeats itself counts up. */
+  private log(): AlertLog {
     const known = new Map<string, Alert>();
+    const commands: string[] = [];
     const until = lastBefore(this.flight.alerts, this.time, (one) => one.time);
     for (const { kind, text } of this.flight.alerts.slice(0, until + 1)) {
+      if (kind === COMMAND_KIND) {
+        commands.push(text);
+        continue;
+      }
       const key = `${kind}: ${text}`;
       const before = known.get(key);
       known.delete(key);
       const count = (before?.count ?? 0) + 1;
-      known.set(key, { id: known.size + 1, kind, text, count, acknowledged: true });
+      known.set(key, { id: known.size + 1, source: "", kind, text, count, acknowledged: true });
     }
-    return [...known.values()].reverse().slice(0, MOST_ALERTS);
+    const newest = <T>(list: T[]) => list.reverse().slice(0, MOST_ALERTS);
+    return Object.assign(new AlertLog(), {
+      alerts: newest([...known.values()]),
+      commands: newest(commands),
+    });
   }
 }
 
@@ -269,6 +293,8 @@ class Track {
       position: this.track.position[row] ?? null,
       velocity: this.track.velocity[row] ?? null,
       yaw: this.track.yaw[row] ?? null,
+      roll: this.track.roll[row] ?? null,
+      pitch: this.track.pitch[row] ?? null,
       battery: this.track.battery[row] ?? null,
       distance: this.track.distance[row] ?? 0,
       outlook: this.track.outlook[row] ?? null,

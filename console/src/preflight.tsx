@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { Refused, ask } from "./connection";
-import type { HealthItem, PreflightOut, RobotOut, Verdict } from "./wire";
+import type { HealthItem, PreflightOut, Verdict } from "./wire";
 
 const LOOK = 2000;
 /** Seconds after which the list is shown as old. */
@@ -64,52 +64,7 @@ export function PreflightPanel(props: {
   );
 }
 
-/** The drones of a fleet, each with its list. */
-export function Garage({ robots, token }: { robots: RobotOut[]; token: string }) {
-  const [open, setOpen] = useState<string | null>(null);
-  if (robots.length === 0) return null;
-  return (
-    <section class="garage" aria-label="Drones">
-      <h2>Drones</h2>
-      {robots.map((one) => (
-        <details
-          key={one.id}
-          class="card preflight"
-          open={open === one.id}
-          onToggle={(event) => {
-            const shown = event.currentTarget.open;
-            setOpen((before) => (shown ? one.id : before === one.id ? null : before));
-          }}
-        >
-          {open === one.id ? (
-            <PreflightList title={one.id} robot={one.id} token={token} live />
-          ) : (
-            <summary>
-              <h2>{one.id}</h2>
-              <Badge verdict={one.preflight} />
-              <span class="hint">{whereabouts(one)}</span>
-            </summary>
-          )}
-        </details>
-      ))}
-    </section>
-  );
-}
-
-function whereabouts(one: RobotOut): string {
-  const charge = one.battery === null ? "" : `, ${(100 * one.battery).toFixed(0)} %`;
-  return (one.enabled ? LINKS[one.link] : "out of service") + charge;
-}
-
-const LINKS: Record<RobotOut["link"], string> = {
-  unwatched: "nobody is connected",
-  connecting: "connecting",
-  connected: "connected",
-  mission: "in a mission",
-  lost: "lost",
-};
-
-function Badge({ verdict, count }: { verdict: Verdict | null; count?: number }) {
+export function Badge({ verdict, count }: { verdict: Verdict | null; count?: number }) {
   if (verdict === null) return <span class="badge">no list</span>;
   const { mark, tone } = WORDS[verdict];
   const many = count === undefined ? "" : `: ${count}`;

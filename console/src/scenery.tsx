@@ -15,19 +15,19 @@ const TOP = 0.25;
 /** Kinds that lie flat, below all that stands. */
 const FLAT = new Set(["road", "crops"]);
 
-/** The scenery of a flight; an empty one until it is known. */
-export function useScenery(mission: string, token: string, recorded?: SceneryOut): SceneryOut {
+/** The scenery that the server tells at a path, an empty one until then; or the recorded one. */
+export function useScenery(path: string, token: string, recorded?: SceneryOut): SceneryOut {
   const [found, setFound] = useState<SceneryOut>({ shapes: [], tiles: null });
   useEffect(() => {
     if (recorded) return;
     let gone = false;
-    ask<SceneryOut>(`v1/missions/${mission}/scenery`, token)
+    ask<SceneryOut>(path, token)
       .then((scenery) => !gone && setFound(scenery))
       .catch(() => undefined); // The flight can be seen without.
     return () => {
       gone = true;
     };
-  }, [mission, token, recorded]);
+  }, [path, token, recorded]);
   return recorded ?? found;
 }
 

@@ -1,17 +1,17 @@
 // A tone for each new alert, where the operator has switched it on.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import type { Flight } from "./flight";
+import type { AlertLog } from "./flight";
 
 const KEPT = "aerodaas.sound";
 const TONES = [880, 660];
 const EACH = 0.14;
 
 /** A switch that sounds when an alert comes in of which this page has not sounded before. */
-export function Sound({ flight }: { flight: Flight }) {
+export function Sound({ log }: { log: AlertLog }) {
   const [on, setOn] = useState(() => localStorage.getItem(KEPT) === "on");
   const player = useRef<AudioContext | null>(null);
-  const newest = flight.alerts[0]?.id ?? 0;
+  const newest = log.alerts[0]?.id ?? 0;
   const heard = useRef(newest);
   useEffect(() => {
     const later = newest > heard.current;

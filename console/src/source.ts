@@ -1,7 +1,7 @@
 // Where a flight's state and pictures come from: the live socket here, a recording in playback.ts.
 
 import { LiveSocket } from "./connection";
-import type { Alert, Sample } from "./flight";
+import type { AlertLog, Sample } from "./flight";
 import type { Spot } from "./place";
 import { wantedForm } from "./video_pictures";
 import type { AnalyticsOut, MissionOut } from "./wire";
@@ -10,7 +10,7 @@ import type { AnalyticsOut, MissionOut } from "./wire";
 export interface Past {
   trails: Map<string, Spot[]>;
   history: Map<string, Sample[]>;
-  alerts: Alert[];
+  log: AlertLog;
   analytics: AnalyticsOut[];
 }
 

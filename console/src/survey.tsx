@@ -85,8 +85,8 @@ export function useSurvey(
   const path = useMemo<Point[]>(() => plan?.waypoints.map((one) => [one.x, one.y]) ?? [], [plan]);
   const photos = plan?.photos?.places ?? NOWHERE;
   const begin = () => {
-    // Map and form stand at the top.
-    scrollTo({ top: 0 });
+    // Of one column, map and form stand at the top.
+    document.querySelector(".map")?.scrollIntoView({ block: "nearest" });
     name.current = `s${Date.now().toString(36).slice(-4)}`;
     setArea([]);
     setSettings({
@@ -187,7 +187,6 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
         event.preventDefault();
         survey.fly();
       }}
-      onKeyDown={(event) => event.key === "Escape" && survey.cancel()}
     >
       <h2>Survey an area with {survey.robot}</h2>
       <p class="hint">

@@ -26,7 +26,14 @@ const TARGETS: Record<Target["state"], { text: string; tone: string }> = {
   unseen: { text: "target not in sight", tone: "warn" },
 };
 
-export function Video({ flight }: { flight: Flight }) {
+interface VideoProps {
+  flight: Flight;
+  /** Whether it takes the map's place; with what changes that, where it may. */
+  large?: boolean;
+  onLarge?(large: boolean): void;
+}
+
+export function Video({ flight, large = false, onLarge }: VideoProps) {
   const streams = flight.mission.streams;
   const names = Object.keys(streams).sort();
   const cameras = names.filter((name) => streams[name] === "pictures");
@@ -71,6 +78,13 @@ export function Video({ flight }: { flight: Flight }) {
     };
   }, [camera, finders, flight, deep]);
 
+  if (cameras.length === 0) {
+    return (
+      <section class="card video" aria-label="Camera">
+        <p class="muted">This flight shows no camera</p>
+      </section>
+    );
+  }
   return (
     <section class="card video" aria-label="Camera">
       <header>
@@ -97,6 +111,16 @@ export function Video({ flight }: { flight: Flight }) {
             Depth
           </button>
         )}
+        {onLarge && (
+          <button
+            type="button"
+            class="plain enlarge"
+            title="Have camera and map change places"
+            onClick={() => onLarge(!large)}
+          >
+            {large ? "Small" : "Large"}
+          </button>
+        )}
         {/* Always there: what comes into it is read out. */}
         <span role="status" data-testid="target">
           {seen?.target && <span class={`badge ${TARGETS[seen.target].tone}`}>{TARGETS[seen.target].text}</span>}
@@ -119,11 +143,7 @@ export function Video({ flight }: { flight: Flight }) {
           data-points={seen?.points}
           data-range={seen?.range}
         />
-        {!seen && (
-          <p class="empty">
-            {cameras.length ? "No picture yet" : "This flight shows no camera"}
-          </p>
-        )}
+        {!seen && <p class="empty">No picture yet</p>}
         {seen?.range != null && <Scale range={seen.range} />}
         {seen && (
           <span class="stamp">

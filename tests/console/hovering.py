@@ -45,6 +45,7 @@ class Run:
         self.traffic: tuple[Traffic, ...] = ()
         self.time = 1.0
         """Mission seconds."""
+        self.mission_state = MissionState.ENROUTE
 
     def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """Enroute to a waypoint."""
@@ -64,7 +65,7 @@ class Run:
         )
         outlook = BatteryOutlook(plan=0.61, returns_at=0.27, hover=207.0)
         status = MissionStatus(
-            round(self.time * 10**9), MissionState.ENROUTE, "flying to wp1", target, outlook=outlook
+            round(self.time * 10**9), self.mission_state, "flying to wp1", target, outlook=outlook
         )
         robots = {"drone": SimpleNamespace(status=status, state=vehicle, health=self.health)}
         return SimpleNamespace(robots=robots, alerts=list(self.alerts), reports={})

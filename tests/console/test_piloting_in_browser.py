@@ -170,7 +170,7 @@ def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
         until_state(watcher, "paused")
         watcher.until(f"{figure('Mission time')} > {at} + 4")
         watcher.run(button("resume"))
-        until_done(watcher, "resume")
+        until_done(watcher, "Resume")
         banner = "document.querySelector('[data-testid=banner]')"
         watcher.until(f"{banner}?.innerText.includes('landed')", 90)
         assert watcher.complaints() == []

@@ -16,7 +16,7 @@ from synthetic_flight import SyntheticFlight, record
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.data import Detections
+from aerodaas.types.data import Detections, Frame
 from aerodaas.types.status import Message
 from tools.browser import Browser, Page
 
@@ -48,6 +48,16 @@ class HalfAnalysed(SyntheticFlight):
         for message in super().messages():
             item = message.item
             if not (isinstance(item, Detections) and item.header.id % 2):
+                yield message
+
+
+class LateCamera(SyntheticFlight):
+    """A flight whose camera begins after three seconds."""
+
+    def messages(self) -> Iterator[Message[Any]]:
+        """What the streams carry."""
+        for message in super().messages():
+            if not (isinstance(message.item, Frame) and message.item.header.stamp < 3e9):
                 yield message
 
 
@@ -107,6 +117,23 @@ def test_a_moment_later_the_same_picture_keeps_its_boxes(browser: Browser, path:
         until_stamp(page, stamp, 1)
 
 
+def test_it_opens_at_its_first_picture(browser: Browser, tmp_path: Path) -> None:
+    """Not on a black one; what comes before is there, too, and a moment that is named is shown."""
+    path = tmp_path / "late.mcap"
+    record(path, LateCamera(frames=4.0))
+    first = min(facts(path)[1])
+    with served(path) as address:
+        page = browser.open(address)
+        page.until("document.querySelector('.timeline')")
+        until_stamp(page, first, 1)
+        assert page.run(TIME) == pytest.approx(first / 1e9)
+        page.key("Home")
+        page.until("document.querySelector('.video .empty')")
+        assert page.run(TIME) < first / 1e9
+        page = browser.open(f"{address}&t=0.5")
+        page.until("document.querySelector('.video .empty')")
+
+
 def test_scrubbing_moves_map_picture_state_and_charts_together(
     browser: Browser, path: Path
 ) -> None:
@@ -133,8 +160,8 @@ def test_scrubbing_moves_map_picture_state_and_charts_together(
             said = page.run(f"{BAR}.getAttribute('aria-valuetext')")
             assert said.startswith(f"{time:.1f} of ")
             assert state.replace("_", " ") in said
-            assert abs(float(page.text(".state dd").split()[0]) - up) < 0.16
-            told = page.text(".state dl")
+            assert abs(float(page.text(".state .figure dd").split()[0]) - up) < 0.16
+            told = page.text(".state > dl")
             assert "12 sat., ±1.0 m" in " ".join(told.split())
             assert ("Returns at" in told) is (state in {"enroute", "loitering"})
             # The picture itself: a red disc where the drone was; the box's edge is drawn on it.

@@ -22,7 +22,7 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
         id_ = str(provider.ask("POST", "/v1/missions", wanted)["id"])
         provider.until(lambda: "one" in provider.mission(id_)["status"])
         viewer = provider.user("vera", provider.ask("GET", "/v1/me")["tenant"], "viewer")
-        page = browser.open(f"{provider.url}/#token={viewer}")
+        page = browser.open(f"{provider.url}/#token={viewer}&mission={id_}")
         page.until("document.querySelector('[data-testid=state]')?.innerText === 'enroute'", 60)
         assert page.run(f"{_BANNER} === null")
         flight = process_of(provider, id_)

@@ -85,12 +85,10 @@ def pictures(socket: ClientConnection, seconds: float, most: int) -> list[dict[s
 @needs_peer("AERODAAS_BROWSER")
 def test_the_tenants_viewer_sees_it_decoded(provider: Served, mission: str) -> None:
     """In the page, by WebCodecs; one picture after another, in the camera's size and no black."""
-    del mission
     viewer = provider.user("vera", "farm", "viewer")
+    address = f"{provider.url}/#token={viewer}&mission={mission}"
     with Browser() as browser:
-        page = opened_camera(
-            browser, f"{provider.url}/#token={viewer}", "h264", COUNT_DECODED, "stamp > 0"
-        )
+        page = opened_camera(browser, address, "h264", COUNT_DECODED, "stamp > 0")
         screen = "document.querySelector('[data-testid=video]')"
         assert page.run(DECODES)
         first = float(page.run(f"{screen}.dataset.stamp"))
@@ -107,7 +105,7 @@ def test_who_may_not_sense_sees_no_camera(provider: Served, mission: str) -> Non
     blind = provider.user("ben", "farm", scopes=["fly"])
     stranger = provider.user("eve", "city")
     with Browser() as browser:
-        page = browser.open(f"{provider.url}/#token={blind}&pictures=h264")
+        page = browser.open(f"{provider.url}/#token={blind}&mission={mission}&pictures=h264")
         page.until("document.querySelector('[data-testid=state]')")
         assert page.run("document.querySelector('.video')") is None
         page = browser.open(f"{provider.url}/#token={stranger}&mission={mission}&pictures=h264")

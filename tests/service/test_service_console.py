@@ -24,8 +24,9 @@ AREA = [[-5, -5], [25, -5], [25, 25], [-5, 25]]
 
 @pytest.fixture(scope="module")
 def provider() -> Iterator[Served]:
-    """One drone in real time, without rehearsals."""
-    with Served(fleet(robot("one")), "--no-rehearse") as served:
+    """Three drones in real time, without rehearsals."""
+    drones = [robot("one"), robot("two", 8.0), robot("three", 16.0)]
+    with Served(fleet(*drones), "--no-rehearse") as served:
         yield served
 
 
@@ -65,9 +66,10 @@ def test_the_list_before_take_off_is_told_between_missions_and_in_them(provider:
 
 
 def test_what_lies_below_a_mission_is_told_to_who_sees_it(provider: Served, mission: str) -> None:
-    """Another tenant has no such mission; the world of this fleet is empty."""
+    """Another tenant has no such mission; the world of this fleet, which all see, is empty."""
     path = f"/v1/missions/{mission}/scenery"
     assert provider.ask("GET", path) == {"shapes": [], "tiles": None}
+    assert provider.ask("GET", "/v1/fleet/scenery") == {"shapes": [], "tiles": None}
     stranger = provider.user("stranger", "others", "operator")
     viewer = provider.user("looker", "others", "viewer")
     assert provider.send("GET", path, token=stranger)[0] == 200
@@ -96,12 +98,12 @@ def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission
 @needs_peer("AERODAAS_BROWSER")
 def test_missions_are_watched_and_commanded_by_role(provider: Served, mission: str) -> None:
     """An operator pauses a mission from the page; a viewer of its tenant sees that, and no more."""
-    del mission
     tenant = provider.ask("GET", "/v1/me")["tenant"]
     viewer = provider.user("vera", tenant, "viewer")
     with Browser() as browser:
         pages = [
-            browser.open(f"{provider.url}/#token={token}") for token in (provider.token, viewer)
+            browser.open(f"{provider.url}/#token={token}&mission={mission}")
+            for token in (provider.token, viewer)
         ]
         pilot, watcher = pages
         pilot.until("document.querySelector('.command.pause:not(:disabled)')")
@@ -147,3 +149,65 @@ def test_a_recording_is_played_to_its_own_tenant_once_it_is_there(
         assert provider.send("GET", route, token=stranger)[0] == 404
         assert provider.send("GET", route, token=blind)[0] == 403
         assert provider.send("GET", route, token="")[0] == 401
+
+
+def state_of(provider: Served, mission: str, drone: str) -> str:
+    """What a drone of a mission does; empty while that is not known."""
+    return str(provider.mission(mission)["status"].get(drone, {}).get("state", ""))
+
+
+@needs_peer("AERODAAS_BROWSER")
+def test_a_fleet_is_watched_and_commanded_by_role(provider: Served) -> None:
+    """Each account commands at once the drones that it may command one by one, and no other."""
+    pilot, viewer = provider.user("paul", "orchard"), provider.user("vic", "orchard", "viewer")
+    way = ((40.0, 40.0), (40.0, 0.0), (0.0, 40.0), (40.0, 40.0))
+    missions = {}
+    for drone, token in (("two", pilot), ("three", provider.token)):
+        answer = provider.ask("POST", "/v1/missions", {"document": document(drone, *way)}, token)
+        missions[drone] = str(answer["id"])
+    provider.until(
+        lambda: all(state_of(provider, id_, drone) == "enroute" for drone, id_ in missions.items())
+    )
+    with Browser() as browser:
+        pages = [
+            browser.open(f"{provider.url}/#token={token}")
+            for token in (pilot, viewer, provider.token)
+        ]
+        for page in pages:
+            page.until("document.querySelectorAll('[data-row]').length === 3")
+            page.until("document.querySelector('[data-row=two]').innerText.includes('enroute')")
+            assert page.run("document.querySelectorAll('[data-drone]').length") == 3
+        own, watching, every = pages
+        # Another tenant's drone is on the map, and whose it is stays its own affair.
+        assert "enroute" not in own.text("[data-row=three]")
+        assert own.run("document.querySelector('[data-row=three] input').disabled")
+        assert watching.run("document.querySelectorAll('.command:disabled').length") == 2
+
+        own.run("document.querySelector('.command.pause').click()")
+        own.until("document.querySelector('[data-testid=orders] [data-stage=done]')")
+        assert state_of(provider, missions["two"], "two") == "paused"
+        assert state_of(provider, missions["three"], "three") != "paused"
+        every.until("document.querySelector('[data-row=two]').innerText.includes('paused')")
+
+        # Those that are selected; to have all return is asked once more.
+        every.run("document.querySelector('[data-row=three] input').click()")
+        every.until("document.querySelector('.command.pause').innerText === 'Hold 1'")
+        every.run("document.querySelector('.command.pause').click()")
+        every.until("document.querySelector('[data-testid=orders] [data-stage=done]')")
+        assert state_of(provider, missions["three"], "three") == "paused"
+        every.key("Escape")
+        every.until("document.querySelector('.command.return-home').innerText === 'Return all'")
+        every.run("document.querySelector('.command.return-home').click()")
+        every.until("document.querySelector('.command.return-home').innerText.includes('sure')")
+        assert state_of(provider, missions["two"], "two") == "paused"
+        every.run("document.querySelector('.command.return-home').click()")
+        home = {"returning", "landing", "landed"}
+        provider.until(lambda: all(state_of(provider, missions[d], d) in home for d in missions))
+        # A mission is opened from its row.
+        watching.press("[data-row=two] [data-label=Mission] button")
+        watching.until("document.querySelector('[data-testid=now]')?.innerText.includes('two')")
+        assert [one for page in pages for one in page.complaints()] == []
+    given = [(one["account"], one["target"]) for one in provider.ask("GET", "/v1/audit?limit=1000")
+             if one["action"] in {"mission.pause", "mission.return-home"}]  # fmt: skip
+    assert ("paul", f"{missions['two']}/two") in given
+    assert not [one for one in given if one[0] == "paul" and one[1] != f"{missions['two']}/two"]
