@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.help_examples import ExampleGroup
-from aerodaas.cli.models_evaluate import evaluate_model
 from aerodaas.config.printable import printable
 
 if TYPE_CHECKING:
@@ -152,6 +151,3 @@ def _told(model: str, detector: OnnxDetector) -> list[str]:
     named = "person" if "person" in detector.names else detector.names[0]
     lines.append(f"use       OnnxDetector({model!r}, classes=[{named!r}])")
     return lines
-
-
-app.command("evaluate")(evaluate_model)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from onnx import TensorProto
@@ -20,7 +17,7 @@ from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.models.registry import REGISTRY
 from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.cli.app import app
-from aerodaas.types.errors import ConfigError, ModelError
+from aerodaas.types.errors import ModelError
 
 
 @pytest.fixture
@@ -124,84 +121,3 @@ def test_an_output_without_axes_is_refused(models: Callable[..., Result]) -> Non
     outputs = [np.array(3, np.float32), np.zeros((1, 17, 128), np.float32)]
     constant_model(Path("a.onnx"), outputs)
     assert "the output of no detector" in str(models("check", "a.onnx").exception)
-
-
-@pytest.fixture
-def dataset() -> Path:
-    """Two pictures: one with a white block that the synthetic model sees, and an annotated dog."""
-    folder = Path("data")
-    folder.mkdir()
-    lit = np.zeros((96, 128, 3), np.uint8)
-    lit[:, :] = 255
-    for name, image in (("lit.png", lit), ("dark.png", np.zeros_like(lit))):
-        (folder / name).write_bytes(cv2.imencode(".png", image)[1].tobytes())
-    content = {
-        "images": [{"id": 1, "file_name": "lit.png"}, {"id": 2, "file_name": "dark.png"}],
-        "categories": [{"id": 1, "name": "human"}, {"id": 2, "name": "robot"}],
-        "annotations": [
-            {"image_id": 1, "category_id": 1, "bbox": [20, 20, 40, 40]},
-            {"image_id": 2, "category_id": 1, "bbox": [20, 20, 40, 40]},
-            {"image_id": 2, "category_id": 2, "bbox": [20, 20, 40, 40]},
-        ],
-    }
-    (folder / "coco.json").write_text(json.dumps(content))
-    return folder
-
-
-@pytest.mark.usefixtures("models")
-def test_a_detector_is_evaluated(models: Callable[..., Result], dataset: Path) -> None:
-    """As a table, as files, and as pictures of what went wrong."""
-    pytest.importorskip("pycocotools")
-    patchwork_model(Path("a.onnx"), shape=(1, 3, 96, 128))
-    words = ["evaluate", "a.onnx", str(dataset / "coco.json"), "--rename", "human=person"]
-    outputs = ["--json", "o.json", "--csv", "o.csv", "--worst", "worst", "--threads", "1"]
-    result = models(*words, *outputs)
-    assert result.exception is None, result.exception
-    assert "not evaluated, for the model does not know them: robot" in result.output
-    content = json.loads(Path("o.json").read_text())
-    assert (content["pictures"], content["left_out"]) == (2, ["robot"])
-    (person,) = content["classes"]
-    assert (person["things"], person["recall"], person["false_boxes"]) == (2, 0.5, 0)
-    rows = list(csv.DictReader(Path("o.csv").read_text().splitlines()))
-    assert [row["label"] for row in rows] == ["person", "all"]
-    assert float(rows[0]["ap50"]) == pytest.approx(person["ap50"])
-    assert rows[0]["ap_small"] == "", "there is no such thing"
-    assert [path.name for path in Path("worst").iterdir()] == ["001_missed_dark.jpg"]
-
-
-@pytest.mark.parametrize(
-    ("words", "problem"),
-    [
-        (["--json", "gone/o.json"], "cannot write gone/o.json"),
-        (["--csv", "data"], "cannot write data"),
-        (["--worst", "a.onnx"], "cannot write a.onnx"),
-    ],
-)
-def test_places_that_cannot_be_written_are_refused_first(
-    models: Callable[..., Result], dataset: Path, words: list[str], problem: str
-) -> None:
-    """Before anything is evaluated."""
-    pytest.importorskip("pycocotools")
-    patchwork_model(Path("a.onnx"), shape=(1, 3, 96, 128))
-    rename = ["--rename", "human=person"]
-    failed = models("evaluate", "a.onnx", str(dataset / "coco.json"), *rename, *words)
-    assert isinstance(failed.exception, ConfigError)
-    assert problem in str(failed.exception)
-    assert not failed.output
-
-
-def test_wrong_words_are_told(models: Callable[..., Result], dataset: Path) -> None:
-    """No label in common, half a rename, a score that is none."""
-    pytest.importorskip("pycocotools")
-    patchwork_model(Path("a.onnx"), shape=(1, 3, 96, 128))
-    words = ["evaluate", "a.onnx", str(dataset / "coco.json")]
-    for more, problem in (
-        ([], "--rename LABEL=CLASS"),
-        (["--rename", "human"], "renamed as --rename"),
-        (["--rename", "man=person"], "no label man"),
-        (["--min-score", "0"], "--min-score lies between"),
-        (["--pictures", "gone", "--rename", "human=person"], "cannot read gone"),
-    ):
-        error = models(*words, *more).exception
-        assert isinstance(error, ConfigError)
-        assert problem in str(error)

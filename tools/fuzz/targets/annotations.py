@@ -10,9 +10,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerodaas.analytics.evaluation.dataset import Dataset
-from aerodaas.analytics.evaluation.reading import read_dataset
 from aerodaas.types.errors import AeroDaaSError
+from tools.evaluation.dataset import Dataset
+from tools.evaluation.reading import read_dataset
 
 __all__ = ["run", "seeds"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aerodaas.analytics.evaluation.coco_json import read_coco
-from aerodaas.analytics.evaluation.dataset import Dataset
-from aerodaas.analytics.evaluation.voc_xml import read_voc
-from aerodaas.analytics.evaluation.yolo_text import read_yolo
 from aerodaas.types.errors import ConfigError
+from tools.evaluation.coco_json import read_coco
+from tools.evaluation.dataset import Dataset
+from tools.evaluation.voc_xml import read_voc
+from tools.evaluation.yolo_text import read_yolo
 
 __all__ = ["read_dataset"]
 

@@ -12,7 +12,8 @@ from typing import Any
 
 import yaml
 
-from aerodaas.analytics.evaluation.dataset import (
+from aerodaas.types.errors import ConfigError
+from tools.evaluation.dataset import (
     PICTURE_SUFFIXES,
     AnnotatedPicture,
     Dataset,
@@ -23,7 +24,6 @@ from aerodaas.analytics.evaluation.dataset import (
     read_size,
     shown,
 )
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["read_yolo"]
 

@@ -1,4 +1,4 @@
-"""`aerodaas models evaluate`: a detector measured on annotated pictures."""
+"""Measure a detector on annotated pictures: `python -m tools.evaluation`."""
 
 from __future__ import annotations
 
@@ -9,17 +9,23 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.cli.app import run_typer
 from aerodaas.cli.rows import write_csv
+from aerodaas.config.extras import require_extra
+from aerodaas.config.printable import printable
+from aerodaas.recording.encoding import plain
+from aerodaas.terminal.figures import Row, show_figures
+from aerodaas.terminal.progress import show_progress
 from aerodaas.types.errors import ConfigError
+from tools.evaluation.errors import draw_mistakes
+from tools.evaluation.figures import LEAST_SCORE, ClassFigures, Evaluation, evaluate
 
-if TYPE_CHECKING:
-    from aerodaas.analytics.evaluation.figures import ClassFigures, Evaluation
-
-__all__ = ["evaluate_model"]
+app = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
 
 _COLUMNS = {
     "things": "things",
@@ -36,7 +42,8 @@ _COLUMNS = {
 }
 
 
-def evaluate_model(
+@app.command()
+def main(
     model: Annotated[str, typer.Argument(help="An ONNX file, or a model's name.")],
     dataset: Annotated[
         Path,
@@ -72,18 +79,12 @@ def evaluate_model(
 
     Average precision counts boxes of 0.01 and more, all else those of --min-score.
 
-        aerodaas models evaluate yolox-nano instances_val2017.json --pictures val2017
-        aerodaas models evaluate mine.onnx campus/data.yaml --worst mistakes --csv campus.csv
-        aerodaas models evaluate mine.onnx VOC2012 --rename human=person
+        python -m tools.evaluation yolox-nano instances_val2017.json --pictures val2017
+        python -m tools.evaluation mine.onnx campus/data.yaml --worst mistakes --csv campus.csv
+        python -m tools.evaluation mine.onnx VOC2012 --rename human=person
     """
-    from aerodaas.config.extras import require_extra  # noqa: PLC0415 - slow to load
-
     require_extra("evaluation", "the evaluation of models")
-    from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415
-    from aerodaas.analytics.evaluation.errors import draw_mistakes  # noqa: PLC0415
-    from aerodaas.analytics.evaluation.figures import LEAST_SCORE, evaluate  # noqa: PLC0415
-    from aerodaas.analytics.evaluation.reading import read_dataset  # noqa: PLC0415
-    from aerodaas.terminal.progress import show_progress  # noqa: PLC0415
+    from tools.evaluation.reading import read_dataset  # noqa: PLC0415 - imports the extra
 
     if not LEAST_SCORE <= min_score <= 1:
         raise ConfigError(f"--min-score lies between {LEAST_SCORE} and 1, not at {min_score}")
@@ -126,9 +127,6 @@ def _renames(texts: Sequence[str]) -> dict[str, str]:
 
 
 def _show(result: Evaluation, title: str) -> None:
-    from aerodaas.config.printable import printable  # noqa: PLC0415 - slow to load
-    from aerodaas.terminal.figures import Row, show_figures  # noqa: PLC0415
-
     rows = [Row(printable(one.label), _cells(one)) for one in result.classes if one.things]
     rows += [Row(printable(one.label), _cells(one)) for one in result.classes if not one.things]
     rows.append(Row("all", _cells(result.overall), bold=True))
@@ -158,8 +156,6 @@ def _n(value: float) -> str:
 def _write(
     result: Evaluation, model: str, dataset: Path, out_json: Path | None, out_csv: Path | None
 ) -> None:
-    from aerodaas.recording.encoding import plain  # noqa: PLC0415 - slow to load
-
     figures = dataclasses.asdict(dataclasses.replace(result, mistakes=()))
     del figures["mistakes"]
     content = plain({"model": model, "dataset": str(dataset), **figures})
@@ -177,3 +173,7 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror}") from None
+
+
+if __name__ == "__main__":
+    run_typer(app, "python -m tools.evaluation")

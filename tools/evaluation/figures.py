@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, read_picture, read_size
 from aerodaas.config.extras import require_extra
 from aerodaas.types.data import Detection, Frame, Header
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import Box
+from tools.evaluation.dataset import AnnotatedPicture, Dataset, read_picture, read_size
 
 __all__ = ["LEAST_SCORE", "Bin", "ClassFigures", "Evaluation", "Mistake", "evaluate", "measure"]
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from aerodaas.analytics.evaluation.dataset import (
+from aerodaas.config.xml_text import XmlError, parse_xml
+from aerodaas.types.errors import ConfigError
+from tools.evaluation.dataset import (
     AnnotatedPicture,
     Dataset,
     Thing,
@@ -18,8 +20,6 @@ from aerodaas.analytics.evaluation.dataset import (
     read_bytes,
     shown,
 )
-from aerodaas.config.xml_text import XmlError, parse_xml
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["read_voc"]
 

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from synthetic_models import patchwork_model
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, Thing
-from aerodaas.analytics.evaluation.figures import Evaluation, evaluate, measure
 from aerodaas.types.data import Detection
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import Box
+from tools.evaluation.dataset import AnnotatedPicture, Dataset, Thing
+from tools.evaluation.figures import Evaluation, evaluate, measure
 
 coco = pytest.importorskip("pycocotools.coco")
 cocoeval = pytest.importorskip("pycocotools.cocoeval")

@@ -8,11 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, read_picture
-from aerodaas.analytics.evaluation.figures import Mistake
 from aerodaas.config.printable import printable
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import Box
+from tools.evaluation.dataset import AnnotatedPicture, read_picture
+from tools.evaluation.figures import Mistake
 
 __all__ = ["draw_mistakes"]
 

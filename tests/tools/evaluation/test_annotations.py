@@ -13,10 +13,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.evaluation import dataset
-from aerodaas.analytics.evaluation.dataset import Dataset, read_picture, read_size
-from aerodaas.analytics.evaluation.reading import read_dataset
 from aerodaas.types.errors import AeroDaaSError, ConfigError
+from tools.evaluation import dataset
+from tools.evaluation.dataset import Dataset, read_picture, read_size
+from tools.evaluation.reading import read_dataset
 
 pytest.importorskip("yaml")
 

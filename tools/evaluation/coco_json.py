@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.evaluation.dataset import (
+from aerodaas.types.errors import ConfigError
+from tools.evaluation.dataset import (
     MOST_SIDE,
     MOST_THINGS,
     AnnotatedPicture,
@@ -21,7 +22,6 @@ from aerodaas.analytics.evaluation.dataset import (
     read_bytes,
     shown,
 )
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["read_coco"]
 
