@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import queue
 import random
 import socket
@@ -217,3 +218,39 @@ def test_rtsp_is_asked_for_by_udp_where_a_camera_refuses_tcp() -> None:
     source.start()
     assert [asked.get(timeout=20.0) for _ in range(2)] == [True, False]
     source.close()
+
+
+def _transport_stream(codec: str) -> bytes:
+    """The frames as MPEG-TS, as drones send by UDP."""
+    content = io.BytesIO()
+    with av.open(content, "w", format="mpegts") as container:
+        stream: Any = container.add_stream(codec, rate=30)
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for number, data in encoded(codec):
+            packet = Packet(data)
+            packet.stream, packet.time_base = stream, Fraction(1, 30)
+            packet.pts = packet.dts = number
+            container.mux(packet)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("codec", ["libx264", "libx265"])
+@pytest.mark.parametrize("lost", [1, 10, 200])
+def test_lost_datagrams_of_a_transport_stream_smear_nothing(codec: str, lost: int) -> None:
+    """Its packets are numbered, so that damage within a frame of H.265 is known, too."""
+    size, whole = 188, _transport_stream(codec)
+    begin = len(whole) // size // 3 * size
+    spoilt = io.BytesIO(whole[:begin] + whole[begin + lost * size :])
+    numbers = []
+    with av.open(spoilt, options={"fpsprobesize": "0"}) as container:
+        stream = container.streams.video[0]
+        decoder, first = FrameDecoder(stream.codec_context), None
+        for packet in container.demux(stream):
+            for picture in decoder.decode(packet):
+                time_of = float(picture.time or 0.0)
+                first = time_of if first is None else first
+                numbers.append(round(30.0 * (time_of - first)))
+                assert error(bgr_image(picture), numbers[-1]) < SMEARED
+    assert numbers[:10] == [*range(10)]
+    assert numbers[-1] == COUNT - 1
+    assert len(numbers) <= COUNT - 10
