@@ -82,15 +82,22 @@ def parse_json(text: str, place: str) -> Any:  # noqa: ANN401 - any JSON
     return content
 
 
-def check_plain(content: object, place: str) -> None:
+def check_plain(content: object, place: str, most: float = math.inf) -> None:
     """Raise ConfigError, with the setting's place, for values that a JSON file cannot hold.
 
-    `content` is of any origin: a file, an application, or the command line.
+    Args:
+        content: Of any origin: a file, an application, or the command line.
+        place: Names it in errors.
+        most: Values that it may have, with those in lists and objects.
     """
+    count = 0
     # Not by recursion, which is what too deep a nesting breaks.
     waiting: list[tuple[tuple[str, ...], object]] = [((), content)]
     while waiting:
         path, value = waiting.pop()
+        count += 1
+        if count + len(waiting) > most:
+            raise ConfigError(f"{place} has more than {most:g} values")
         where = ".".join(path)
         if len(path) > _MOST_LEVELS:
             raise ConfigError(f"{place}: {_too_deep(where)}")

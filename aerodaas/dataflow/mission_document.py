@@ -11,7 +11,15 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    FailFast,
+    Field,
+    Strict,
+    model_validator,
+)
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
@@ -42,6 +50,9 @@ _HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
+"""Of a document."""
+_MOST_VALUES = 10_000
+"""Of the settings of one analysis or scheduler, or of a condition."""
 _MOST_MOVES = 16
 _Name = Annotated[str, Field(min_length=1, max_length=64)]
 _MOST_HERTZ = 1000.0
@@ -82,7 +93,7 @@ a class of the application's own is known at the user's side alone."""
 def _plain(value: object) -> object:
     """Refuse what no file can hold, which a request's JSON may; raises ValueError."""
     try:
-        check_plain(value, "its value")
+        check_plain(value, "its value", _MOST_VALUES)
     except ConfigError as error:
         raise ValueError(str(error)) from None
     return value
@@ -223,7 +234,9 @@ class NavigationDocument(_Entry):
 
     robot: Word
     stream: ScopedWord | None = None
-    waypoints: list[WaypointEntry] = Field(default_factory=list, max_length=_MOST_WAYPOINTS)
+    waypoints: Annotated[list[WaypointEntry], FailFast()] = Field(
+        default_factory=list, max_length=_MOST_WAYPOINTS
+    )
     ordered: bool = True
     priority: Annotated[int, Field(ge=0)] | None = None
     index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
@@ -244,12 +257,22 @@ class MissionDocument(_Entry):
     """File name of the environment that it was written for; a hint."""
     sensors: list[ScopedWord] = Field(default_factory=list, max_length=_MOST)
     """Sensors that run, by full id."""
-    analyses: list[AnalysisEntry] = Field(default_factory=list, max_length=_MOST)
+    analyses: Annotated[list[AnalysisEntry], FailFast()] = Field(
+        default_factory=list, max_length=_MOST
+    )
     """Each after those that it reads."""
-    navigation: list[NavigationDocument] = Field(default_factory=list, max_length=_MOST)
+    navigation: Annotated[list[NavigationDocument], FailFast()] = Field(
+        default_factory=list, max_length=_MOST
+    )
     """Empty for one that senses only, which a provider attaches to another flight's cameras."""
     trajectory_scheduler: SchedulerEntry | None = None
     analytics_scheduler: Word | None = None
+
+    @model_validator(mode="after")
+    def _is_bounded(self) -> Self:
+        if sum(len(one.waypoints) for one in self.navigation) > _MOST_WAYPOINTS:
+            raise ValueError(f"a document has at most {_MOST_WAYPOINTS} waypoints")
+        return self
 
     @property
     def here(self) -> list[str]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from typing import Any
 
+import anyio.to_thread
 from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
@@ -39,6 +42,8 @@ __all__ = ["build_service"]
 _RATE = 50.0
 """Requests a second of one account, on average."""
 _BURST = 200.0
+_THREADS = 200
+"""Most threads that answer requests, and most that look whether lasting ones still may be."""
 
 
 def build_service(
@@ -75,6 +80,9 @@ def build_service(
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        # More than all users but operators may keep busy, see `Gate`.
+        anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(_THREADS, "service"))
         desk.start()
         if edge is not None:
             edge.start()

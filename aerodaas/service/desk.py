@@ -264,22 +264,20 @@ class MissionDesk:
         return host.row.id, [one for one in self._attachments.shared(host, tenant) if one in own]
 
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
-        one = self._flown(principal, mission)
-        with self._lock:
-            link = one.follow()
+        # Without the lock, which may be held for long: a drone that is to come home comes home.
+        link = self._flown(principal, mission).follow()
         return link.ask(operator=principal.role.reaches(Role.OPERATOR), **request)
 
     def _flown(self, principal: Principal, mission: str) -> ActiveMission:
         """A flying mission; raises RefusedError unless this account may command it."""
         self._require_own(principal, mission)
-        with self._lock:
-            one = self._one(mission)
-            if one.phase is not MissionPhase.FLYING:
-                raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
-            if one.attached_to is not None:
-                text = f"{mission} is attached to {one.attached_to}: it senses only"
-                raise RefusedError(403, text)
-            return one
+        one = self._one(mission)
+        if one.phase is not MissionPhase.FLYING:
+            raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
+        if one.attached_to is not None:
+            text = f"{mission} is attached to {one.attached_to}: it senses only"
+            raise RefusedError(403, text)
+        return one
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; raises RefusedError for any other."""

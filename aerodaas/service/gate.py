@@ -9,6 +9,7 @@ from http import HTTPStatus
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from aerodaas.analytics.remote.guard import address_of
 from aerodaas.console.page import is_page
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access import Principal
@@ -20,22 +21,32 @@ from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Gate"]
 
-_LARGEST_BODY = 4 << 20
-"""Bytes of a JSON body: a document of 10,000 waypoints has 2 MB."""
-_MOST_AT_ONCE = 16
-"""Requests of one account that are answered at once, less than the threads that answer: who asks
-for more, and for what takes long, would keep others' commands waiting."""
+_LARGEST_DOCUMENT, _LARGEST_COMMAND, _LARGEST_OTHER = 4 << 20, 1 << 20, 16 << 10
+"""Bytes of a submission, of what is asked of a mission, and of any other body: a document of 10,000
+waypoints has 2 MB, a command of 1,000 a quarter."""
+_LARGE = 64 << 10
+"""Bytes of a body of which an account sends few at once."""
+_MOST_AT_ONCE, _MOST_LARGE, _MOST_LASTING = 16, 2, 32
+"""Requests of one account that are answered at once, those of them with a large body, and its live
+views and other WebSockets: who asks for more keeps others' commands waiting."""
+_MOST_LASTING_OF_ADDRESS = 160
+_MOST_OF_ALL, _MOST_LARGE_OF_ALL, _MOST_LASTING_OF_ALL = 160, 16, 320
+"""The same of all accounts but operators, for whom threads and connections are left."""
+_READING = frozenset({"GET", "HEAD"})
 
 
 class Gate:
-    """ASGI middleware that admits valid tokens only, bodies of a bounded size, and few at once."""
+    """ASGI middleware that admits valid tokens only, bodies of a bounded size, and few at once.
+
+    The role comes first: who may only look sends no body. An operator is never turned away.
+    """
 
     def __init__(self, app: ASGIApp, admission: Admission) -> None:
         """Protect `app`."""
         self._app = app
         self._admission = admission
-        self._answered: Counter[str] = Counter()
-        """Requests that are being answered, by account."""
+        self._counts: Counter[tuple[str, str]] = Counter()
+        """What is answered now, by kind and account or address; "" for all but operators."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it."""
@@ -47,38 +58,64 @@ class Gate:
             await self._app(scope, _Bounded(receive, 0), send)
             return
         try:
-            most = _bound_of(connection)
-            sender = await asyncio.to_thread(self._admission.enter, connection)
-            # A WebSocket that lasts is none that others wait for; an operator is never turned away.
-            counts = scope["type"] == "http" and not sender.role.reaches(Role.OPERATOR)
-            if counts and self._answered[sender.account] >= _MOST_AT_ONCE:
-                await asyncio.to_thread(self._turn_away, sender, connection)
+            most, large = _bound_of(connection)
+            sender = await self._admission.admit(connection)
+            if scope["type"] == "http" and scope["method"] not in _READING:
+                await asyncio.to_thread(self._admission.require, connection, Role.PILOT)
+            bounds = _bounds_of(sender, connection, large=large)
+            for (kind, whose), limit in bounds.items():
+                if self._counts[kind, whose] >= limit:
+                    text = f"{limit} {kind} of {whose or 'all users'} are answered: wait for one"
+                    await asyncio.to_thread(self._turn_away, sender, connection, text)
         except AeroDaaSError as error:
             await refuse(scope, send, error)
             return
-        count = Counter([sender.account] if counts else [])
-        self._answered += count
+        self._counts.update(bounds.keys())
         try:
             await self._app(scope, _Bounded(receive, most), send)
         finally:
-            self._answered -= count
+            self._counts -= Counter(bounds.keys())
 
-    def _turn_away(self, sender: Principal, connection: HTTPConnection) -> None:
-        status = int(HTTPStatus.TOO_MANY_REQUESTS)
-        text = f"{_MOST_AT_ONCE} requests of {sender.account} are being answered: wait for one"
+    def _turn_away(self, sender: Principal, connection: HTTPConnection, text: str) -> None:
         with self._admission.auditing(sender, connection):
-            raise RefusedError(status, text, retry_after=1.0)
+            raise RefusedError(int(HTTPStatus.TOO_MANY_REQUESTS), text, retry_after=1.0)
 
 
-def _bound_of(connection: HTTPConnection) -> int:
-    """Most bytes of a request's body; raises RefusedError for one that says it has more."""
-    model = connection.scope["path"].startswith("/v1/models/")
-    most = LARGEST_MODEL if model else _LARGEST_BODY
+def _bounds_of(
+    sender: Principal, connection: HTTPConnection, *, large: bool
+) -> dict[tuple[str, str], int]:
+    """What a request counts as, by kind and whose it is, with the most of each; none for some."""
+    if sender.role.reaches(Role.OPERATOR):
+        return {}
+    if connection.scope["type"] == "websocket":
+        return {
+            ("live views", sender.account): _MOST_LASTING,
+            ("live views", address_of(connection.scope)): _MOST_LASTING_OF_ADDRESS,
+            ("live views", ""): _MOST_LASTING_OF_ALL,
+        }
+    bounds = {("requests", sender.account): _MOST_AT_ONCE, ("requests", ""): _MOST_OF_ALL}
+    if large:
+        bounds["large requests", sender.account] = _MOST_LARGE
+        bounds["large requests", ""] = _MOST_LARGE_OF_ALL
+    return bounds
+
+
+def _bound_of(connection: HTTPConnection) -> tuple[int, bool]:
+    """Most bytes of a request's body, and whether it is large; raises RefusedError beyond them."""
+    path = connection.scope["path"]
+    most = _LARGEST_OTHER
+    if path == "/v1/missions":
+        most = _LARGEST_DOCUMENT
+    elif path.startswith("/v1/missions/"):
+        most = _LARGEST_COMMAND
+    elif path.startswith("/v1/models/"):
+        most = LARGEST_MODEL
     length = connection.headers.get("content-length", "0")
     if not length.isdecimal() or int(length) > most:
         status = int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
         raise RefusedError(status, f"a body has at most {most} bytes")
-    return most
+    hidden = "transfer-encoding" in connection.headers
+    return most, hidden or int(length) > _LARGE
 
 
 class _Bounded:

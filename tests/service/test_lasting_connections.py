@@ -38,7 +38,7 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.models import ModelShelf
-from aerodaas.service.routes import here
+from aerodaas.service.routes import bodies, here
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -289,6 +289,7 @@ def test_what_the_users_side_says_reaches_the_flight(
 ) -> None:
     """Except what is longer than any answer, which ends the connection before it is read."""
     heard: list[object] = []
+    monkeypatch.setattr(HereRelay, "waits", True)
     monkeypatch.setattr(HereUser, "answered", lambda _, message, __: heard.append(message))
     mission = service.submit()
     flight = service.fly(mission)
@@ -426,4 +427,148 @@ def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
         socket.recv(ENOUGH)
         socket.send('{"at": 0, "forward": 1' + " " * 10_000 + "}")
         assert not json.loads(socket.recv(ENOUGH))["held"]
+    flight.close()
+
+
+@pytest.mark.parametrize("length", [10, 3 << 20])
+def test_who_may_only_look_is_refused_before_the_body_is_sent(
+    service: Service, length: int
+) -> None:
+    """It would be read and checked for nothing."""
+    assert (
+        _status_of_length(service, "missions", service.token("vera", role=Role.VIEWER), length)
+        == 403
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "length"),
+    [("missions", 5 << 20), ("missions/x/navigation", 2 << 20), ("leases", 100_000)],
+)
+def test_a_body_is_as_large_as_what_it_is_for(service: Service, path: str, length: int) -> None:
+    """And no larger, by its length alone."""
+    assert _status_of_length(service, path, service.token("ivan"), length) == 413
+
+
+def _status_of_length(service: Service, path: str, token: str, length: int) -> int:
+    """Answer to a request that says how long its body is, and sends none."""
+    connection = http.client.HTTPConnection("127.0.0.1", service.port, timeout=ENOUGH)
+    with contextlib.closing(connection):
+        connection.putrequest("POST", f"/v1/{path}")
+        connection.putheader("Authorization", f"Bearer {token}")
+        connection.putheader("Content-Type", "application/json")
+        connection.putheader("Content-Length", str(length))
+        connection.endheaders()
+        return connection.getresponse().status
+
+
+PLACES = [{"id": f"a{number}", "x": 1.0, "y": 1.0, "z": 2.0} for number in range(4000)]
+HOSTILE: dict[str, tuple[dict[str, Any], int]] = {
+    "no waypoints": ({"navigation": [{"robot": "one", "waypoints": [0] * 9000}] * 32}, 422),
+    "many values": ({"name": [0] * 400_000}, 413),
+    "many lists": ({"name": [[]] * 200_000}, 413),
+    "many keys": ({f"key{number}": 0 for number in range(20_000)}, 422),
+    "many settings": (
+        {"analyses": [{"id": "one/a", "analysis": "X", "settings": {"a": [0] * 20_000}}]},
+        422,
+    ),
+    "many waypoints": ({"navigation": [{"robot": "one", "waypoints": PLACES}] * 3}, 422),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_document_that_takes_long_to_check_is_refused(service: Service, name: str) -> None:
+    """By its counts, and in a sentence."""
+    changes, status = HOSTILE[name]
+    body = {"document": document("one", (5, 0)) | changes}
+    assert service.status("POST", "missions", service.token("ivan"), body) == status
+
+
+def test_a_document_that_is_checked_keeps_no_command_waiting(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is parsed beside the loop."""
+    begun, free, content = threading.Event(), threading.Event(), bodies._content
+
+    def slow(*words: Any) -> Any:  # noqa: ANN401
+        begun.set()
+        assert free.wait(ENOUGH)
+        return content(*words)
+
+    monkeypatch.setattr(bodies, "_content", slow)
+    mission = service.submit()
+    flight = service.fly(mission)
+    token = service.token("ivan")
+    places = [(float(number % 9), 0.0) for number in range(100)]
+    with ThreadPoolExecutor(1) as pool:
+        body = {"document": document("one", *places)}
+        submitted = pool.submit(service.status, "POST", "missions", token, body)
+        assert begun.wait(ENOUGH)
+        command = {"robot": "one", "command": "pause"}
+        assert service.status("POST", f"missions/{mission}/commands", token, command) == 200
+        free.set()
+        assert submitted.result() == 202
+    flight.close()
+
+
+def test_a_command_waits_for_nothing_that_the_desk_does(service: Service) -> None:
+    """It may read a large document, or write to a slow disk."""
+    mission = service.submit()
+    flight = service.fly(mission)
+    (desk,) = service.desks
+    until(lambda: desk._missions[mission].link is not None)
+    words = "POST", f"missions/{mission}/commands", service.token("ivan")
+    with ThreadPoolExecutor(1) as pool, desk._lock:
+        command = {"robot": "one", "command": "return-home"}
+        assert pool.submit(service.status, *words, command).result(ENOUGH) == 200
+    flight.close()
+
+
+def test_an_account_has_so_many_views_and_an_operator_all(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that ends makes room for the next one."""
+    monkeypatch.setattr(gate, "_MOST_LASTING", 2)
+    mission = service.submit()
+    viewer = service.token("vera", role=Role.VIEWER)
+    operator = service.token("olga", role=Role.OPERATOR)
+    with contextlib.ExitStack() as stack:
+        first = stack.enter_context(service.socket(f"{mission}/live", viewer))
+        stack.enter_context(service.socket(f"{mission}/live", viewer))
+        assert not _opens(service, mission, viewer)
+        for _ in range(4):
+            stack.enter_context(service.socket(f"{mission}/live", operator))
+        first.close()
+        until(lambda: _opens(service, mission, viewer))
+
+
+def _opens(service: Service, mission: str, token: str) -> bool:
+    """Whether there is room for one more live view."""
+    try:
+        with service.socket(f"{mission}/live", token):
+            return True
+    except InvalidStatus as refused:
+        return refused.response.status_code != 429
+
+
+def test_an_answer_that_nobody_waits_for_is_not_even_parsed(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The flight has commands to answer; what is no JSON ends no connection."""
+    heard: list[object] = []
+    monkeypatch.setattr(HereUser, "answered", lambda _, message, __: heard.append(message))
+    mission = service.submit()
+    flight = service.fly(mission)
+    relay = cast("HereRelay", service.relay)
+    with service.socket(f"{mission}/here", service.token("ivan")) as socket:
+        assert relay.wait_attached(ENOUGH)
+        socket.send(json.dumps({"number": 1, "item": [[]] * 100_000}))
+        socket.send("[" * 50_000)
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(relay.ask, {"do": "process", "key": "one/seen"}, b"")
+            question = json.loads(socket.recv(ENOUGH))
+            socket.send(json.dumps({"number": question["number"], "item": [[]] * 100_000}))
+            socket.send(json.dumps({"number": question["number"], "item": 7}))
+            until(lambda: heard)
+    assert heard == [{"number": question["number"], "item": 7}]
     flight.close()

@@ -46,6 +46,17 @@ class Channel:
 
     def receive(self, timeout: float | None = None) -> tuple[dict[str, Any], bytes]:
         """Receive one message; raises GuestError for none in time, and for a malformed one."""
+        data, blob = self.receive_bytes(timeout)
+        try:
+            found = json.loads(data)
+        except (ValueError, RecursionError):
+            raise GuestError("sent a message that is not JSON") from None
+        if not isinstance(found, dict):
+            raise GuestError("sent a message that is no JSON object")
+        return found, blob
+
+    def receive_bytes(self, timeout: float | None = None) -> tuple[bytes, bytes]:
+        """As `receive`, with the JSON as it came."""
         until = None if timeout is None else time.monotonic() + timeout
         text, blob = HEAD.unpack(self._read(HEAD.size, until))
         if text > LARGEST_TEXT or blob > LARGEST_BLOB:
@@ -53,14 +64,7 @@ class Channel:
                 f"sent a message of {text} and {blob} bytes; the most are {LARGEST_TEXT} and "
                 f"{LARGEST_BLOB}"
             )
-        data, rest = self._read(text, until), self._read(blob, until)
-        try:
-            found = json.loads(data)
-        except (ValueError, RecursionError):
-            raise GuestError("sent a message that is not JSON") from None
-        if not isinstance(found, dict):
-            raise GuestError("sent a message that is no JSON object")
-        return found, rest
+        return self._read(text, until), self._read(blob, until)
 
     def close(self) -> None:
         """Close the connection."""

@@ -26,6 +26,8 @@ Send: TypeAlias = Callable[[dict[str, Any], bytes], None]
 """Sends one question, JSON and a blob, towards the user without waiting; raises if it cannot."""
 LARGEST_ANSWER = 1 << 20
 """Bytes of an answer's JSON: a thousand waypoints or boxes take a quarter of it."""
+_MOST_GROUPS = 20_000
+"""Most lists and objects of an answer: a thousand boxes have a fifth; they take long to parse."""
 _ANSWER_SECONDS = 3.0
 """Wall seconds for an answer, less than an actor waits, and than a hung analysis may take."""
 _PARTS = ("item", "fired", "alerts", "failed")
@@ -72,6 +74,18 @@ class HereUser:
     def answered(self, message: object, blob: bytes = b"") -> None:
         """Take an answer, JSON and a blob, as it came from the user; never raises."""
         self._relay.take(self, message, blob)
+
+    def answered_text(self, text: bytes, blob: bytes = b"") -> None:
+        """As `answered`, with the JSON as it came; what cannot be an answer is not even parsed."""
+        if (
+            not (self.slow or self._relay.waits)
+            or text.count(b"[") + text.count(b"{") > _MOST_GROUPS
+        ):
+            return
+        try:
+            self.answered(json.loads(text), blob)
+        except (ValueError, RecursionError):
+            return
 
     def detach(self) -> None:
         """Tell the relay that this connection has ended."""
@@ -125,6 +139,11 @@ class HereRelay:
     def wait_attached(self, timeout: float) -> bool:
         """Wait for the user's side to connect, `timeout` seconds at most; whether it has."""
         return self._attached.wait(timeout)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a question has no answer yet."""
+        return bool(self._waiting)
 
     def leave(self, user: HereUser) -> None:
         """Ask `user` no more; what waits for it is told so."""

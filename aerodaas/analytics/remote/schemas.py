@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -31,7 +32,9 @@ class _Strict(BaseModel):
 class WaypointsIn(_Strict):
     """Waypoints to add to the mission."""
 
-    waypoints: Annotated[list[WaypointEntry], Field(min_length=1, max_length=_MOST_WAYPOINTS)]
+    waypoints: Annotated[
+        list[WaypointEntry], Field(min_length=1, max_length=_MOST_WAYPOINTS), FailFast()
+    ]
     ordered: bool = True
     """Whether to keep their order; otherwise the scheduler chooses it."""
     index: Annotated[int, Field(ge=0)] | None = None
@@ -40,8 +43,8 @@ class WaypointsIn(_Strict):
     @field_validator("waypoints")
     @classmethod
     def _distinct(cls, waypoints: list[WaypointEntry]) -> list[WaypointEntry]:
-        ids = [waypoint.id for waypoint in waypoints]
-        twice = sorted({name for name in ids if ids.count(name) > 1})
+        counts = Counter(waypoint.id for waypoint in waypoints)
+        twice = sorted(name for name, count in counts.items() if count > 1)
         if twice:
             message = f"more than one waypoint is called {', '.join(twice)}"
             raise ValueError(message)

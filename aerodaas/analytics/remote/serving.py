@@ -109,6 +109,7 @@ class _Config(uvicorn.Config):
 
     def __init__(self, *words: Any, **settings: Any) -> None:  # noqa: ANN401 - uvicorn's
         super().__init__(*words, **settings)
+        self.most: int = settings["limit_concurrency"]
         self.shared = _Connections()
 
 
@@ -180,7 +181,7 @@ class _ImpatientProtocol(_Protocol):
         transport.set_write_buffer_limits(high=0)
         self.address = self.client[0] if self.client else ""
         self._wait()
-        if len(self.connections) >= self.config.limit_concurrency:
+        if len(self.connections) >= self.config.most:
             self.config.shared.make_room(self)
 
     def pause_writing(self) -> None:

@@ -283,8 +283,7 @@ class ControlServer:
         sender.start()
         try:
             while not self._closed.is_set():
-                message, blob = channel.receive()
-                user.answered(message, blob)
+                user.answered_text(*channel.receive_bytes())
         finally:
             gone.set()
             user.detach()

@@ -23,6 +23,7 @@ from aerodaas.protocol.schemas import (
 from aerodaas.service.access import Accounts, Audit, usage_csv
 from aerodaas.service.access.usage import usage_out
 from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.bodies import BoundedRoute
 from aerodaas.service.store import Store, Tenant
 
 __all__ = ["AccountRoutes"]
@@ -54,7 +55,7 @@ class AccountRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1", tags=["accounts"])
+        router = APIRouter(prefix="/v1", tags=["accounts"], route_class=BoundedRoute)
         router.add_api_route("/accounts", self.accounts)
         router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
         router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])

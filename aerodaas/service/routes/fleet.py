@@ -17,6 +17,7 @@ from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import LARGEST_MODEL, ModelShelf
 from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.bodies import BoundedRoute
 
 __all__ = ["FleetRoutes"]
 
@@ -51,7 +52,7 @@ class FleetRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1", tags=["fleet"])
+        router = APIRouter(prefix="/v1", tags=["fleet"], route_class=BoundedRoute)
         none: dict[str, Any] = {"status_code": 204, "response_class": Response}
         router.add_api_route("/me", self.me)
         router.add_api_route("/fleet", self.fleet)

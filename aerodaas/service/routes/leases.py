@@ -12,6 +12,7 @@ from aerodaas.service.access import Audit
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.leases import lease_out
 from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.bodies import BoundedRoute
 
 __all__ = ["LeaseRoutes"]
 
@@ -37,7 +38,7 @@ class LeaseRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1/leases", tags=["leases"])
+        router = APIRouter(prefix="/v1/leases", tags=["leases"], route_class=BoundedRoute)
         router.add_api_route("", self.request, methods=["POST"], status_code=201)
         router.add_api_route("", self.leases)
         router.add_api_route("/{lease}", self.lease)

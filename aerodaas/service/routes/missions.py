@@ -31,6 +31,7 @@ from aerodaas.service.access import Audit
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.idempotency import read_key
 from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.bodies import BoundedRoute
 
 __all__ = ["MissionRoutes"]
 
@@ -47,7 +48,7 @@ class MissionRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1/missions", tags=["missions"])
+        router = APIRouter(prefix="/v1/missions", tags=["missions"], route_class=BoundedRoute)
         router.add_api_route("", self.submit, methods=["POST"], status_code=202)
         router.add_api_route("", self.missions)
         router.add_api_route("/{mission}", self.mission)

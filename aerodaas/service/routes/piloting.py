@@ -17,6 +17,7 @@ from aerodaas.service.access import Audit
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.bodies import BoundedRoute
 from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
@@ -35,7 +36,7 @@ class PilotingRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1/missions", tags=["missions"])
+        router = APIRouter(prefix="/v1/missions", tags=["missions"], route_class=BoundedRoute)
         secured = [Security(HTTPBearer(auto_error=False))]
         posted: dict[str, Any] = {"methods": ["POST"], "dependencies": secured}
         router.add_api_route("/{mission}/survey", self.survey, **posted)

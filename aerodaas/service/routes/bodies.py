@@ -1,0 +1,94 @@
+"""Bodies of requests: parsed beside the event loop, one at a time, and bounded by what it costs."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
+from pydantic import TypeAdapter, ValidationError
+
+from aerodaas.service.errors import RefusedError
+
+__all__ = ["BoundedRoute"]
+
+_SMALL = 1 << 10
+"""Bytes of a body that is parsed at once: a command waits for nobody's document."""
+_MOST_VALUES, _MOST_GROUPS = 300_000, 100_000
+"""Most commas, and opening brackets, of a body: 10,000 waypoints have 210,000 and 30,000."""
+_MOST_KEYS = 1000
+_MOST_ERRORS = 100
+"""Most errors of a body that are worded; each one takes as long as many values."""
+_parsing = ThreadPoolExecutor(1, "parsing")
+
+
+class BoundedRoute(APIRoute):
+    """Route whose body, unless it is small, keeps no other request waiting while it is parsed."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """Parse the body, then handle the request."""
+        handle = super().get_route_handler()
+        if self.body_field is None:
+            return handle
+        model: TypeAdapter[Any] = TypeAdapter(self.body_field.field_info.annotation or Any)
+
+        async def bounded(request: Request) -> Response:
+            parsed = _Parsed(request.scope, request.receive)
+            body = await parsed.body()
+            if len(body) > _SMALL and "json" in request.headers.get("content-type", ""):
+                loop = asyncio.get_running_loop()
+                parsed.content = await loop.run_in_executor(_parsing, _content, model, body)
+            return await handle(parsed)
+
+        return bounded
+
+
+class _Parsed(Request):
+    """Request whose body may have been parsed."""
+
+    content: Any = None
+
+    async def json(self) -> Any:  # noqa: ANN401 - the base's
+        return await super().json() if self.content is None else self.content
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object with few enough keys: unknown ones are refused one by one, which takes long."""
+    if len(pairs) > _MOST_KEYS:
+        raise RefusedError(
+            int(HTTPStatus.UNPROCESSABLE_ENTITY), f"an object has at most {_MOST_KEYS} keys"
+        )
+    return dict(pairs)
+
+
+def _content(model: TypeAdapter[Any], body: bytes) -> Any:  # noqa: ANN401 - the model's
+    """What a body says; raises RequestValidationError, and RefusedError for one beyond bounds."""
+    if body.count(b",") > _MOST_VALUES or body.count(b"[") + body.count(b"{") > _MOST_GROUPS:
+        raise RefusedError(
+            int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE),
+            f"a body has at most {_MOST_VALUES} values and {_MOST_GROUPS} lists and objects",
+        )
+    try:
+        return model.validate_python(json.loads(body, object_pairs_hook=_object))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        said = {"type": "json_invalid", "loc": ("body",), "msg": f"no JSON: {error}"}
+        raise RequestValidationError([said]) from None
+    except RecursionError:
+        raise RefusedError(int(HTTPStatus.BAD_REQUEST), "the body is nested too deeply") from None
+    except ValidationError as error:
+        if error.error_count() > _MOST_ERRORS:
+            raise RefusedError(
+                int(HTTPStatus.UNPROCESSABLE_ENTITY),
+                f"{error.error_count()} values of the body are not as the schema has them: GET "
+                "/v1/openapi.json",
+            ) from None
+        found = error.errors(include_url=False, include_input=False)
+        raise RequestValidationError(
+            [{**one, "loc": ("body", *one["loc"])} for one in found]
+        ) from None
