@@ -1,4 +1,4 @@
-#!/bin/sh
+#!/bin/bash
 # Make what Ray's TLS asks for: an authority, and for each node a certificate that it signs.
 #
 #   certificates.sh FOLDER ADDRESS...
@@ -10,7 +10,7 @@
 #
 # From the environment:
 #   AERODAAS_DAYS   days for which the certificates hold   (default: 365)
-set -eu
+set -euo pipefail
 
 [ $# -ge 2 ] || { echo "usage: certificates.sh FOLDER ADDRESS..." >&2; exit 2; }
 folder=$1
@@ -18,6 +18,10 @@ shift
 days=${AERODAAS_DAYS:-365}
 umask 077
 mkdir -p "$folder"
+# Who may write there, or has made the key, can make nodes of this cluster.
+for own in "$folder" "$folder/ca.key"; do
+    [ ! -e "$own" ] || [ -O "$own" ] || { echo "certificates: $own is another user's" >&2; exit 1; }
+done
 
 new_key() {
     openssl genpkey -quiet -algorithm EC -pkeyopt ec_paramgen_curve:P-256 -out "$1"

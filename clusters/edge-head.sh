@@ -1,4 +1,4 @@
-#!/bin/sh
+#!/bin/bash
 # Be the head of a cluster and its edge, as a container does; with a fleet, the provider's service, too.
 #
 # From the environment:
@@ -11,7 +11,7 @@
 #   AERODAAS_OBJECT_STORE  bytes of Ray's object store, within /dev/shm (default: Ray's)
 #   AERODAAS_VENV          Python environment with aerodaas           (default: ~/aerodaas)
 #   AERODAAS_ROOT          1 lets it run as root                      (default: it does not)
-set -eu
+set -euo pipefail
 
 fail() {
     echo "edge-head: $1" >&2
@@ -28,10 +28,12 @@ own=${AERODAAS_OWN_ADDRESS:-$(hostname -I | cut -d' ' -f1)}
 export RAY_AUTH_MODE=token RAY_USAGE_STATS_ENABLED=0
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor RAY_max_direct_call_object_size=4194304
 export RAY_timeout_ms_task_wait_for_death_info=100
-export RAY_gcs_storage=rocksdb RAY_gcs_storage_path=/tmp/ray-control
+# A new folder: one of a known name may be another user's. Those of former starts are ours to remove.
+find /tmp -maxdepth 1 -type d -user "$(id -u)" -name 'ray-control.*' -print0 | xargs -0r rm -rf
+control=$(mktemp -d /tmp/ray-control.XXXXXXXX)
+export RAY_gcs_storage=rocksdb RAY_gcs_storage_path=$control
 
 "$venv/bin/python" -m aerodaas cluster token >/dev/null || fail "no token"
-rm -rf "$RAY_gcs_storage_path" && mkdir -m 700 "$RAY_gcs_storage_path"
 
 if [ -n "${AERODAAS_FLEET:-}" ]; then
     set -- "$AERODAAS_FLEET" --state "${AERODAAS_STATE:-$HOME/state}" --address "$own:6379"

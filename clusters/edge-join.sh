@@ -1,4 +1,4 @@
-#!/bin/sh
+#!/bin/bash
 # Join an edge node (a Jetson, a ground station, any Linux box) to a cluster, and stay.
 #
 #   edge-join.sh HEAD:PORT [own address]
@@ -13,7 +13,7 @@
 #   AERODAAS_OBJECT_STORE  bytes of Ray's object store      (default: Ray's, a third of the memory)
 #   RAY_AUTH_TOKEN_PATH  the cluster's token, mode 0600     (default: ~/.ray/auth_token)
 #   RAY_USE_TLS and the paths of certificates (docs/cluster.md), if the cluster speaks TLS
-set -eu
+set -euo pipefail
 
 fail() {
     echo "edge-join: $1" >&2
@@ -53,8 +53,8 @@ export RAY_USAGE_STATS_ENABLED=0
 
 if [ -z "$own" ]; then
     # `ip` takes no names, by which containers know each other.
-    there=$(getent ahosts "${head%:*}" | sed -n '1s/ .*//p')
-    own=$(ip -o route get "${there:-${head%:*}}" | sed -n 's/.* src \([^ ]*\).*/\1/p')
+    there=$(getent ahosts "${head%:*}" | sed -n '1s/ .*//p' || true)
+    own=$(ip -o route get "${there:-${head%:*}}" | sed -n 's/.* src \([^ ]*\).*/\1/p' || true)
 fi
 [ -n "$own" ] || fail "no way leads to $head; say this machine's own address after it"
 echo "edge-join: joining $head as $own with $resources"

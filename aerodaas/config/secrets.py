@@ -7,6 +7,7 @@ called like one (`password`, `token`, …), and what a URL holds beside its sche
 from __future__ import annotations
 
 import re
+import string
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -30,13 +31,15 @@ MAVLINK_KEY = "AERODAAS_MAVLINK_KEY"
 """Environment variable that may hold the signing key of MAVLink vehicles, as 64 hexadecimal digits.
 
 It goes to the processes that fly or watch a vehicle, and to no other."""
-_SCHEME = re.compile(r"[a-z][a-z0-9+.\-]*:/", re.IGNORECASE)
+_LETTERS, _FURTHER = string.ascii_letters, string.digits + "+.-"
+"""Characters with which a URL's scheme begins, and which it has beside them."""
 _PARAMETERS = re.compile(r"[?#;=\s\"']")
-_NAME = re.compile(
-    r"(?:^|[_\-.])(?:\w*(?:passw(?:or)?d|passphrase|secret|token|credential|bearer|cookie)s?|"
-    r"pass|pwd|auth|authorization|login|key|pin|psk)(?:$|[_\-.])",
+_WORD = re.compile(
+    r"\w*(?:passw(?:or)?d|passphrase|secret|token|credential|bearer|cookie)s?|"
+    r"pass|pwd|auth|authorization|login|key|pin|psk",
     re.IGNORECASE,
 )
+"""One word of a name that tells of a secret."""
 _ABOUT = re.compile(r"[_\-.](?:env|file|header|id|name|path|timeout|type)$", re.IGNORECASE)
 """Ends of names of settings that tell of a secret without holding it, such as `token_env`."""
 _SHORTEST = 4
@@ -57,16 +60,31 @@ def shown_text(text: str) -> str:
     follows the first `?`, `#`, `;` or `=` is left out, for some cameras have the password in the
     path.
     """
-    start = _SCHEME.search(text)
-    if start is None:
+    found = _scheme(text)
+    if found is None:
         return text
-    before = _cut(text[: start.start()])
-    slashes = len(text[start.end() :]) - len(text[start.end() :].lstrip("/"))
-    end = start.end() + slashes
+    start, end = found
+    before = _cut(text[:start])
+    end += len(text[end:]) - len(text[end:].lstrip("/"))
     login, at, address = text[end:].rpartition("@")
     # An @ behind parameters may be a password's or a parameter's: what follows is either.
     shown_address = "***" if at and _PARAMETERS.search(login) else _cut(address)
-    return f"{before}{text[start.start() : end]}{shown_address}"
+    return f"{before}{text[start:end]}{shown_address}"
+
+
+def _scheme(text: str) -> tuple[int, int] | None:
+    """Where the first scheme of a URL begins, and where its `:/` ends; None without one.
+
+    Each character is looked at once: an expression would begin anew at each of a long word.
+    """
+    begin = 0
+    while (colon := text.find(":/", begin)) >= 0:
+        rest = text[begin:colon].rstrip(_LETTERS + _FURTHER)
+        word = text[begin + len(rest) : colon].lstrip(_FURTHER)
+        if word:
+            return colon - len(word), colon + len(":/")
+        begin = colon + len(":/")
+    return None
 
 
 def _cut(text: str) -> str:
@@ -77,7 +95,8 @@ def _cut(text: str) -> str:
 def is_secret_name(name: str) -> bool:
     """Whether a setting of this name holds a secret: `password`, `api_key`, `mqtt_token`, …."""
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
-    return _NAME.search(words) is not None and _ABOUT.search(words) is None
+    secret = any(map(_WORD.fullmatch, re.split(r"[_\-.\s]", words)))
+    return secret and _ABOUT.search(words) is None
 
 
 def plain(value: object) -> Any:  # noqa: ANN401 - of any type
@@ -144,16 +163,16 @@ def secret_texts(value: object, name: str = "") -> Iterator[str]:  # noqa: C901 
 def _parts(url: str) -> Iterator[str]:
     """A URL and its parts that are not shown, as a library's message may quote them singly."""
     yield url
-    start = _SCHEME.search(url)
-    rest = url[start.end() :].lstrip("/") if start else url
+    found = _scheme(url)
+    rest = url[found[1] :].lstrip("/") if found else url
     login, at, address = rest.rpartition("@")
     if at:
         yield login
         yield login.partition(":")[2]
-    found = _PARAMETERS.search(address)
-    if found is not None:
-        yield address[found.end() :]
-        for pair in re.split(r"[&;]", address[found.end() :]):
+    parameters = _PARAMETERS.search(address)
+    if parameters is not None:
+        yield address[parameters.end() :]
+        for pair in re.split(r"[&;]", address[parameters.end() :]):
             yield pair.partition("=")[2]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
@@ -111,7 +112,7 @@ def test_the_service_is_started_by_words_that_it_takes(tmp_path: Path) -> None:
         program.write_text(f'#!/bin/sh\necho {name} "$@"\n')
         program.chmod(0o755)
     script = HEAD.replace("sleep 2", "sleep 0.2").replace("while true", "for once in 1")
-    script = script.replace("/tmp/ray-control", str(tmp_path / "control"))  # noqa: S108
+    script = script.replace("/tmp", str(tmp_path))  # noqa: S108
     variables = {
         "PATH": "/usr/bin:/bin",
         "HOME": str(tmp_path),
@@ -124,7 +125,7 @@ def test_the_service_is_started_by_words_that_it_takes(tmp_path: Path) -> None:
             if name != "HOME"
         },
     }
-    words = ["sh", "-c", script.replace("exec ", "") + "\nwait"]
+    words = ["bash", "-c", script.replace("exec ", "") + "\nwait"]
     done = subprocess.run(words, env=variables, capture_output=True, text=True, check=True)
     (served,) = re.findall(r"^python -m aerodaas serve (.*)$", done.stdout, re.MULTILINE)
     root = typer.main.get_command(app)
@@ -136,6 +137,35 @@ def test_the_service_is_started_by_words_that_it_takes(tmp_path: Path) -> None:
     assert "--dashboard-host=127.0.0.1" in done.stdout
 
 
+def test_the_heads_tables_are_in_a_folder_that_nobody_else_has_made(tmp_path: Path) -> None:
+    """Whatever another user has put there before, under whatever name."""
+    (tmp_path / "bin").mkdir()
+    program = tmp_path / "bin" / "ray"
+    program.write_text('#!/bin/sh\nstat -c "%a %u %F" "$RAY_gcs_storage_path"\n')
+    (tmp_path / "bin" / "python").write_text("#!/bin/sh\n")
+    for one in (tmp_path / "bin").iterdir():
+        one.chmod(0o755)
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    (tmp_path / "ray-control").symlink_to(kept)
+    (tmp_path / "ray-control.planted").symlink_to(kept)
+    script = HEAD.replace("/tmp", str(tmp_path))  # noqa: S108
+    variables = {"PATH": "/usr/bin:/bin", "AERODAAS_VENV": str(tmp_path), "HOME": str(tmp_path)}
+    variables |= {"AERODAAS_OWN_ADDRESS": "10.0.0.7", "AERODAAS_ROOT": "1"}
+    words = ["bash", "-c", script]
+    for _ in range(2):
+        done = subprocess.run(words, env=variables, capture_output=True, text=True, check=True)
+        assert f"700 {os.getuid()} directory" in done.stdout
+    assert len([one for one in tmp_path.glob("ray-control.*") if not one.is_symlink()]) == 1
+    assert kept.is_dir()
+
+
+@pytest.mark.parametrize("name", ["edge-head.sh", "edge-join.sh", "certificates.sh"])
+def test_a_script_ends_at_its_first_failure(name: str) -> None:
+    """Also within a pipe, and for a variable that is not set."""
+    assert "\nset -euo pipefail\n" in (ROOT / "clusters" / name).read_text()
+
+
 def test_the_head_refuses_to_run_as_root(tmp_path: Path) -> None:
     """Unless it is told to."""
     script = tmp_path / "head.sh"
@@ -145,7 +175,7 @@ def test_the_head_refuses_to_run_as_root(tmp_path: Path) -> None:
     (tmp_path / "bin" / "ray").chmod(0o755)
     variables = {"PATH": "/usr/bin:/bin", "AERODAAS_VENV": str(tmp_path), "HOME": str(tmp_path)}
     done = subprocess.run(
-        ["sh", str(script)],  # noqa: S607
+        ["bash", str(script)],  # noqa: S607
         env=variables | {"AERODAAS_OWN_ADDRESS": "10.0.0.7"},
         capture_output=True,
         text=True,
@@ -199,7 +229,7 @@ def test_a_head_is_joined_by_its_name(tmp_path: Path) -> None:
         "AERODAAS_OBJECT_STORE": "1000",
         "HOME": str(tmp_path),
     }
-    words = ["sh", str(ROOT / "clusters" / "edge-join.sh")]
+    words = ["bash", str(ROOT / "clusters" / "edge-join.sh")]
     done = subprocess.run(
         [*words, "localhost:6379"], env=variables, capture_output=True, text=True, check=True
     )
@@ -213,7 +243,7 @@ def test_a_head_is_joined_by_its_name(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("script", ["edge-head.sh", "edge-join.sh"])
-def test_scripts_are_posix_shell(script: str) -> None:
+def test_scripts_are_valid_shell(script: str) -> None:
     """As far as a shell that reads them without running them can tell."""
-    subprocess.run(["sh", "-n", str(ROOT / "clusters" / script)], check=True)  # noqa: S607
+    subprocess.run(["bash", "-n", str(ROOT / "clusters" / script)], check=True)  # noqa: S607
     assert (ROOT / "clusters" / script).stat().st_mode & 0o111
