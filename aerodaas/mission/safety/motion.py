@@ -34,8 +34,8 @@ _REMEMBERED = 2 * NANOSECONDS
 """Nanoseconds for which a command explains the motion: vehicles lag behind."""
 _FASTER = 2.0
 """Times the commanded speed that still follows the command."""
-_STANDS = 0.2
-"""m/s below which a drone does not move."""
+_STANDS_WITHIN = 1.0
+"""Metres within which a drone stands: on the ground, running motors shake and shift it."""
 _MOVES = 0.3
 """m/s commanded from which it should."""
 STANDS_AFTER = 10.0
@@ -60,6 +60,8 @@ class MotionWatch:
         self._adrift_since: int | None = None
         self._patience = 0.0
         self._stands_since: int | None = None
+        self._lands = False
+        self._stood_at: Vector = np.zeros(3)
         self._now = 0
 
     def command(self, action: Action, setpoint: Setpoint | None) -> None:
@@ -69,7 +71,9 @@ class MotionWatch:
             action: What the vehicle is asked to do.
             setpoint: The setpoint as which it was sent; None if it was not sent as one.
         """
-        if isinstance(action, Land):
+        if isinstance(action, Land) is not self._lands:
+            self._lands, self._stands_since = not self._lands, None
+        if self._lands:
             setpoint = VelocitySetpoint(np.array([0.0, 0.0, -self._limits.max_climb]))
         elif isinstance(action, TakeOff):
             setpoint = VelocitySetpoint(np.zeros(3))
@@ -95,11 +99,11 @@ class MotionWatch:
             self._observe_drift(velocity[:2])
         else:
             self._adrift_since = None
-        stands = length(velocity) < _STANDS and length(wanted) >= _MOVES
-        if not stands:
+        position = state.odometry.position
+        if length(wanted) < _MOVES:
             self._stands_since = None
-        elif self._stands_since is None:
-            self._stands_since = now
+        elif self._stands_since is None or length(position - self._stood_at) > _STANDS_WITHIN:
+            self._stands_since, self._stood_at = now, position
 
     def forget(self) -> None:
         """Begin anew: the drone follows no setpoint, or its motion is not known."""

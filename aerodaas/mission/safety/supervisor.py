@@ -261,14 +261,13 @@ class Supervisor:
             faults.append(Fault(demand, "wind", text, "" if home else "land"))
         if self.motion.stands_for < STANDS_AFTER:
             return faults
-        what = (
-            f"for {STANDS_AFTER:g} s and its motors run: if it stands, stop them by remote control"
-        )
+        what = f"for {STANDS_AFTER:g} s, and its motors run"
+        rest = "if it stands on the ground, stop them by remote control"
         if state.mode is VehicleMode.LANDING:
-            text = f"the landing drone has come no lower {what}"
+            text = f"the landing drone has come no lower {what}: {rest}"
             faults.append(Fault(FailsafeAction.NOTHING, "motors_running", text))
         elif self._height(state) < _LOW:
-            text = f"the drone neither climbs nor moves as commanded {what}"
+            text = f"the drone has neither climbed nor moved as commanded {what}: it lands; {rest}"
             faults.append(Fault(FailsafeAction.LAND, "motors_running", text, "land"))
         return faults
 

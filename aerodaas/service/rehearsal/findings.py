@@ -33,6 +33,7 @@ _FAILURES = frozenset(
         "battery_low",
         "command_failed",
         "failsafe",
+        "motors_running",
         "no_position",
         "refused",
         "scheduler",
@@ -40,6 +41,7 @@ _FAILURES = frozenset(
         "unreachable_plan",
         "vehicle",
         "vehicle_lost",
+        "wind",
     }
 )
 """Kinds of alerts that tell of a failure; all others are an application's own results, or have a

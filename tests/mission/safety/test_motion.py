@@ -196,17 +196,20 @@ def test_too_high_and_too_far_are_outside_too(place: tuple[float, ...], word: st
 
 
 class GroundedVehicle(KinematicVehicle):
-    """A vehicle whose motor fails in the air: it comes down and stands, and says nothing of it."""
+    """A vehicle whose motor fails in the air: it comes down, and stands shaking."""
 
     failed = False
     disarms = False
     landing_for = 0.0
+    _shaken = 0
 
     def _step(self, duration: float) -> None:
         if not self.failed:
             super()._step(duration)
             return
-        self.velocity[:] = 0.0
+        self._shaken = (self._shaken + 1) % 40
+        self.velocity[:] = 0.5 if self._shaken < 20 else -0.5, 0.0, 0.0
+        self.position += self.velocity * duration
         self.position[2] = max(self._ground, self.position[2] - 3.0 * duration)
         self.landing_for += duration * (self.mode is VehicleMode.LANDING)
         if self.disarms and self.landing_for > 2.0:
@@ -222,7 +225,7 @@ def test_a_drone_on_the_ground_with_motors_running_is_told_and_landed(disarms: b
     vehicle.failed, vehicle.disarms = True, disarms
     broken.run(40.0)
     broken.expect(S.LANDED if disarms else S.LANDING)
-    assert "neither climbs nor moves" in broken.status.reason
+    assert "neither climbed nor moved" in broken.status.reason
     told = [alert.text for alert in broken.mission.alerts if alert.kind == "motors_running"]
     assert len(told) >= (1 if disarms else 2)
     assert not broken.status.visited
