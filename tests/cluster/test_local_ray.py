@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
+import threading
 
 import pytest
 
 from aerodaas.actors.cluster import local_ray
+from aerodaas.actors.cluster.head_watch import answers
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.types.errors import AeroDaaSError
 
@@ -42,3 +45,20 @@ def test_a_start_that_takes_too_long_is_no_end(monkeypatch: pytest.MonkeyPatch) 
     ray = LocalRay({})
     with pytest.raises(AeroDaaSError, match="this machine is too busy"):
         _ = ray.address
+
+
+@pytest.mark.parametrize("reply", [None, b"\0", b""], ids=["hangs", "speaks", "hangs up"])
+def test_only_a_process_that_runs_answers(reply: bytes | None) -> None:
+    """The kernel accepts connections of one that hangs; a server that expects TLS hangs up."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = server.getsockname()
+
+        def serve() -> None:
+            link, _ = server.accept()
+            with link:
+                link.sendall(reply or b"")
+
+        if reply is not None:
+            threading.Thread(target=serve, daemon=True).start()
+        assert answers(address) == (reply is not None)
+    assert not answers(address)
