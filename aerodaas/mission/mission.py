@@ -327,8 +327,8 @@ class Mission:
             return Wait()
         if self.state is MissionState.PREFLIGHT:
             return self._preflight(state, objections)
-        # Who has landed it within the moment that the reason takes to be known has taken it over.
-        if state.mode is VehicleMode.GROUNDED and self._taken_over(landed=True):
+        # It may be landed before the reason of the takeover is settled.
+        if state.mode is VehicleMode.GROUNDED and self._taken_over():
             return Wait()
         if self._motors_stopped(state):
             return Wait()
@@ -435,16 +435,13 @@ class Mission:
         elif demand is FailsafeAction.RETURN and self.state not in _LEAVING:
             self._to(MissionState.RETURNING, reason)
 
-    def _taken_over(self, *, landed: bool = False) -> bool:
-        """Whether somebody else flies; if so, end the mission as soon as it is known why.
-
-        At once where it has `landed`.
-        """
+    def _taken_over(self) -> bool:
+        """Whether somebody else flies; if so, end the mission as soon as it is known why."""
         taken = self._supervisor.taken_over(self._now)
         if taken is None:
             return False
         fault, settled = taken
-        if settled or landed:
+        if settled:
             self._to(MissionState.ABORTED, fault.text)
             self._log.alert(self._now, fault.kind, fault.text)
         else:

@@ -242,3 +242,31 @@ def test_a_pilot_before_the_motors_turn_ends_the_take_off(
         assert len(flight.orders()) == before, flight.story
         assert not flight.firmware.armed
         assert flight.loop.mission.state is S.ABORTED, flight.story
+
+
+def test_letting_go_in_a_silence_orders_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though the vehicle would hear it: whose it is by now is not known."""
+    with flown(monkeypatch, "ardupilot") as flight:
+        flight.until(S.ENROUTE)
+        autopilot = flight.ends.autopilot
+        autopilot.cut()
+        autopilot.spoil(up=type(autopilot.options.uplink)())
+        flight.run(2.0)
+        before = len(flight.orders())
+        flight.ends.vehicle.close()
+        assert len(flight.orders()) == before
+
+
+def test_a_loop_that_hangs_in_a_silence_is_answered_after_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is told to hold once a HEARTBEAT has shown that it is still ours."""
+    with flown(monkeypatch, "ardupilot") as flight:
+        flight.until(S.ENROUTE)
+        flight.ends.autopilot.cut()
+        flight.ends.advance(3.0)
+        before = len(flight.orders())
+        flight.ends.autopilot.cut(off=False)
+        flight.ends.advance(1.5)
+        (order,) = flight.orders()[before:]
+        assert (order.command, order.param2) == (mavlink.MAV_CMD_DO_SET_MODE, 17.0)

@@ -283,6 +283,9 @@ def test_the_modes_of_a_take_off_are_no_pilots_while_it_is_taken_back(shown: Fli
         taken.append(flight.phase.taken is not None)
     assert taken == [False, True]
     assert not flight.departure.withdrawing, "who has taken it over is left alone"
+    before = len(flight.sent)
+    flight.turn(5.0)
+    assert len(flight.sent) == before, "nor are unanswered orders repeated"
 
 
 def test_whoever_takes_over_is_left_alone() -> None:
