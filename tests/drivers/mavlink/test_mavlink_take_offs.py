@@ -134,10 +134,15 @@ def test_what_shows_to_be_done_is_done() -> None:
         (2.9, -0.31, False),
         (2.9, 0.29, True),
         (2.9, -0.29, True),
+        (3.99, 2.0, False),
+        (4.01, 2.0, True),
     ],
 )
 def test_when_a_climb_is_done(up: float, rise: float, *, done: bool) -> None:
-    """Within a tenth of 3 m below the height, and no faster than 0.3 m/s up or down."""
+    """Within a tenth of 3 m below the height, and no faster than 0.3 m/s up or down.
+
+    A metre above it the climb is ended, however fast it is.
+    """
     flight = TakeOff()
     flight.climb()
     flight.turn(3.0, up, rise)

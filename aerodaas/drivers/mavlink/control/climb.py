@@ -24,6 +24,9 @@ _NEAR = 0.2
 """Tolerance of the height in metres; a tenth of the height if that is more."""
 _CALM = 0.3
 """m/s."""
+_OVER = 1.0
+"""Metres above the height from which on it is not waited for: ArduPilot counts from its home, which
+may lie higher than the vehicle stands."""
 _DOUBT = 3.0
 """Seconds in which the refusal of an order sent twice may mean that the first was executed."""
 
@@ -85,7 +88,8 @@ class Climb:
             if now - self._started > _PATIENCE:
                 self.fail("it did not start its motors")
             return False
-        self._over = self.goal - up < self._near and abs(rise) < _CALM
+        short = self.goal - up
+        self._over = short < -_OVER or (short < self._near and abs(rise) < _CALM)
         return self._over
 
     def cancel(self) -> None:
