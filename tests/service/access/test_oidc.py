@@ -167,6 +167,8 @@ FORGED: dict[str, Callable[[Issuer], str]] = {
     "nobody": lambda issuer: issuer.token(without="sub"),
     "an empty subject": lambda issuer: issuer.token(sub=""),
     "a long subject": lambda issuer: issuer.token(sub="x" * 300),
+    "an end of 400 digits": lambda issuer: issuer.token(exp=10**400),
+    "an end beyond numbers": lambda issuer: issuer.token(exp=1e300),
     "too large": lambda issuer: issuer.token(more="x" * 20_000),
     "dots": lambda _: "..",
     "words": lambda _: "a.b.c",
@@ -183,6 +185,47 @@ def test_what_the_issuer_has_not_signed_for_this_service_is_refused(
     assert store.accounts.all() == []
     assert [one.action for one in store.audit.all()] == ["token.refused"]
     assert status_of(gate, issuer.token()) == 200
+
+
+TOLD: dict[str, tuple[Callable[[Issuer], str], list[str]]] = {
+    "no audience": (lambda issuer: issuer.token(without="aud"), ["no aud"]),
+    "Cognito": (lambda issuer: issuer.token(without="aud", client_id="4x"), ["'4x'", "ID token"]),
+    "audience": (lambda issuer: issuer.token(aud=["account"]), ["['account']", "'drones'"]),
+    "slash": (lambda issuer: issuer.token(iss=issuer.url + "/"), ["/farm/'", "/farm'"]),
+    "no key id": (FORGED["no key id"], ["no kid"]),
+    "unknown key": (by_unknown_key, ["no key 'other'"]),
+    "ahead": (lambda issuer: issuer.token(iat=int(time.time()) + 45), ["iat", "NTP"]),
+    "over": (lambda issuer: issuer.token(exp=5), ["exp is 5"]),
+    "signature": (by_anothers_key, ["signature"]),
+    "HMAC": (by_hmac, ["HS256"]),
+    "escapes": (lambda issuer: issuer.token(aud="\x1b[2J\n" + "x" * 999), ["aud is '"]),
+    "end": (lambda issuer: issuer.token(exp=10**400), ["exp is beyond"]),
+}
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_the_log_says_why_a_token_is_refused(
+    issuer: Issuer, store: Store, caplog: pytest.LogCaptureFixture, name: str
+) -> None:
+    """In one line of bounded length, with the claim; who sent it learns nothing of that."""
+    make, words = TOLD[name]
+    assert status_of(access(store, issuer), make(issuer)) == 401
+    (line,) = [one.getMessage() for one in caplog.records if one.name.endswith("oidc")]
+    assert all(word in line for word in words), line
+    assert line.isprintable()
+    assert len(line) < 600
+
+
+def test_the_log_is_not_filled_by_refused_tokens(
+    issuer: Issuer, store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Nor by what is no token at all."""
+    gate = access(store, issuer)
+    for _ in range(5):
+        status_of(gate, "a.b.c")
+    for _ in range(20):
+        status_of(gate, issuer.token(aud="another"))
+    assert len([one for one in caplog.records if one.name.endswith("oidc")]) == 1
 
 
 def test_a_key_of_another_kind_is_good_for_its_own_algorithm(issuer: Issuer, store: Store) -> None:
