@@ -119,9 +119,11 @@ class LiveReader:
         while not self._waiting:
             over = self._over()
             self._take(min(0.2, max(0.0, until - time.monotonic())))
-            if not self._waiting and over:
+            late = time.monotonic() >= until
+            # Whether a mission that has just ended is known to be over must not decide.
+            if not self._waiting and (over or (late and self._over())):
                 raise StopIteration
-            if not self._waiting and time.monotonic() >= until:
+            if not self._waiting and late:
                 raise TimeoutError(f"nothing arrived within {timeout} s")
         return self._waiting.popleft()
 

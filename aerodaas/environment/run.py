@@ -271,7 +271,8 @@ class Run:
             self._looked = time.monotonic()
             self.state = self._flight.poll(newest)
             self._view.print_alerts(self.state)
-        self._over = self.state.over
+        # One who began to look before the end may come back after it.
+        self._over = self._over or self.state.over
         return self.state
 
     def _keep_alive(self) -> None:

@@ -71,6 +71,8 @@ class WireReader:
                 if self._ended:
                     raise StopIteration
                 left = until - time.monotonic()
+                if left <= 0.0 and self._follower.mission.phase.over:
+                    raise StopIteration
                 if left <= 0.0:
                     raise TimeoutError(f"nothing arrived within {timeout} s")
                 self._arrived.wait(min(_LOOK_SECONDS, left))

@@ -228,6 +228,18 @@ def test_a_refused_stream_is_told(client: ProviderClient, stub: Stub) -> None:
         reader.next(SECONDS)
 
 
+def test_after_the_end_no_time_limit_is_told(client: ProviderClient, stub: Stub) -> None:
+    """Also while the connection for the last items is not made: by which is left to chance."""
+    follower = following(client)
+    stub.state = mission(MissionPhase.LANDED)
+    assert follower.await_end(SECONDS)
+    stub.refusals["/v1/missions"] = (503, {"text": "the database is gone"})
+    reader = WireReader(client, follower, "drone/odom")
+    for read in (reader.next, reader.newest):
+        with pytest.raises(StopIteration):
+            read(0.02)
+
+
 def test_many_readers_end_with_the_mission(client: ProviderClient, stub: Stub) -> None:
     """No thread is left waiting."""
     follower = following(client)
