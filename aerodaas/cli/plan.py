@@ -49,16 +49,23 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
 
     waypoints, notices = flown_plan(plan, home_altitude)
     for one in waypoints:
-        speed = "" if one.speed is None else f", {one.speed:g} m/s"
-        hover = f", hovers {one.hover_duration:g} s" if one.hover_duration else ""
         above = HeightReference(one.above or HeightReference.HOME).value
-        typer.echo(
-            f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above {above}{speed}{hover}"
-            f"{_pictures(one)}"
-        )
+        place = f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above {above}"
+        typer.echo(f"{place}{_flown(one)}{_pictures(one)}")
     for notice in notices:
         typer.echo(printable(f"not done: {notice}"))
     typer.echo(f"{plan}: waypoints: {len(waypoints)}, not done: {len(notices)}")
+
+
+def _flown(waypoint: Waypoint) -> str:
+    from aerodaas.types.geometry import yaw_enu_to_ned  # noqa: PLC0415 - loads numpy
+
+    said = [] if waypoint.speed is None else [f", {waypoint.speed:g} m/s"]
+    if waypoint.hover_duration:
+        said.append(f", hovers {waypoint.hover_duration:g} s")
+    if waypoint.yaw is not None:
+        said.append(f", heading {math.degrees(yaw_enu_to_ned(waypoint.yaw)) % 360:.0f} degrees")
+    return "".join(said)
 
 
 def _pictures(waypoint: Waypoint) -> str:

@@ -48,6 +48,16 @@ def test_a_plan_is_shown(plan: Callable[..., Result]) -> None:
     assert "20 m above home, 4 m/s\n" in higher
 
 
+def test_a_heading_is_shown(plan: Callable[..., Result], tmp_path: Path) -> None:
+    """As the plan has it, in degrees clockwise from north."""
+    item = {"type": "SimpleItem", "autoContinue": True, "command": 16, "frame": 3, "doJumpId": 1}
+    item["params"] = [0, 0, 0, 270, 47.001, 8.0, 20]
+    mission = {"items": [item], "plannedHomePosition": [47.0, 8.0, 488.0], "firmwareType": 12}
+    (tmp_path / "a.plan").write_text(json.dumps({"mission": mission}))
+    line, *_ = plan("show", "a.plan").output.splitlines()
+    assert line.endswith("20 m above home, heading 270 degrees")
+
+
 def test_what_is_photographed_is_shown(plan: Callable[..., Result], tmp_path: Path) -> None:
     """Triggers, single pictures, the gimbal, what is looked at, and video."""
     rows = [
