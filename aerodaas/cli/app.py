@@ -45,8 +45,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="""Program drones as a service.
 
-An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
-flies a simulated drone or a Tello.
+An application of some 20 lines becomes a dataflow of sensing, analytics and navigation. It flies
+a simulated drone, a PX4 or ArduPilot vehicle, a ROS 2 drone or a Tello.
 
     aerodaas run farm_survey
     aerodaas new my_app

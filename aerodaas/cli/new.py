@@ -41,7 +41,7 @@ def new(
         aerodaas run my_app.py
         pip install pytest && pytest
     """
-    templates = sorted(path.name for path in TEMPLATES.iterdir() if path.is_dir())
+    templates = sorted(path.parent.name for path in TEMPLATES.glob(f"*/{_NAME}.py"))
     if template not in templates:
         raise UnknownIdError("template", template, templates)
     _check(name)

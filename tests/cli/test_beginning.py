@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,7 @@ from aerodaas.testing.flight import fly
 from aerodaas.types.errors import ConfigError, MissionError
 
 Command = Callable[..., tuple[int, str, str]]
-TEMPLATE_NAMES = sorted(path.name for path in TEMPLATES.iterdir() if path.is_dir())
+TEMPLATE_NAMES = sorted(path.parent.name for path in TEMPLATES.glob("*/my_app.py"))
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -44,6 +45,48 @@ def test_the_applications_that_ship_are_the_repositorys() -> None:
         path.name for path in (ROOT / "apps").glob("*.py")
     }
     assert all(purpose(path) for path in shipped.values())
+
+
+def _first_program() -> str:
+    """The README's first program, as printed."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return text.split("```python\n")[1].split("```")[0]
+
+
+def test_the_first_program_is_built_as_printed(aerodaas: Command) -> None:
+    """From the README into the folder that the README names, with what ships."""
+    assert aerodaas("examples")[0] == 0
+    Path("examples/first.py").write_text(_first_program(), encoding="utf-8")
+    code, out, said = aerodaas("check", "examples/first.py")
+    assert code == 0, out + said
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_the_first_program_flies_as_printed(aerodaas: Command, tmp_path: Path) -> None:
+    """It follows the person that it says it follows, and lands at the raised hand."""
+    assert aerodaas("examples")[0] == 0
+    first = Path("examples/first.py")
+    first.write_text(_first_program(), encoding="utf-8")
+    drone = fly(first, tmp_path / "flown", seed=1, timeout=850).robots["tello"]
+    assert drone.outcome.startswith("landed: an analysis asked to land")
+    assert drone.distance > 40
+
+
+def test_only_templates_are_named(aerodaas: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not the folder in which Python keeps what it has compiled."""
+    shutil.copytree(TEMPLATES, "templates")
+    Path("templates/__pycache__").mkdir(exist_ok=True)
+    monkeypatch.setattr("aerodaas.cli.new.TEMPLATES", Path("templates"))
+    code, _, said = aerodaas("new", "patrol", "--template", "__pycache__")
+    assert code == 2
+    assert "known: camera, detector, driver, follow, scheduler, survey" in said
+
+
+def test_help_names_what_is_flown(aerodaas: Command) -> None:
+    """Each kind of vehicle of the documentation."""
+    told = aerodaas("--help")[1]
+    assert all(name in told for name in ("PX4", "ArduPilot", "ROS 2", "Tello"))
 
 
 def test_an_application_is_found_by_path_first(
