@@ -431,6 +431,24 @@ def test_a_good_run_says_where_everything_lies(aerodaas: Commands) -> None:
         assert (aerodaas.folder / "out" / name).exists()
 
 
+def test_the_doctor_names_what_models_run_on(
+    runtime: None,  # noqa: ARG001
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not what onnxruntime could be told to send elsewhere."""
+    monkeypatch.setattr(
+        "aerodaas.actors.cluster.ray_cluster.disconnect", lambda: None
+    )  # others use it, too
+    monkeypatch.setattr(
+        "onnxruntime.get_available_providers",
+        lambda: ["AzureExecutionProvider", "CPUExecutionProvider"],
+    )
+    examine()
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "inference on" in line]
+    assert line.split() == ["ok", "inference", "on", "CPU"]
+
+
 def test_the_doctor_names_a_port_that_is_taken(
     runtime: None,  # noqa: ARG001
     capsys: pytest.CaptureFixture[str],

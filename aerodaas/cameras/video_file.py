@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 
 import cv2
 import numpy as np
@@ -15,6 +16,8 @@ from aerodaas.types.errors import SourceError
 __all__ = ["VideoFile"]
 
 _log = logging.getLogger(__name__)
+# Whoever opens a damaged file is told once, by us. OpenCV reads this at the first file.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 _HIGHEST_RATE = 500.0
 """Hz above which a file's rate, or its frames' stamps, are the ticks of its clock at best."""
 _ROUNDING = 1e-6

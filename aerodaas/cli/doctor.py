@@ -143,11 +143,11 @@ def _package(package: str, module: str) -> Finding:
 
 
 def _providers() -> Iterator[Finding]:
-    import onnxruntime  # noqa: PLC0415 - slow to load
+    from aerodaas.analytics.detection.providers import (  # noqa: PLC0415 - slow to load
+        default_providers,
+    )
 
-    names = [
-        name.removesuffix("ExecutionProvider") for name in onnxruntime.get_available_providers()
-    ]
+    names = [name.removesuffix("ExecutionProvider") for name in default_providers()]
     yield Finding("inference on", ", ".join(names))
 
 

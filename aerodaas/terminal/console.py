@@ -52,8 +52,9 @@ class StartupView:
         self._begun = ""
 
     def __enter__(self) -> Self:
-        if self._shown and self._console.is_terminal:
-            self._status = self._stack.enter_context(self._console.status("starting"))
+        console = self._console
+        if self._shown and console.is_terminal and not console.is_dumb_terminal:
+            self._status = self._stack.enter_context(console.status("starting"))
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.console import Console, ConsoleDimensions
 from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
@@ -75,5 +75,6 @@ def _width(table: Table) -> int:
 
 
 def _print(console: Console, table: Table) -> None:
-    console.width = max(console.width, _width(table))
+    # With the height, for of a dumb terminal the width alone is not taken.
+    console.size = ConsoleDimensions(max(console.width, _width(table)), console.height)
     console.print(table)

@@ -47,7 +47,7 @@ class MissionView:
         self._paths: dict[str, list[tuple[float, float]]] = {}
 
     def __enter__(self) -> Self:
-        if self._console.is_terminal:
+        if self._console.is_terminal and not self._console.is_dumb_terminal:
             self._live = Live(console=self._console, auto_refresh=False)
             self._live.start()
         return self

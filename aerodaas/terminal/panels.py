@@ -65,7 +65,7 @@ def robot_panel(
     """Mission, position and battery of a robot, beside a plan of its flight."""
     facts = Table.grid(padding=(0, 1), expand=True)
     facts.add_column(style="dim", width=9, no_wrap=True)
-    facts.add_column(ratio=1, no_wrap=True)
+    facts.add_column(ratio=1, overflow="fold")
     mission, vehicle = robot.mission, robot.vehicle
     facts.add_row(Text(robot.name, "bold not dim"), _state(mission))
     facts.add_row("", Text(mission.reason if mission else "", "italic"))
@@ -91,7 +91,7 @@ def robot_panel(
 def streams_panel(streams: Sequence[StreamSnapshot]) -> RenderableType:
     """Rate, latency and drops of each stream."""
     table = Table(box=None, expand=True, pad_edge=False, header_style="dim")
-    table.add_column("stream", ratio=1, no_wrap=True)
+    table.add_column("stream", ratio=1, overflow="fold")
     for heading in ("per second", "median ms", "p99 ms", "dropped"):
         table.add_column(heading, justify="right", width=10, no_wrap=True)
     for stream in streams:
@@ -108,7 +108,7 @@ def streams_panel(streams: Sequence[StreamSnapshot]) -> RenderableType:
 
 def alerts_panel(alerts: Sequence[str]) -> RenderableType:
     """The last few alerts."""
-    return Group(*(Text(f"! {alert}", "yellow", no_wrap=True) for alert in alerts[-_ALERTS:]))
+    return Group(*(Text(f"! {alert}", "yellow") for alert in alerts[-_ALERTS:]))
 
 
 def _state(mission: MissionStatus | None) -> Text:
@@ -167,7 +167,7 @@ def _faults(mission: MissionStatus | None, vehicle: VehicleState | None) -> Text
 def _bar(share: float, text: str, style: str) -> RenderableType:
     row = Table.grid(padding=(0, 1))
     row.add_column(width=_BAR)
-    row.add_column(no_wrap=True)
+    row.add_column(overflow="fold")
     bar = ProgressBar(
         total=1.0,
         completed=min(max(share, 0.0), 1.0),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -54,6 +56,23 @@ def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def number(image: np.ndarray[Any, np.dtype[np.uint8]]) -> int:
     """Which of the video's frames this is."""
     return round(float(image.mean()) / STEP)
+
+
+def test_a_damaged_file_is_told_by_us_alone(tmp_path: Path) -> None:
+    """FFmpeg has a line of its own for each thing that it stumbles over."""
+    broken = tmp_path / "broken.mp4"
+    broken.write_bytes(bytes(4) + b"ftypisom" + bytes(4000))
+    code = (
+        "from aerodaas.cameras.video_file import VideoFile\n"
+        "from aerodaas.config.secrets import SecretUrl\n"
+        "from aerodaas.types.errors import SourceError\n"
+        f"try: VideoFile(SecretUrl({str(broken)!r}), 5.0, loop=False).open()\n"
+        "except SourceError: print('told')"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert (ended.stdout, ended.stderr) == ("told\n", "")
 
 
 def test_a_file_gives_the_frame_of_each_stamp(video: Path) -> None:

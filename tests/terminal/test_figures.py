@@ -53,6 +53,14 @@ def test_nothing_is_cut_and_the_width_is_kept(
     assert cells == [list(row.cells) for row in rows]
 
 
+def test_a_dumb_terminal_cuts_nothing() -> None:
+    """Its width is taken for 80 columns, and one name is wider."""
+    file = io.StringIO()
+    console = Console(file=file, force_terminal=True, _environ={"TERM": "dumb"})
+    show_figures("title", "name", ["cell"], [Row("n" * 90, ["1"])], console=console)
+    assert "n" * 90 in file.getvalue()
+
+
 @given(tables())
 def test_a_pipe_has_one_table(table: tuple[list[str], list[Row]]) -> None:
     """However wide: who reads it by a program finds each row on one line."""

@@ -94,6 +94,36 @@ def test_panel_shows_what_matters(width: int) -> None:
         assert words in text
 
 
+@pytest.mark.parametrize("width", [72, 80])
+def test_a_narrow_panel_cuts_no_name(width: int) -> None:
+    """Streams, reasons, faults and alerts go on in the next line."""
+    long = "drone/a_stream_with_a_name_that_tells_all_that_it_is_made_from"
+    alert = "link_lost: " + " ".join(f"word{number}" for number in range(30))
+    told = snapshot(3.0, alerts=(alert,))
+    (robot,) = told.robots
+    assert robot.mission is not None
+    reason = " ".join(f"reason{number}" for number in range(20))
+    mission = replace(robot.mission, reason=reason, faults=(alert,))
+    told = replace(told, robots=(replace(robot, mission=mission),), streams=(StreamSnapshot(long),))
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, color_system=None)
+    console.print(MissionView(console).render(told))
+    assert isinstance(console.file, io.StringIO)
+    text = console.file.getvalue()
+    assert "…" not in text
+    assert all(word in text for word in (*alert.split(), *reason.split()))
+
+
+def test_a_dumb_terminal_gets_lines() -> None:
+    """It cannot draw over what it has drawn."""
+    out = io.StringIO()
+    console = Console(file=out, force_terminal=True, _environ={"TERM": "dumb"})
+    with MissionView(console) as view:
+        view.update(snapshot(1.0))
+        assert not view.live
+    assert "\x1b" not in out.getvalue()
+    assert "tello enroute" in out.getvalue()
+
+
 @pytest.mark.parametrize("width", [40, 80])
 def test_panel_keeps_to_the_width(width: int) -> None:
     """No line wraps."""

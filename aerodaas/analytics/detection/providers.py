@@ -12,7 +12,7 @@ import onnxruntime as ort
 
 from aerodaas.types.errors import ModelError
 
-__all__ = ["default_threads", "open_session"]
+__all__ = ["default_providers", "default_threads", "open_session"]
 
 _log = logging.getLogger(__name__)
 _PREFERRED = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
@@ -33,6 +33,12 @@ def default_threads() -> int:
     return max(1, len(os.sched_getaffinity(0)) // 2)
 
 
+def default_providers() -> list[str]:
+    """The execution providers that a session takes unless others are given, best first."""
+    available = ort.get_available_providers()
+    return [name for name in _PREFERRED if name in available]
+
+
 def open_session(
     content: bytes, label: str, providers: Sequence[str] | None, threads: int | None
 ) -> ort.InferenceSession:
@@ -50,7 +56,7 @@ def open_session(
             f"{', '.join(available)}; install onnxruntime-gpu, or leave providers out"
         )
         raise ModelError(message)
-    chosen = list(providers or (name for name in _PREFERRED if name in available))
+    chosen = list(providers or default_providers())
     options = ort.SessionOptions()
     options.log_severity_level = _ERRORS_ONLY
     options.intra_op_num_threads = threads or default_threads()
