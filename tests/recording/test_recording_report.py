@@ -17,6 +17,7 @@ from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
+from aerodaas.recording.report.page.document import paragraph, table
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 from aerodaas.recording.report.report import write_report
 from aerodaas.types.errors import RecordingError
@@ -71,6 +72,14 @@ def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:
         assert image is not None
         assert min(image.shape[:2]) > 300
         assert len(np.unique(image[::9, ::9].reshape(-1, 3), axis=0)) > 10
+
+
+def test_words_between_backticks_are_code() -> None:
+    """In paragraphs and cells; a stranger's text stays text."""
+    assert paragraph("say `--full`") == "<p>say <code>--full</code></p>"
+    cells = table(["a", "b"], [("`x`", "see `<b>` and a lone `")])
+    assert "<th>`x`</th>" in cells
+    assert "<td>see <code>&lt;b&gt;</code> and a lone `</td>" in cells
 
 
 def test_states_cover_the_flight(recorded: Path) -> None:

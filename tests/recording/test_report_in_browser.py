@@ -17,10 +17,17 @@ from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.report import write_report
 
 BROWSER = peer("AERODAAS_BROWSER")
-PROBE = """
+PROBE = r"""
 <script>
 window.addEventListener("load", () => {
   const pictures = [...document.images];
+  const cells = [...document.querySelectorAll("tbody th")];
+  const names = cells.filter(one => !/\s/.test(one.textContent));
+  const lines = cell => {
+    const range = document.createRange();
+    range.selectNodeContents(cell);
+    return new Set([...range.getClientRects()].map(one => one.top)).size;
+  };
   const found = {
     errors: window.complaints,
     pictures: pictures.length,
@@ -28,6 +35,9 @@ window.addEventListener("load", () => {
     tooWide: pictures.filter(one => one.getBoundingClientRect().right > innerWidth + 1).length,
     scrolls: document.documentElement.scrollWidth - innerWidth,
     width: innerWidth,
+    page: getComputedStyle(document.body).backgroundColor,
+    ink: getComputedStyle(document.body).color,
+    brokenNames: names.filter(one => lines(one) > 1).map(one => one.textContent),
   };
   document.title = JSON.stringify(found);
 });
@@ -41,7 +51,7 @@ window.addEventListener("error", event => window.complaints.push(String(event.me
 """
 
 
-def look(page: Path, width: int) -> tuple[dict[str, Any], str]:
+def look(page: Path, width: int, *, dark: bool = False) -> tuple[dict[str, Any], str]:
     """Load a page in a window of this width; returns what was found, and the browser's log."""
     probe = page.with_name("probe.html")
     text = page.read_text().replace("<head>", f"<head>{EARS}").replace("</body>", f"{PROBE}</body>")
@@ -49,7 +59,7 @@ def look(page: Path, width: int) -> tuple[dict[str, Any], str]:
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr",
         f"--user-data-dir={page.parent / 'browser'}", f"--window-size={width},900", "--dump-dom",
-        probe.as_uri(),
+        f"--blink-settings=preferredColorScheme={0 if dark else 1}", probe.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
     title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
@@ -82,3 +92,18 @@ def test_pages_load_without_complaint(recorded: Path, tmp_path: Path, width: int
         assert found["missing"] == 0
         assert found["tooWide"] == 0
         assert found["scrolls"] <= 0
+        assert found["brokenNames"] == []
+
+
+@pytest.mark.slow
+@needs_peer("AERODAAS_BROWSER")
+def test_a_dark_browser_gets_a_dark_page(recorded: Path, tmp_path: Path) -> None:
+    """With light ink, and the other way round."""
+    page = write_report(recorded, tmp_path).page
+    for dark in (True, False):
+        found, _ = look(page, 800, dark=dark)
+        shown, ink = (
+            sum(map(int, re.findall(r"\d+", found[what])[:3])) / (3 * 255)
+            for what in ("page", "ink")
+        )
+        assert (shown < 0.2 and ink > 0.8) if dark else (shown > 0.8 and ink < 0.2)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from html import escape
 
 from aerodaas.cli.leaderboard.origin import Origin
-from aerodaas.recording.report.page.document import document, paragraph, section, table
+from aerodaas.recording.report.page.document import document, marked, paragraph, section, table
 from aerodaas.schedulers.lab.leaderboard import CASES, SET, Leaderboard, Standing
 from aerodaas.schedulers.lab.metrics import Mean
 
@@ -62,7 +62,7 @@ def _standings(board: Leaderboard, ideas: Mapping[str, str]) -> str:
         f'<tr{" class=first" if one.rank == 1 else ""}><td class="number">{one.rank}</td>'
         f"<th>{escape(one.scheduler)}</th>{_bar(one.utility, dagger=one.is_behind)}"
         f'{_bar(one.completion)}<td class="number">{one.completion_rank}</td>'
-        f"<td>{escape(ideas[one.scheduler])}</td></tr>"
+        f"<td>{marked(ideas[one.scheduler])}</td></tr>"
         for one in board.standings
     ]
     return _scrolled(
@@ -138,7 +138,7 @@ def _entering() -> tuple[str, ...]:
         f"<pre>{escape(_OWN)}</pre>",
         paragraph(
             "Its row appears among the others; the figures of the others stay the same. To see one "
-            "case alone: aerodaas lab run with the words of its row above."
+            "case alone: `aerodaas lab run` with the words of its row above."
         ),
     )
 

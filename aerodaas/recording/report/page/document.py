@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
 
-__all__ = ["document", "paragraph", "picture", "section", "table"]
+__all__ = ["document", "marked", "paragraph", "picture", "section", "table"]
 
 _STYLE = Path(__file__).with_name("style.css")
 
@@ -39,9 +40,14 @@ def section(title: str, *content: str, wide: bool = False) -> str:
     return f"<section{kind}><h2>{escape(title)}</h2>{''.join(content)}</section>"
 
 
+def marked(text: str) -> str:
+    """A text as HTML, what stands between backticks in it as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
+
+
 def paragraph(text: str, kind: str = "") -> str:
     """A paragraph of text with the CSS class `kind`."""
-    return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
+    return f'<p class="{kind}">{marked(text)}</p>' if kind else f"<p>{marked(text)}</p>"
 
 
 def picture(data: bytes, alt: str, *, media: str = "image/png", caption: str = "") -> str:
@@ -80,7 +86,7 @@ def _cell(value: object, *, first: bool) -> str:
         return f'<td class="number">{value:,.1f}</td>'
     if isinstance(value, int):
         return f'<td class="number">{value:,}</td>'
-    return f"<td>{escape(str(value))}</td>"
+    return f"<td>{marked(str(value))}</td>"
 
 
 @cache
