@@ -73,13 +73,28 @@ def parse_json(text: str, place: str) -> Any:  # noqa: ANN401 - any JSON
             parse_int=_bounded,
         )
     except json.JSONDecodeError as error:
-        raise ConfigError(f"{place} is not JSON: {error}") from None
+        raise ConfigError(f"{place} is not JSON: {error}{_remedy(text, error.pos)}") from None
     except _OddityError as error:
         raise ConfigError(f"{place} is not JSON: {error}") from None
     except RecursionError:
         raise ConfigError(f"{place}: {_too_deep('')}") from None
     check_plain(content, place)
     return content
+
+
+def _remedy(text: str, at: int) -> str:
+    """What is to be done about what other dialects of JSON permit; empty for anything else."""
+    if text[at : at + 1] == "#" or text[at : at + 2] in {"//", "/*"}:
+        return "; JSON has no comments: delete it"
+    # Where it stops, at a comma, at the bracket behind it or between, depends on the Python.
+    before, behind = text[:at].rstrip(), text[at:].lstrip()
+    if behind[:1] == ",":
+        before, behind = f"{before},", behind[1:].lstrip()
+    if before[-1:] == "," and behind[:1] in {"]", "}"}:
+        return "; JSON has no comma behind the last item: delete it"
+    if text[at : at + 1] == "'":
+        return "; JSON has double quotes"
+    return ""
 
 
 def check_plain(content: object, place: str, most: float = math.inf) -> None:

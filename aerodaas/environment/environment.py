@@ -276,12 +276,15 @@ class Environment(PaperNames, IEnvironment):
         if self._mission is not None:
             self._mission.wait()
 
-    def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
-        """Plug in the trajectory scheduler; raises ConfigError if it is none.
+    def set_trajectory_scheduler(
+        self, scheduler: INavigate | str | type[TrajectoryScheduler]
+    ) -> None:
+        """Plug in the trajectory scheduler: a name, `module:Class`, a class, or an instance.
 
-        In flight, the whole queue is planned again by it.
+        In flight, the whole queue is planned again by it. Raises UnknownIdError for a name that
+        there is not, ConfigError for what is no scheduler.
         """
-        checked = _checked_scheduler(scheduler)
+        checked = self._trajectory_scheduler(scheduler)
         if self._mission is not None and self.graph.flying:
             self._mission.use_scheduler(checked)
         self._trajectory = self.chosen_trajectory = checked
@@ -329,10 +332,19 @@ class Environment(PaperNames, IEnvironment):
     def trajectory_scheduler(self) -> TrajectoryScheduler:
         """The scheduler plugged in, or the one that the environment file names."""
         if self._trajectory is None:
-            name = self.config.schedulers.trajectory
-            scheduler = load_plugin("trajectory_schedulers", name)(self)
-            self._trajectory = _checked_scheduler(scheduler)
+            self._trajectory = self._trajectory_scheduler(self.config.schedulers.trajectory)
         return self._trajectory
+
+    def _trajectory_scheduler(self, wanted: object) -> TrajectoryScheduler:
+        scheduler = wanted
+        if isinstance(wanted, str):
+            scheduler = load_plugin("trajectory_schedulers", wanted)(self)
+        elif isinstance(wanted, type):
+            scheduler = wanted(self)
+        if not isinstance(scheduler, TrajectoryScheduler):
+            kind = type(scheduler).__name__
+            raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+        return scheduler
 
     def analytics_scheduler(self) -> AnalyticsScheduler | None:
         """The scheduler plugged in, or the one that the environment file names, if any."""
@@ -507,13 +519,6 @@ class Environment(PaperNames, IEnvironment):
                 require_actuators(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
-
-
-def _checked_scheduler(scheduler: object) -> TrajectoryScheduler:
-    if not isinstance(scheduler, TrajectoryScheduler):
-        kind = type(scheduler).__name__
-        raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
-    return scheduler
 
 
 def _addressee(entry: NavigationEntry, flying: list[str]) -> str:

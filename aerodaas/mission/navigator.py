@@ -97,7 +97,8 @@ class Navigator:
     def _objection(self, waypoint: Waypoint, now: float, source: str) -> str:
         distance = float(((waypoint.position - self._home) ** 2).sum() ** 0.5)
         if distance > self._max_range:
-            return f"{distance:.0f} m away is beyond the range of {self._max_range:g} m"
+            most = f"{self._max_range:g} m (limits.max_range)"
+            return f"{distance:.0f} m away is beyond the range of {most}"
         if waypoint.deadline is not None and waypoint.deadline <= now:
             return f"its deadline of {waypoint.deadline:g} s is past, it is {now:.1f} s now"
         known = self.queue.find(waypoint.id)

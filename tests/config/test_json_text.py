@@ -27,6 +27,12 @@ ROBOT = '{"robots": [{"id": "d", "settings": {"x": %s}}]}'
         (ROBOT % "-Infinity", "robots.0.settings.x: must be a finite number"),
         (ROBOT % '{"a": 1, "a": 2}', "'a' stands twice"),
         ("[", "is not JSON"),
+        ('{"robots": [], // mine\n "name": "a"}', "JSON has no comments"),
+        ('{"robots": [] /* mine */}', "JSON has no comments"),
+        ('{ # mine\n"robots": []}', "JSON has no comments"),
+        ('{"robots": [],\n}', "no comma behind the last item"),
+        ('{"robots": [{"id": "d"}, ]}', "no comma behind the last item"),
+        ("{'robots': []}", "double quotes"),
         ('"' + "x" * (5 << 20) + '"', "larger than 4 MiB"),
     ],
 )

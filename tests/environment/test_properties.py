@@ -11,7 +11,7 @@ import pytest
 from flying import FLAT, robot
 from pydantic import BaseModel
 
-from aerodaas import AeroNavigation, Environment
+from aerodaas import AeroNavigation, Environment, NearestNeighborScheduler
 from aerodaas.types.errors import ConfigError, SchedulerError, UnknownIdError
 from aerodaas.types.geometry import GeodeticOrigin
 
@@ -140,3 +140,29 @@ def test_a_robot_plans_a_survey_by_its_camera(tmp_path: Path) -> None:
     ]
     with pytest.raises(SchedulerError, match="a height or a ground resolution"):
         env.get_robot_by_id("drone").plan_survey(field)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        "nearest_neighbor",
+        "aerodaas.schedulers.trajectory.nearest_neighbor:NearestNeighborScheduler",
+        NearestNeighborScheduler,
+        NearestNeighborScheduler(),
+    ],
+    ids=["name", "module", "class", "instance"],
+)
+def test_a_trajectory_scheduler_is_set_as_an_analytics_one_is(
+    env: Environment, given: str | type[NearestNeighborScheduler] | NearestNeighborScheduler
+) -> None:
+    """By name, by module and class, by class, and by instance."""
+    env.set_trajectory_scheduler(given)
+    assert isinstance(env.trajectory_scheduler(), NearestNeighborScheduler)
+
+
+def test_what_is_no_trajectory_scheduler_is_refused(env: Environment) -> None:
+    """A wrong name with those that are close, anything else by its kind."""
+    with pytest.raises(UnknownIdError, match="did you mean nearest_neighbor"):
+        env.set_trajectory_scheduler("nearest")
+    with pytest.raises(ConfigError, match="not int"):
+        env.set_trajectory_scheduler(5)  # type: ignore[arg-type]

@@ -213,6 +213,42 @@ def test_bad_waypoints_are_answered_and_the_flight_goes_on(waypoint: Waypoint, w
     assert (waypoint.id in survey.status.given_up) is (waypoint.id not in survey.status.visited)
 
 
+@pytest.mark.parametrize(
+    ("waypoint", "setting"),
+    [
+        (Waypoint("w", 99, 0, 2), "limits.geofence"),
+        (Waypoint("w", 24.8, 0, 2), "limits.geofence.margin"),
+        (Waypoint("w", 0, 0, 0.1), "limits.geofence.floor"),
+        (Waypoint("w", 0, 0, 11), "limits.geofence.ceiling"),
+        (Waypoint("w", 0, 5000, 2), "limits.max_range"),
+    ],
+)
+def test_a_refusal_names_the_setting(waypoint: Waypoint, setting: str) -> None:
+    """By which it may be permitted."""
+    far = waypoint.y > 1000
+    refused = flight(limits=LimitsConfig() if far else FENCE).tell(add(waypoint))
+    assert f"({setting})" in refused.text
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "height", "setting"),
+    [
+        (KinematicVehicle((50.0, 0.0, 0.0)), 2.0, "limits.geofence"),
+        (KinematicVehicle(charge=0.2), 2.0, "limits.battery_return"),
+        (KinematicVehicle((0.0, 0.0, 5.0)), 9.0, "limits.takeoff_height"),
+    ],
+)
+def test_a_refused_take_off_names_the_setting(
+    vehicle: KinematicVehicle, height: float, setting: str
+) -> None:
+    """By which it may be permitted."""
+    limits = FENCE.model_copy(update={"takeoff_height": height})
+    refused = flight(live(), limits=limits, vehicle=vehicle)
+    refused.run()
+    refused.expect(S.ABORTED)
+    assert setting in refused.status.reason
+
+
 def test_commands_that_make_no_sense_are_refused() -> None:
     """Empty lists, unknown streams, negative indices, a second start, too late, resume."""
     survey = flight(add(*square()))

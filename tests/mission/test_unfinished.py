@@ -31,7 +31,7 @@ def _loses_its_link() -> Flight:
 
 def _meets_the_wind() -> Flight:
     options = MissionConfig(stall_timeout=5.0, on_complete="land")
-    return flight(add(FAR), vehicle=KinematicVehicle(wind=(-3.0, 0.0, 0.0)), options=options)
+    return flight(add(FAR), vehicle=KinematicVehicle(wind=(-1.0, 0.0, 0.0)), options=options)
 
 
 @pytest.mark.parametrize(

@@ -75,9 +75,10 @@ class Geofence:
         """Return why `position` is not a permitted target, or an empty string."""
         east, north, up = (float(axis) for axis in position)
         if up < self.floor:
-            return f"{up:.2f} m is under the floor of {self.floor:g} m"
+            return f"{up:.2f} m is under the floor of {self.floor:g} m (limits.geofence.floor)"
         if up > self.ceiling:
-            return f"{up:.2f} m is above the ceiling of {self.ceiling:g} m"
+            ceiling = f"{self.ceiling:g} m (limits.geofence.ceiling)"
+            return f"{up:.2f} m is above the ceiling of {ceiling}"
         if self.area is None or self.inner is None:
             return ""
         place = shapely.Point(east, north)
@@ -86,11 +87,13 @@ class Geofence:
             return (
                 f"({east:.1f}, {north:.1f}) lies over ground that the terrain does not know"
                 if self._unknown is not None and shapely.covers(self._unknown, place)
-                else f"({east:.1f}, {north:.1f}) lies {distance:.1f} m outside the geofence"
+                else f"({east:.1f}, {north:.1f}) lies {distance:.1f} m outside the geofence "
+                "(limits.geofence)"
             )
         tolerance = 1e-6
         if shapely.distance(self.inner, place) > tolerance:
-            return f"({east:.1f}, {north:.1f}) lies within {self.margin:g} m of the geofence's edge"
+            edge = "the geofence's edge (limits.geofence.margin)"
+            return f"({east:.1f}, {north:.1f}) lies within {self.margin:g} m of {edge}"
         return ""
 
     def nearest_allowed(self, position: Vector) -> Vector:

@@ -298,7 +298,7 @@ def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:
         return ""
     return (
         f"the battery is at {charge:.0%}, and the drone returns at "
-        f"{limits.battery_return:.0%}: charge it"
+        f"{limits.battery_return:.0%} (limits.battery_return): charge it"
     )
 
 
@@ -308,12 +308,13 @@ def place_objections(state: VehicleState, limits: LimitsConfig, fence: Geofence)
         return ["the vehicle does not know its position"]
     reasons, position = list[str](), state.odometry.position
     if not fence.inside(position):
-        reasons.append(f"the drone stands outside its geofence, at {_place(position)}")
+        where = _place(position)
+        reasons.append(f"the drone stands outside its geofence (limits.geofence), at {where}")
     height = float(position[2]) + limits.takeoff_height
     if not fence.floor <= height <= fence.ceiling:
         reasons.append(
             f"taking off to {height:g} m leaves the geofence's heights of "
-            f"{fence.floor:g} to {fence.ceiling:g} m"
+            f"{fence.floor:g} to {fence.ceiling:g} m (limits.takeoff_height, limits.geofence)"
         )
     return reasons
 
