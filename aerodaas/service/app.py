@@ -23,6 +23,7 @@ from aerodaas.service.edge import EdgeArbiter
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
+from aerodaas.service.model_trial import try_model
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.routes.accounts import AccountRoutes
@@ -61,7 +62,7 @@ def build_service(
     accounts, access = Accounts(store), Access(store, audit, tell, issuer=issuer)
     accounts.on_change = access.forget
     quotas, garage = Quotas(store), Garage(settings.config, store)
-    models = ModelShelf(settings.models)
+    models = ModelShelf(settings.models, try_model)
     bookings = Bookings(settings.config, store, garage, quotas, settings.state / "clock")
     monitor = None
     if settings.monitor:

@@ -11,9 +11,10 @@ import hashlib
 import os
 import re
 import shutil
+import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -50,8 +51,9 @@ def require_room(folder: Path) -> None:
 class ModelShelf:
     """Folder of models."""
 
-    def __init__(self, folder: Path) -> None:
-        """Keep models in `folder`."""
+    def __init__(self, folder: Path, trial: Callable[[Path], None] = lambda _: None) -> None:
+        """Keep models in `folder` that pass a `trial`, which raises AeroDaaSError of others."""
+        self._trial = trial
         self._folder = folder
         self._lock = threading.Lock()
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -73,8 +75,8 @@ class ModelShelf:
     def put(self, tenant: str, sha256: str, content: bytes) -> None:
         """Keep a tenant's model, for which its longest unused ones go if need be.
 
-        Raises ConfigError if it is too large or not the one that it is called, RefusedError if
-        there is no room.
+        Raises ConfigError if it is too large or not the one that it is called, or takes too much
+        to be run; RefusedError if there is no room.
         """
         if len(content) > LARGEST_MODEL:
             raise ConfigError(f"a model has at most {LARGEST_MODEL >> 20} MiB")
@@ -86,6 +88,11 @@ class ModelShelf:
         path = self._path(tenant, sha256)
         with self._lock:
             path.parent.mkdir(exist_ok=True, mode=0o700)
+        with tempfile.TemporaryDirectory(dir=self._folder, prefix=".") as tried:
+            file = Path(tried) / path.name
+            write_private(file, content)
+            self._trial(file)
+        with self._lock:
             _make_room(path.parent, len(content), tenant)
             write_private(path, content)
 
