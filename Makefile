@@ -76,9 +76,13 @@ lock: $(VENV)/.installed-dev
 	  --generate-hashes --no-emit-index-url --no-annotate \
 	  --custom-compile-command "make lock" --output-file requirements-dev.txt
 
-# Known holes of what is locked; asks a service on the network.
+# Known holes of what is locked, and of the oldest releases that our floors admit; asks a service on
+# the network.
 audit: $(VENV)/.installed-dev
 	$(BIN)/uv tool run pip-audit --requirement requirements-dev.txt --disable-pip --strict
+	$(BIN)/uv pip compile pyproject.toml --extra all --resolution lowest-direct --quiet \
+	  --generate-hashes --output-file $(VENV)/floors.txt
+	$(BIN)/uv tool run pip-audit --requirement $(VENV)/floors.txt --disable-pip --strict
 
 licences: $(VENV)/.installed-dev
 	$(BIN)/python -m tools.licences

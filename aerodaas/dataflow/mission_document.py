@@ -28,7 +28,13 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.identifiers import ScopedWord, Word
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
+from aerodaas.types.waypoints import (
+    DEFAULT_PRIORITY,
+    LARGEST,
+    HeightReference,
+    Waypoint,
+    WaypointType,
+)
 
 __all__ = [
     "HERE_CONDITION",
@@ -44,7 +50,7 @@ __all__ = [
     "read_mission",
 ]
 
-_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 _Percent = Annotated[float, Field(ge=0, le=100)]
 _HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
@@ -119,7 +125,7 @@ class WaypointEntry(BaseModel):
     waypoint_type: Literal["relative", "local", "global", "global_relative"] = "relative"
     yaw: _Number | None = None
     speed: Annotated[_Number, Field(gt=0)] | None = None
-    priority: int = DEFAULT_PRIORITY
+    priority: Annotated[int, Field(ge=-LARGEST, le=LARGEST)] = DEFAULT_PRIORITY
     deadline: _Number | None = None
     above: Literal["home", "sea", "ground"] | None = None
     """What z is counted from; None: as `waypoint_type` says."""
@@ -238,9 +244,9 @@ class NavigationDocument(_Entry):
         default_factory=list, max_length=_MOST_WAYPOINTS
     )
     ordered: bool = True
-    priority: Annotated[int, Field(ge=0)] | None = None
+    priority: Annotated[int, Field(ge=0, le=LARGEST)] | None = None
     index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
-    deadline: Annotated[float, Field(gt=0)] | None = None
+    deadline: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
     """Seconds of mission time."""
     clear_on: ScopedWord | None = None
     """Stream whose first item empties the queue."""

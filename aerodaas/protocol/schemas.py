@@ -18,6 +18,7 @@ from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
 from aerodaas.types.health import Verdict
 from aerodaas.types.identifiers import ScopedWord, Word
+from aerodaas.types.waypoints import LARGEST
 
 __all__ = [
     "AccountIn",
@@ -51,13 +52,15 @@ __all__ = [
     "Word",
 ]
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 Area = Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=100)]
 """A polygon's corners (east, north) in metres of the provider's local frame."""
 _MOST_ROBOTS = 64
 _MOST_MINUTES = 24 * 60
 _YEAR_DAYS = 366
+_MOST_STORED = 2**63 - 1
+"""Largest whole number that a database holds."""
 
 
 class Role(str, enum.Enum):
@@ -278,7 +281,7 @@ class MissionIn(RequestModel):
     """Tenants that may watch it."""
     grants: dict[Word, list[ScopedWord]] = Field(default_factory=dict, max_length=_MOST_ROBOTS)
     """Tenants that may attach missions to its cameras, as `GrantIn` says for each."""
-    seed: Annotated[int, Field(ge=0)] | None = None
+    seed: Annotated[int, Field(ge=0, le=_MOST_STORED)] | None = None
     """Of a simulated fleet."""
 
 
@@ -451,9 +454,9 @@ class TenantChange(RequestModel):
     """Share of an edge that is shared, relative to the other tenants'."""
     flight_minutes: Annotated[Number, Field(ge=0)] | None = None
     """Minutes in the air, of all its robots together, in a calendar month (UTC)."""
-    cloud_calls: Annotated[int, Field(ge=0)] | None = None
+    cloud_calls: Annotated[int, Field(ge=0, le=_MOST_STORED)] | None = None
     """Calls of cloud nodes and endpoints in a month."""
-    storage_bytes: Annotated[int, Field(ge=0)] | None = None
+    storage_bytes: Annotated[int, Field(ge=0, le=_MOST_STORED)] | None = None
     """Bytes of recordings kept."""
     max_height: Positive | None = None
     """Metres above home."""

@@ -34,7 +34,7 @@ from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes
 from aerodaas.service.routes.piloting import PilotingRoutes
-from aerodaas.service.routes.refusals import register_refusals
+from aerodaas.service.routes.refusals import REFUSALS, register_refusals
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -110,8 +110,8 @@ def build_service(
         MissionRoutes(desk, admission, audit),
         AccountRoutes(accounts, store, admission, audit),
     ):
-        app.include_router(routes.router(), dependencies=secured)
-    app.include_router(PilotingRoutes(desk, admission, audit).router())
+        app.include_router(routes.router(), dependencies=secured, responses=REFUSALS)
+    app.include_router(PilotingRoutes(desk, admission, audit).router(), responses=REFUSALS)
     app.include_router(LiveRoutes(desk, hub, admission).router())
     app.include_router(HereRoutes(desk, admission).router())
     app.include_router(page_routes(tiles=settings.config.map_tiles))

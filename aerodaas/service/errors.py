@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+import re
+
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["RefusedError", "StoreError"]
+__all__ = ["RefusedError", "StoreError", "without_folders"]
+
+_FOLDERS = re.compile(r"(?<![\w/:.~-])/(?:[^\s/'\":;,()]+/)+")
+"""The folders of an absolute path, up to its last part."""
+
+
+def without_folders(text: str) -> str:
+    """A text for users, which the provider's folders are no business of: paths by their last part.
+
+    Addresses (`https://…`) stay.
+    """
+    return _FOLDERS.sub("", text)
 
 
 class RefusedError(AeroDaaSError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from aerodaas.protocol.schemas import MissionOut, MissionPhase, VerdictOut
+from aerodaas.service.errors import without_folders
 from aerodaas.service.mission import ActiveMission
 
 __all__ = ["shown"]
@@ -17,6 +18,9 @@ def shown(one: ActiveMission) -> MissionOut:
     if outcome is not None:
         status, alerts = outcome.status, outcome.alerts
     verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
+    if verdict is not None:
+        reasons = [without_folders(reason) for reason in verdict.reasons]
+        verdict = verdict.model_copy(update={"reasons": reasons})
     if verdict is not None and one.rehearsal.picture.is_file():
         verdict = verdict.model_copy(update={"picture": f"/v1/missions/{row.id}/rehearsal.png"})
     return MissionOut(
@@ -25,7 +29,7 @@ def shown(one: ActiveMission) -> MissionOut:
         tenant=row.tenant,
         account=row.account,
         phase=row.phase,
-        reason=one.waits_for or row.reason,
+        reason=without_folders(one.waits_for or row.reason),
         robots=list(row.robots),
         lease=row.lease,
         share=list(row.request.get("share", ())),

@@ -91,6 +91,9 @@ _WHOLE = 100.0
 """Percent."""
 _HALF_TURN = 3.1416
 """Radians: pi, and the rounding of who writes it by hand."""
+LARGEST = 1e9
+"""Largest number of a waypoint either way: 64 bits hold as many seconds in nanoseconds; Earth is
+smaller in metres."""
 LEAST_TRIGGER = 0.1
 """Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
@@ -100,18 +103,19 @@ def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
     for name in names:
         value = getattr(record, name)
         # Almost every value; a status has hundreds of them, each time that it is read.
-        if value is None or (type(value) is float and math.isfinite(value)):
+        if value is None or (type(value) is float and abs(value) <= LARGEST):
             continue
-        if not (isinstance(value, int | float | np.floating) and math.isfinite(value)):
-            message = f"{owner}: {name} must be a finite number, not {value!r}"
+        if not (isinstance(value, int | float | np.floating) and abs(value) <= LARGEST):
+            message = f"{owner}: {name} must be a finite number, not {value!r}; at most {LARGEST:g}"
             raise InvalidWaypointError(message)
 
 
 def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
     if not isinstance(waypoint_id, str) or not waypoint_id:
         raise InvalidWaypointError(f"{owner}: an id is a text that is not empty")
-    if not isinstance(priority, int | np.integer):
-        raise InvalidWaypointError(f"{owner}: priority must be a whole number, not {priority!r}")
+    if not (isinstance(priority, int | np.integer) and abs(priority) <= LARGEST):
+        message = f"{owner}: priority must be a whole number, not {priority!r}; at most {LARGEST:g}"
+        raise InvalidWaypointError(message)
 
 
 def _moves(owner: str, asked: object) -> tuple[tuple[str, str], ...]:
@@ -251,7 +255,7 @@ class Waypoint:
             isinstance(place, tuple | list)
             and len(place) == len("xyz")
             and all(isinstance(one, int | float | np.floating) for one in place)
-            and all(map(math.isfinite, place))
+            and all(abs(one) <= LARGEST for one in place)
         ):
             message = f"{owner}: look_at must be three finite numbers (x, y, z), not {place!r}"
             raise InvalidWaypointError(message)

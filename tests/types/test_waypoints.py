@@ -232,3 +232,16 @@ def test_each_number_is_finite(kind: Any) -> None:  # noqa: ANN401 - a dataclass
     for name in numbers:
         with pytest.raises(InvalidWaypointError, match=f"{name} must be a finite number"):
             filled(kind, **{name: math.nan})
+
+
+@pytest.mark.parametrize("value", [1e308, -1e308, 10**400, 1.1e9])
+def test_each_number_can_be_counted_in_nanoseconds(value: float) -> None:
+    """A larger one would overflow in flight: in a clock, or in a distance that is squared."""
+    hints = typing.get_type_hints(Waypoint)
+    names = [name for name, hint in hints.items() if {float, int} & {hint, *typing.get_args(hint)}]
+    assert {"trigger_interval", "hover_duration", "deadline", "priority", "x"} <= set(names)
+    for name in names:
+        with pytest.raises(InvalidWaypointError, match=name):
+            filled(Waypoint, **{name: value})
+    with pytest.raises(InvalidWaypointError, match="look_at"):
+        Waypoint("w", 1, 2, 3, look_at=(0, 0, value))

@@ -21,6 +21,7 @@ from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 __all__ = ["AnswerOut", "OutlookOut", "StatusOut", "WaypointsIn"]
 
 _MOST_WAYPOINTS = 1000
+_MOST_INDEX = 10_000
 
 
 class _Strict(BaseModel):
@@ -37,7 +38,7 @@ class WaypointsIn(_Strict):
     ]
     ordered: bool = True
     """Whether to keep their order; otherwise the scheduler chooses it."""
-    index: Annotated[int, Field(ge=0)] | None = None
+    index: Annotated[int, Field(ge=0, le=_MOST_INDEX)] | None = None
     """Number of waypoints of the same priority to visit before these."""
 
     @field_validator("waypoints")

@@ -65,7 +65,10 @@ class AccountRoutes:
         router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
         router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
         router.add_api_route("/audit", self.audit)
-        router.add_api_route("/usage", self.usage, response_model=list[UsageOut])
+        table: dict[int | str, dict[str, Any]] = {
+            200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
+        }
+        router.add_api_route("/usage", self.usage, response_model=list[UsageOut], responses=table)
         return router
 
     def accounts(self, request: Request) -> list[AccountOut]:

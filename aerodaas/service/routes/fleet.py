@@ -92,7 +92,9 @@ class FleetRoutes:
     def has_model(self, sha256: str, request: Request) -> Response:
         """Whether the tenant has a model here."""
         tenant = self._admission.require(request, Role.VIEWER).tenant
-        return Response(status_code=204 if self._models.has(tenant, sha256) else 404)
+        if not self._models.has(tenant, sha256):
+            raise RefusedError(404, f"{tenant} has no model {sha256} here")
+        return Response(status_code=204)
 
     async def put_model(self, sha256: str, request: Request) -> Response:
         """Bring a model, an ONNX file of at most 64 MiB, named by its SHA-256."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 from http import HTTPStatus
+from typing import Any
 
 from fastapi import FastAPI, Request, WebSocket
 from fastapi.exceptions import RequestValidationError, WebSocketRequestValidationError
@@ -13,12 +16,32 @@ from starlette.types import Receive, Scope, Send
 
 from aerodaas.analytics.remote.denial import deny, malformed
 from aerodaas.protocol.schemas import RefusalOut
-from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.errors import RefusedError, StoreError, without_folders
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["refuse", "register_refusals"]
+__all__ = ["REFUSALS", "refuse", "register_refusals"]
 
+_log = logging.getLogger(__name__)
 _LONGEST = 2000
+_LOG_SECONDS = 60.0
+"""Least seconds between two words in the log that the database cannot be used."""
+REFUSALS: dict[int | str, dict[str, Any]] = {
+    int(status): {"model": RefusalOut, "description": status.phrase}
+    for status in (
+        HTTPStatus.BAD_REQUEST,
+        HTTPStatus.UNAUTHORIZED,
+        HTTPStatus.FORBIDDEN,
+        HTTPStatus.NOT_FOUND,
+        HTTPStatus.CONFLICT,
+        HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+        HTTPStatus.TOO_MANY_REQUESTS,
+        HTTPStatus.SERVICE_UNAVAILABLE,
+        HTTPStatus.INSUFFICIENT_STORAGE,
+    )
+}
+"""Refusals of each route, as its schema names them."""
+_logged_at = -_LOG_SECONDS
 
 
 def register_refusals(app: FastAPI) -> None:
@@ -37,12 +60,28 @@ async def refuse(scope: Scope, send: Send, error: Exception) -> None:
             pause = math.ceil(error.retry_after)
     elif isinstance(error, StoreError):
         status = int(HTTPStatus.SERVICE_UNAVAILABLE)
-        text = f"the service's database cannot be used: {error}"
+        text = "the service's database cannot be used: ask again later; its log says why"
+        _log_failure(error)
     elif isinstance(error, RequestValidationError | WebSocketRequestValidationError):
         status, text = malformed(error.errors())
     elif isinstance(error, HTTPException):
         status, text = error.status_code, str(error.detail)
-    await deny(scope, send, status, RefusalOut(text=text[:_LONGEST]).model_dump(), pause=pause)
+    await deny(
+        scope,
+        send,
+        status,
+        RefusalOut(text=without_folders(text)[:_LONGEST]).model_dump(),
+        pause=pause,
+    )
+
+
+def _log_failure(error: StoreError) -> None:
+    """Tell the provider's people alone what is wrong with the database, and where it is."""
+    global _logged_at  # noqa: PLW0603 - one log for all that are refused
+    now = time.monotonic()
+    if now - _logged_at >= _LOG_SECONDS:
+        _logged_at = now
+        _log.warning("requests are refused: %s", error)
 
 
 class _Refusal(Response):
