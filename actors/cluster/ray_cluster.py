@@ -7,7 +7,7 @@ import contextlib
 import logging
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -70,15 +70,21 @@ def begin(address: str | None) -> None:
     atexit.register(disconnect)
 
 
-def connect(address: str | None) -> None:
-    """Start a local Ray on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+def connect(address: str | None, begin_step: Callable[[str], None] = lambda _: None) -> None:
+    """Start a local Ray on this machine, or join a cluster; nothing where that was done before.
 
-    Raises AeroDaaSError if the cluster cannot be reached or Ray does not start, ConfigError if the
-    cluster offers no edge node.
+    Args:
+        address: The cluster's `host:port`; None for that of `RAY_ADDRESS`, or for a local Ray.
+        begin_step: Called with the name of the step that follows, which may take a minute.
+
+    Raises:
+        AeroDaaSError: If the cluster cannot be reached or Ray does not start.
+        ConfigError: If the cluster offers no edge node.
     """
     if ray.is_initialized():
         return
     address = address or os.environ.get("RAY_ADDRESS")
+    begin_step(f"joining the Ray cluster at {address}" if address else "starting Ray")
     if address:
         join(address)
         _require_edge(address)

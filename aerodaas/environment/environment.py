@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 from aerodaas.actors.run.checks import check_environment, sensor_properties
@@ -307,23 +308,16 @@ class Environment(PaperNames, IEnvironment):
     def _hardware(self, resource: ComputeConfig) -> dict[str, Any]:
         if resource.kind == "http" or self.provider is not None:
             return {}
-        from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
-            ray_cluster as cluster,
-        )
-
-        cluster.connect(current_options.get().address)
-        return cluster.hardware(cluster.Placement(resource.kind, resource.node))
+        cluster = _connected_cluster()
+        found: dict[str, Any] = cluster.hardware(cluster.Placement(resource.kind, resource.node))
+        return found
 
     def compute(self) -> list[ComputeConfig]:
         """The compute resources; those of the cluster where the file says "auto"."""
         if self._compute is None:
             if self.config.compute == "auto" and self.provider is None:
-                from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
-                    ray_cluster as cluster,
-                )
-
-                cluster.connect(current_options.get().address)
-                self._compute = cluster.discover()
+                discovered: list[ComputeConfig] = _connected_cluster().discover()
+                self._compute = discovered
             else:
                 listed = self.config.compute
                 self._compute = [] if listed == "auto" else list(listed)
@@ -519,6 +513,17 @@ class Environment(PaperNames, IEnvironment):
                 require_actuators(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
+
+
+def _connected_cluster() -> ModuleType:
+    """Module `ray_cluster`, connected to the cluster that is asked for."""
+    from aerodaas.actors.cluster import ray_cluster  # noqa: PLC0415 - ray only where it is needed
+    from aerodaas.terminal.console import StartupView  # noqa: PLC0415 - slow to load
+
+    options = current_options.get()
+    with StartupView(options) as starting:
+        ray_cluster.connect(options.address, starting.begin)
+    return ray_cluster
 
 
 def _addressee(entry: NavigationEntry, flying: list[str]) -> str:

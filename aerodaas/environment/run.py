@@ -121,8 +121,7 @@ class Run:
         from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
 
         with StartupView(self.options) as starting:
-            starting.begin("starting Ray")
-            cluster.connect(self.options.address)
+            cluster.connect(self.options.address, starting.begin)
             raise_on_signals()
             provenance = Provenance.collect(
                 app=self.options.application,

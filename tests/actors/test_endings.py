@@ -76,14 +76,14 @@ def landed(folder: Path) -> RecordedFlight:
     return flight
 
 
-def airborne(process: subprocess.Popen[str]) -> None:
-    """Wait until the application says that it is in the air."""
+def airborne(process: subprocess.Popen[str]) -> list[str]:
+    """Wait until the application says that it is in the air; returns its lines so far."""
     assert process.stdout is not None
     said = []
     for line in process.stdout:
         said.append(line)
         if "in the air" in line:
-            return
+            return said
     raise AssertionError("".join(said) + process.communicate()[1])
 
 
@@ -115,7 +115,8 @@ def test_an_interrupted_run_lands(
 ) -> None:
     """The drone lands, the recording is closed, and no process is left."""
     with running(tmp_path, "drone.wait()") as process:
-        airborne(process)
+        said_first = airborne(process)
+        assert said_first[0] == "starting Ray …\n"
         processes = everyone(process)
         assert len(processes) > 3
         if sent is signal.SIGINT:
