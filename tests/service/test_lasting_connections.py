@@ -467,9 +467,13 @@ HOSTILE: dict[str, tuple[dict[str, Any], int]] = {
     "no waypoints": ({"navigation": [{"robot": "one", "waypoints": [0] * 9000}] * 32}, 422),
     "many values": ({"name": [0] * 400_000}, 413),
     "many lists": ({"name": [[]] * 200_000}, 413),
-    "many keys": ({f"key{number}": 0 for number in range(20_000)}, 422),
+    "many keys": ({f"key{number}": 0 for number in range(20_000)}, 413),
+    "one with many keys": (
+        {"name": [{}] * 500, "more": {f"key{number}": 0 for number in range(20_000)}},
+        422,
+    ),
     "many settings": (
-        {"analyses": [{"id": "one/a", "analysis": "X", "settings": {"a": [0] * 20_000}}]},
+        {"analyses": [{"id": "one/a", "analysis": "X", "settings": {"a": [[0] * 150] * 150}}]},
         422,
     ),
     "many waypoints": ({"navigation": [{"robot": "one", "waypoints": PLACES}] * 3}, 422),

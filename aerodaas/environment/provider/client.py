@@ -49,6 +49,8 @@ M = TypeVar("M")
 LARGEST_MODEL = 64 << 20
 """Bytes of a model that a service takes."""
 _ABSENT = frozenset({404})
+_TRIAL_SECONDS = 180.0
+"""For a model, which a service runs once before it keeps it."""
 _RESEND_SECONDS = 30.0
 """Seconds for which a submission is sent again, as long as a service takes to be started anew."""
 
@@ -138,7 +140,8 @@ class ProviderClient:
             )
         sha256 = hashlib.sha256(content).hexdigest()
         headers = {"Content-Type": "application/octet-stream"}
-        self._exchange.send("PUT", f"/v1/models/{sha256}", content, headers)
+        path = f"/v1/models/{sha256}"
+        self._exchange.send("PUT", path, content, headers, patience=_TRIAL_SECONDS)
         return sha256
 
     def submit(self, wanted: MissionIn, key: str | None = None) -> MissionOut:

@@ -54,9 +54,10 @@ class Exchange:
         # A request that may have changed something is not sent again; others once, for a server
         # may close an idle connection at the moment that it is used.
         again = urllib3.Retry(total=1, connect=0, redirect=0, status=0, other=0)
+        self._timeout = urllib3.Timeout(timeout)
         self._pool = urllib3.PoolManager(
             retries=again,
-            timeout=urllib3.Timeout(timeout),
+            timeout=self._timeout,
             ssl_context=self.ssl,
             maxsize=_KEPT_OPEN,
         )
@@ -91,13 +92,15 @@ class Exchange:
         data: bytes | None = None,
         headers: Mapping[str, str] | None = None,
         allowed: frozenset[int] = frozenset(),
+        patience: float | None = None,
     ) -> tuple[int, bytes]:
         """Send a request; returns status and content of a success, or of an `allowed` status.
 
-        Raises what `ask` raises.
+        `patience` is in seconds, for an answer that takes longer than others. Raises what `ask`
+        raises.
         """
         own = self.headers | (dict(headers or {}) if data is not None else {})
-        with self._answer(method, path, data, own) as response:
+        with self._answer(method, path, data, own, patience) as response:
             try:
                 answer = response.read(_MOST_BYTES + 1)
             except (HTTPError, OSError) as error:
@@ -164,7 +167,12 @@ class Exchange:
         return kind(f"{self.address.host}: {text}{hint}")
 
     def _answer(
-        self, method: Method, path: str, data: bytes | None, headers: Mapping[str, str]
+        self,
+        method: Method,
+        path: str,
+        data: bytes | None,
+        headers: Mapping[str, str],
+        patience: float | None = None,
     ) -> urllib3.BaseHTTPResponse:
         try:
             return self._pool.request(
@@ -174,6 +182,7 @@ class Exchange:
                 headers=headers,
                 preload_content=False,
                 redirect=False,
+                timeout=self._timeout if patience is None else urllib3.Timeout(patience),
             )
         except (HTTPError, OSError) as error:
             raise self.unreachable(error) from None
