@@ -30,6 +30,8 @@ _HEADER = 96
 _WITH_CHROMA = frozenset({44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244})
 """Profiles whose parameters tell the format of colours (7.3.2.1.1)."""
 _NO_SUBSAMPLING = 3
+_MOST_SEQUENCE_IDS, _MOST_PICTURE_IDS, _MOST_NUMBER_BITS = 31, 255, 16
+"""Bounds of 7.4.2: a stream may claim any number."""
 _BEGIN_WHOLE = ("h264", "hevc")
 """Decoders that hold pictures back until one is whole, by key frames or step by step."""
 _LENGTHS_AHEAD = b"\1"
@@ -106,11 +108,14 @@ class _Bits:
             raise IndexError
         return int(self._bits[begin : self._place] or "0", 2)
 
-    def unsigned(self) -> int:
-        """A number of a length of its own, ue(v)."""
+    def unsigned(self, most: int | None = None) -> int:
+        """A number of a length of its own, ue(v); raises ValueError for one above `most`."""
         zeros = self._bits.index("1", self._place) - self._place
         self.fixed(zeros)
-        return self.fixed(zeros + 1) - 1
+        value = self.fixed(zeros + 1) - 1
+        if most is not None and value > most:
+            raise ValueError
+        return value
 
     def signed(self) -> int:
         """As `unsigned`, with a sign: se(v)."""
@@ -164,7 +169,7 @@ class _FrameNumbers:
                 if kind == _SEQUENCE_PARAMETERS:
                     self._read_sequence(bits)
                 elif kind == _PICTURE_PARAMETERS:
-                    self._pictures[bits.unsigned()] = bits.unsigned()
+                    self._pictures[bits.unsigned(_MOST_PICTURE_IDS)] = bits.unsigned()
                 elif kind in _SLICES:
                     kept = match[1][0] >> 5 > 0
                     return self._is_gap_at(bits, pause, is_key=kind == _KEY_SLICE, kept=kept)
@@ -207,7 +212,7 @@ class _FrameNumbers:
     def _read_sequence(self, bits: _Bits) -> None:
         profile = bits.fixed(8)
         bits.fixed(16)
-        name, chroma, has_planes = bits.unsigned(), 1, False
+        name, chroma, has_planes = bits.unsigned(_MOST_SEQUENCE_IDS), 1, False
         if profile in _WITH_CHROMA:
             chroma = bits.unsigned()
             has_planes = chroma == _NO_SUBSAMPLING and bool(bits.fixed(1))
@@ -218,7 +223,7 @@ class _FrameNumbers:
                 for index in range(12 if chroma == _NO_SUBSAMPLING else 8):
                     if bits.fixed(1):
                         _skip_scaling_list(bits, 16 if index < 6 else 64)  # noqa: PLR2004
-        number_bits = bits.unsigned() + 4
+        number_bits = bits.unsigned(_MOST_NUMBER_BITS - 4) + 4
         order = bits.unsigned()
         if order == 0:
             bits.unsigned()
