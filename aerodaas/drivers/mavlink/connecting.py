@@ -156,7 +156,7 @@ def _await_ready(
         if now - began > settings.ready_timeout:
             if places:
                 return
-            said = [telemetry.health.gps_objection, *telemetry.events.objections]
+            said = [telemetry.health.gps_objection, *telemetry.events.objections_to_hold]
             said = list(dict.fromkeys(filter(None, [*said, *telemetry.texts.recent(now, _WORDS)])))
             words = f"; it says: {'; '.join(said)}" if said else ""
             raise VehicleError(

@@ -311,3 +311,21 @@ def test_a_place_of_zeros_is_none() -> None:
         )
         places.append(telemetry.place)
     assert places == [(1e-6, 1e-6), None]
+
+
+def test_what_px4_acts_for_is_told_before_what_a_mode_lacks() -> None:
+    """Its newest findings in flight, and the cause among a failsafe's own arguments."""
+    telemetry, px4 = Telemetry(), PX4()
+    report(telemetry.events, "check_mag_missing")
+    gone = ("check_modes_offboard_signal", "check_mag_missing", "check_gf_violation_custom_gf")
+    for name in ("commander_arming_check_summary", *gone, "commander_health_summary"):
+        telemetry.events.take(event_number(name), 3, next(SEQUENCE), (), 100.0)
+    assert px4.protection_reasons(telemetry, 101.0, 12.0) == ["its own geofence: outside"]
+    arguments = [0] * 40
+    arguments[5] = 4
+    number = event_number("commander_failsafe_enter")
+    sequence = next(SEQUENCE)
+    telemetry.take(mavlink.mavlink_map[410](0, 0, number, 0, sequence, 2, arguments), 101.0)
+    assert px4.protection_reasons(telemetry, 101.0, 12.0)[1] == "battery: critical"
+    report(telemetry.events, "check_modes_offboard_signal")
+    assert not px4.protection_reasons(telemetry, 200.0, 12.0)

@@ -138,7 +138,7 @@ class PX4(Autopilot):
         del now
         if telemetry.altitude is None:
             unknown = "PX4 does not know its altitude above the sea yet"
-            return [*telemetry.events.objections, unknown]
+            return [*telemetry.events.objections_to_hold, unknown]
         ready, events = self.ready(telemetry), telemetry.events
         if ready is None:
             return ["PX4 has not told yet whether its arming checks pass"]
@@ -147,12 +147,14 @@ class PX4(Autopilot):
         if self.mode(telemetry.custom_mode) is not FlightMode.HOLD and events.objections:
             # A take-off begins with hold, so that what only its present mode lacks does not matter.
             return list(events.objections_to_hold)
-        return list(events.objections) or ["PX4's arming checks fail"]
+        # It reports what other modes lack as well: no matter while there is anything else.
+        found = events.objections_to_hold or events.objections
+        return list(found) or ["PX4's arming checks fail"]
 
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
-        """Texts of its events, and what its checks have newly found in flight."""
+        """What its checks have newly found in flight, and texts of its events."""
         said = telemetry.texts.recent(now, seconds)
-        return [*said, *telemetry.events.new_objections(now, seconds)]
+        return [*telemetry.events.new_objections(now, seconds), *said]
 
     def encode(self, value: float, kind: int) -> float:
         """Integers travel as the float of the same bytes."""

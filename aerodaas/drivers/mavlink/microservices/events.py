@@ -73,8 +73,12 @@ class EventReader:
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
     def new_objections(self, now: float, seconds: float) -> list[str]:
-        """Those of the last `seconds`, in flight as well: they are what its failsafes act for."""
-        return [text for text in self.objections if now - self._since[text] <= seconds]
+        """Those of the last `seconds`, in flight as well: they are what its failsafes act for.
+
+        What a mode lacks is among them only where there is nothing else.
+        """
+        new = [text for text in self.objections if now - self._since[text] <= seconds]
+        return [text for text in new if text not in _OF_THE_MODE] or new
 
     def take(
         self,
