@@ -9,6 +9,7 @@ from mavlink_flights import Pair, flight, wait_for
 
 from aerodaas.drivers.mavlink.state.boot_clock import BootClock
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.testing.channel import Impairment
 
 SYSTEM = 7
 
@@ -195,3 +196,18 @@ def test_states_tell_its_clock_and_how_surely() -> None:
         pair.autopilot.restart()
         wait_for(lambda: pair.vehicle.telemetry.reboots == 1)
         wait_for(lambda: right(pair))
+
+
+@pytest.mark.slow
+def test_an_uplink_that_is_lost_alone_is_told() -> None:
+    """The vehicle is heard and answers nothing; as soon as it answers again all is well."""
+
+    def deaf(pair: Pair) -> bool:
+        return any(fault.startswith("link:") for fault in pair.vehicle.read().faults)
+
+    with flight() as pair:
+        wait_for(lambda: "autopilot_time_error" in pair.vehicle.read().extra)
+        pair.autopilot.spoil(up=Impairment(loss=1.0))
+        wait_for(lambda: deaf(pair))
+        pair.autopilot.spoil(up=Impairment())
+        wait_for(lambda: not deaf(pair))
