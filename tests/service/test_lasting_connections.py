@@ -464,7 +464,7 @@ def _status_of_length(service: Service, path: str, token: str, length: int) -> i
 
 PLACES = [{"id": f"a{number}", "x": 1.0, "y": 1.0, "z": 2.0} for number in range(4000)]
 HOSTILE: dict[str, tuple[dict[str, Any], int]] = {
-    "no waypoints": ({"navigation": [{"robot": "one", "waypoints": [0] * 9000}] * 32}, 422),
+    "no waypoints": ({"navigation": [{"robot": "one", "waypoints": [0] * 9000}] * 32}, 413),
     "many values": ({"name": [0] * 400_000}, 413),
     "many lists": ({"name": [[]] * 200_000}, 413),
     "many keys": ({f"key{number}": 0 for number in range(20_000)}, 413),

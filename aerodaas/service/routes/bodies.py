@@ -22,8 +22,8 @@ _SMALL = 1 << 10
 """Bytes of a body that is parsed at once: a command waits for nobody's document."""
 _MOST_VALUES, _MOST_GROUPS = 300_000, 100_000
 """Most commas, and opening brackets, of a body: 10,000 waypoints have 210,000 and 30,000."""
-_MOST_OF_GROUP = 200
-"""Most values of a list or an object on average: a waypoint has 26."""
+_FEW_VALUES, _MOST_OF_GROUP = 20_000, 200
+"""Most values of a list or object on average, where a body has more than few: a waypoint has 26."""
 _MOST_KEYS = 1000
 _MOST_ERRORS = 100
 """Most errors of a body that are worded; each one takes as long as many values."""
@@ -73,7 +73,10 @@ def _content(model: TypeAdapter[Any], body: bytes) -> Any:  # noqa: ANN401 - the
     """What a body says; raises RequestValidationError, and RefusedError for one beyond bounds."""
     values = max(body.count(b","), body.count(b":"))
     groups = body.count(b"{") + body.count(b"[")
-    if values > _MOST_VALUES or groups > _MOST_GROUPS or values > _MOST_OF_GROUP * groups:
+    if (
+        values > max(_FEW_VALUES, min(_MOST_VALUES, _MOST_OF_GROUP * groups))
+        or groups > _MOST_GROUPS
+    ):
         raise RefusedError(
             int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE),
             f"a body has at most {_MOST_VALUES} values, {_MOST_GROUPS} lists and objects, and "
