@@ -74,6 +74,9 @@ _NAVIGATION = (AddNavigation, StreamItem, RearrangeNavigation, TakeControls, Ste
 """Commands that a drone does not execute any more once it leaves."""
 _DRIFT = 0.5
 """Ground speed in m/s below which a landing may begin; above it, the drone overshoots home."""
+_BESIDE = 4.0
+"""Seconds within twice the arrival radius of home after which a landing begins all the same: an
+estimator tells up to 0.8 m/s of a drone that hovers."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
@@ -150,6 +153,8 @@ class Mission:
         self._now = 0
         self._turned_at = 0
         self._elapsed = 0.0
+        self._away_at = 0
+        """Mission clock at which a returning drone was last away from home, nanoseconds."""
         self._leg: Leg | None = None
         self._motors = MotorWatch(self.home)
         self._anchor: Vector | None = None
@@ -604,8 +609,11 @@ class Mission:
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
         stuck = self._supervisor.motion.stands_for > self._options.stall_timeout
         drift = math.hypot(*state.odometry.velocity[:2])
-        arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
-        if late or stuck or (arrived and drift <= _DRIFT):
+        away, radius = math.hypot(way[0], way[1]), self.limits.arrival_radius
+        if away > 2 * radius:
+            self._away_at = self._now
+        beside = seconds(self._now - max(self._away_at, self._machine.since)) >= _BESIDE
+        if late or stuck or beside or (away <= radius and drift <= _DRIFT):
             why = "the return took too long; " if late else ""
             why = "the drone comes no nearer to home; " if stuck else why
             self._to(MissionState.LANDING, f"{why}{self._machine.reason}")

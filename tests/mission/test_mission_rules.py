@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
 from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 
@@ -65,6 +66,26 @@ def test_the_way_home_is_never_below_the_lowest_allowed_height() -> None:
     began = len(high.track)
     high.run_to(S.LANDING)
     assert min(p[2] for p in high.track[began:]) > 5.5
+
+
+def test_a_wobbling_velocity_does_not_keep_a_drone_beside_home() -> None:
+    """An estimator tells 0.8 m/s, to and fro, of a drone that hovers over home: it lands soon."""
+    one = flight(add(Waypoint("far", 20, 0, 1.5)))
+    one.run_to(S.RETURNING)
+    one.run(until=lambda: math.hypot(*one.vehicle.position[:2]) < 1.5)
+    one.expect(S.RETURNING)
+    read = one.vehicle.read
+
+    def wobbly() -> VehicleState:
+        state = read()
+        side = 0.8 if state.stamp // (NANOSECONDS // 2) % 2 else -0.8
+        moving = state.odometry.velocity + np.array([0.0, side, 0.0])
+        return replace(state, odometry=replace(state.odometry, velocity=moving))
+
+    one.vehicle.read = wobbly  # type: ignore[method-assign]
+    one.run(8.0)
+    assert S.LANDING in one.states
+    assert one.status.reason == "all waypoints are visited"
 
 
 def test_telemetry_that_stands_still_counts_as_loss() -> None:
