@@ -126,9 +126,9 @@ def test_a_refused_waypoint_leaves_the_good_one_of_its_id_alone() -> None:
     assert not one.status.given_up
     assert [alert.kind for alert in one.mission.alerts] == ["refused"]
     one.run(until=lambda: "wp" in one.status.visited)
-    assert one.tell(add(Waypoint("wp", 9e9, 1, 1.5))).refused
+    assert one.tell(add(Waypoint("wp", 9e6, 1, 1.5))).refused
     assert not one.status.given_up
-    assert one.tell(add(Waypoint("new", 9e9, 1, 1.5))).refused
+    assert one.tell(add(Waypoint("new", 9e6, 1, 1.5))).refused
     assert one.status.given_up == ("new",)
     assert one.tell(add(Waypoint("new", 9, 9, 1.5))).accepted
     assert not one.status.given_up
