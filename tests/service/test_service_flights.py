@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from aerodaas.config.file_lock import actor_lock, is_locked
 from aerodaas.environment.provider.logins import client_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
@@ -224,9 +225,7 @@ def test_a_lost_flight_takes_its_drone_out_of_service(provider: Served) -> None:
     id_ = submitted(provider, "two", *((one[0] + 10, one[1]) for one in FAR))
     flying(provider, id_, "two")
     flight = process_of(provider, id_)
-    [actor] = [
-        one for one in flight.children(recursive=True) if "DroneActor" in "".join(one.cmdline())
-    ]
+    lock = actor_lock(provider.folder / "s" / "locks", "two")
     os.kill(flight.pid, signal.SIGKILL)
     ended = provider.until_phase(id_)
     assert ended["phase"] == "failed"
@@ -236,10 +235,10 @@ def test_a_lost_flight_takes_its_drone_out_of_service(provider: Served) -> None:
     assert provider.send("PATCH", "/v1/robots/two", {"enabled": True})[0] == 204
     again = submitted(provider, "two", (12.0, 0.0))
     # Whoever has looked too soon: its actor brings it home, and nobody else flies it meanwhile.
-    assert actor.is_running()
+    assert is_locked(lock)
     provider.until(lambda: "two" in provider.mission(again)["reason"])
     assert provider.until_phase(again, "flying")["phase"] == "flying"
-    assert not actor.is_running()
+    assert not is_locked(lock), "the next actor takes seconds to begin"
     assert provider.until_phase(again)["phase"] == "landed"
 
 
