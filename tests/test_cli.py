@@ -508,7 +508,7 @@ def test_a_survey_loads_no_model_and_no_codec(tmp_path: Path) -> None:
     code = (
         "import sys\n"
         "from aerodaas.actors.cluster import ray_cluster\n"
-        "def connect(address):\n"
+        "def connect(address, starting):\n"
         "    import aerodaas.actors.run.flight\n"
         "    print('loaded:', *{'cv2', 'onnxruntime', 'matplotlib', 'mcap'} & set(sys.modules))\n"
         "    raise SystemExit\n"

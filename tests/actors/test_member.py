@@ -55,5 +55,7 @@ def test_calls_that_take_long_are_no_fault_of_a_clock(monkeypatch: pytest.Monkey
     monkeypatch.setattr(flight, "ask", infos.get)
     monkeypatch.setattr(Flight, "_connect_all", lambda _: None)
     ready: list[str] = []
-    Flight._prepare(object.__new__(Flight), [one("drone"), one("camera")], ready.append)
+    bare = object.__new__(Flight)
+    bare._origin = 0
+    Flight._prepare(bare, [one("drone"), one("camera")], ready.append)
     assert ready == ["drone", "camera"]

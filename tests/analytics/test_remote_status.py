@@ -59,8 +59,9 @@ def test_a_driver_that_does_not_know_says_so(
 
 
 UNTOLD = {
-    # Each visit is in what was visited, and alerts tell of pictures that were not taken.
-    MissionStatus: {"visits", "photos"},
+    # Each visit is in what was visited, alerts tell of pictures that were not taken, and reason and
+    # given_up of what is left undone.
+    MissionStatus: {"visits", "photos", "unfinished"},
     # Complaints are in the mission's faults; of the rest, what people need comes as alerts and
     # answers. The simulator's truth, further figures and addresses are nobody's business.
     VehicleState: {

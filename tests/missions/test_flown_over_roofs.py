@@ -13,7 +13,9 @@ from flying import FLAT, Flyer, recorded, robot
 from aerodaas import AeroNavigation, Environment, SchedulingType, Waypoint
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.states import vehicle_states
+from aerodaas.types.errors import IncompleteError
 
 _HALL = {
     "kind": "building",
@@ -74,10 +76,12 @@ def test_a_place_that_is_too_low_over_a_roof_is_given_up_for_the_clearance(flyer
         stops = [Waypoint("low", 20, 0, 8.0), Waypoint("behind", 35, 0, 7.0)]
         drone.navigate(AeroNavigation(data=stops, scheduling_type=SchedulingType.ORDERED))
 
-    run = _flown_over_the_hall(flyer, build, stall_timeout=5.0)
-    drone = recorded(run).robots["drone"]
-    assert drone.visited == ("behind",)
-    (text,) = [text for _, _, text in recorded(run).alerts if "low" in text]
+    with pytest.raises(IncompleteError, match="low cannot be reached"):
+        _flown_over_the_hall(flyer, build, stall_timeout=5.0)
+    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        flight = RecordedFlight.read(recording)
+    assert flight.robots["drone"].visited == ("behind",)
+    (text,) = [text for _, _, text in flight.alerts if "low" in text]
     assert text == (
         "low cannot be reached: the drone comes no nearer, for it stays 3 m above what is below it "
         "(limits.rangefinder_clearance)"
