@@ -131,7 +131,7 @@ posts = st.tuples(
 orders = st.sampled_from(["pause", "resume", "clear", "return-home", "abort"]).map(
     lambda name: (f"/{name}", b"")
 )
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-1e9, 1e9)
 velocities = st.builds(
     VelocityCommand,
     forward=finite,
@@ -139,7 +139,7 @@ velocities = st.builds(
     up=finite,
     yaw_rate=finite,
     priority=edges,
-    valid_for=st.floats(min_value=0, exclude_min=True, allow_infinity=False),
+    valid_for=st.floats(min_value=0, max_value=1e9, exclude_min=True),
 )
 requests = st.lists(posts | posts | posts | orders | velocities, max_size=8)
 
