@@ -14,11 +14,12 @@ fly: $(VENV)/.installed
 test: lint
 	$(PYTEST) -m "not slow and not sitl"
 
-# All tests but those on real autopilots, and both type checkers; about two hours. Tests that go by the
-# wall clock come last, and one that met a busy machine runs once more, named, and counts as a rerun.
+# All tests but those on real autopilots, both type checkers, and the golden flights; about two hours.
+# Tests that go by the wall clock come last; one that met a busy machine runs once more and is counted.
 CLOCK := slow and wall_clock
 test-all: training lint mypy
 	CI=true $(PYTEST) -m "not ($(CLOCK)) and not sitl"
+	$(BIN)/python -m tools.golden
 	CI=true $(PYTEST) -m "$(CLOCK) and not sitl"
 
 # Real autopilots in simulation, which AERODAAS_SITL_PX4 and AERODAAS_SITL_ARDUPILOT name, mutants of what

@@ -1,0 +1,1 @@
+"""Golden flights: what flies today, to the last digit, as the judge of a change that means none."""

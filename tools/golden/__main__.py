@@ -1,0 +1,80 @@
+"""Fly the golden flights and compare them with what is kept: `python -m tools.golden`."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tools.golden.flights import FLIGHTS, FlightFailedError
+from tools.golden.summary import differences
+
+_KEPT = Path(__file__).parents[2] / "tests" / "golden"
+_SHOWN = 12
+"""Differences of one flight that are printed."""
+
+
+def main(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Flights, or the start of names.")
+    ] = None,
+    *,
+    write: Annotated[bool, typer.Option(help="Keep what is flown instead of comparing.")] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="Flights side by side.")] = 2,
+) -> None:
+    """Fly golden flights and compare trajectory, states, alerts, decisions and counts.
+
+    Flights in simulated time are compared to the last digit; those on emulated autopilots, which
+    go by the wall clock, by their milestones. A change that means to move one keeps it anew with
+    --write, and its commit explains the difference.
+    """
+    wanted = [
+        name for name in FLIGHTS if not names or any(name.startswith(start) for start in names)
+    ]
+    if not wanted:
+        raise typer.BadParameter(f"no such flight; there are {', '.join(FLIGHTS)}")
+    failed: list[str] = []
+    # Those that go by the wall clock fly alone.
+    for width, share in ((jobs, False), (1, True)):
+        with ThreadPoolExecutor(width) as pool:
+            chosen = [name for name in wanted if FLIGHTS[name].alike is share]
+            for name, lines in zip(
+                chosen, pool.map(lambda name: _fly(name, write=write), chosen), strict=True
+            ):
+                typer.echo(f"{name}: {'differs' if lines else 'kept' if write else 'equal'}")
+                for line in lines[:_SHOWN]:
+                    typer.echo(f"  {line}")
+                if lines:
+                    failed.append(name)
+    typer.echo(
+        f"{len(wanted) - len(failed)} of {len(wanted)} flights {'kept' if write else 'equal'}"
+    )
+    raise typer.Exit(1 if failed else 0)
+
+
+def _fly(name: str, *, write: bool) -> list[str]:
+    flight, path = FLIGHTS[name], _KEPT / f"{name}.json"
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="golden-") as folder:
+        try:
+            flown = flight.fly(Path(folder))
+        except FlightFailedError as error:
+            return str(error).splitlines()
+    typer.echo(f"{name} flew for {time.monotonic() - began:.0f} s", err=True)
+    if write:
+        text = json.dumps(flown, indent=None, separators=(",", ":"))
+        path.write_text(text.replace('],"', '],\n"') + "\n", encoding="utf-8")
+        return []
+    if not path.is_file():
+        return [f"nothing is kept of it: python -m tools.golden {name} --write"]
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    return list(differences(kept, json.loads(json.dumps(flown)), alike=flight.alike))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,138 @@
+"""What a recording says of a flight, as a small JSON object that is equal for equal flights."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import NANOSECONDS
+
+__all__ = ["differences", "milestones", "summary"]
+
+_SAMPLE = 5 * NANOSECONDS
+"""Mission time between two recorded samples of a trajectory."""
+_MEASURED = ("aerodaas.Vitals", "aerodaas.Latency")
+"""Schemas whose messages tell of the machine, not of the flight."""
+_NEAR, _ALIKE = 1.5, 0.15
+"""Metres and shares within which flights in real time are alike."""
+
+
+def summary(path: Path) -> dict[str, Any]:
+    """Summarise a recording.
+
+    Args:
+        path: An MCAP file.
+
+    Returns:
+        Trajectories (a digest of every state, and samples), mission states, alerts, decisions, and
+        the number of messages of each topic. Times are seconds of the mission.
+    """
+    tracks: dict[str, list[list[float]]] = defaultdict(list)
+    states: dict[str, list[list[Any]]] = defaultdict(list)
+    last: dict[str, dict[str, Any]] = {}
+    decisions: dict[str, list[Any]] = defaultdict(list)
+    alerts: list[Any] = []
+    counts: Counter[str] = Counter()
+    with Recording.open(path) as recording:
+        for record in recording.records():
+            value = record.value
+            if record.schema not in _MEASURED:
+                counts[record.topic] += 1
+            if record.schema == "aerodaas.VehicleState":
+                pose = value["odometry"]
+                place = [pose["position"][axis] for axis in "xyz"]
+                tracks[value["robot"]].append([value["stamp"], *place, pose["yaw"]])
+            elif record.schema == "aerodaas.MissionStatus":
+                told = [value["state"], value["reason"]]
+                entries = states[value["robot"]]
+                if not entries or entries[-1][1:] != told:
+                    entries.append([_seconds(value["stamp"]), *told])
+                last[value["robot"]] = value
+            elif record.schema == "aerodaas.Decision":
+                row = [value["stamp"], value["task"], value["action"], value["reason"]]
+                decisions[record.topic].append(row)
+            elif record.schema == "foxglove.Log":
+                alerts.append([_seconds(record.captured), value.level, value.name, value.message])
+    return {
+        "trajectories": {robot: _trajectory(rows) for robot, rows in sorted(tracks.items())},
+        "states": dict(sorted(states.items())),
+        "visited": {robot: value["visited"] for robot, value in sorted(last.items())},
+        "given_up": {robot: value["given_up"] for robot, value in sorted(last.items())},
+        "log": sorted(alerts),
+        "decisions": {topic: _decided(rows) for topic, rows in sorted(decisions.items())},
+        "counts": dict(sorted(counts.items())),
+    }
+
+
+def milestones(whole: dict[str, Any]) -> dict[str, Any]:
+    """The part of a summary in which two flights in real time are alike."""
+    return {
+        "ends": {robot: track["samples"][-1] for robot, track in whole["trajectories"].items()},
+        "states": {
+            robot: [state for _, *state in entries] for robot, entries in whole["states"].items()
+        },
+        "visited": whole["visited"],
+        "given_up": whole["given_up"],
+    }
+
+
+def differences(golden: Any, flown: Any, *, alike: bool = False, at: str = "") -> Iterable[str]:  # noqa: ANN401 - JSON
+    """Tell where two summaries differ, a line each.
+
+    Args:
+        golden: The summary that is kept.
+        flown: The summary of a new flight.
+        alike: Whether numbers need only be near each other, as between flights in real time.
+        at: Path of both within the whole.
+
+    Yields:
+        Path, kept value and new value.
+    """
+    if isinstance(golden, dict) and isinstance(flown, dict):
+        for key in sorted(golden.keys() | flown.keys()):
+            yield from differences(golden.get(key), flown.get(key), alike=alike, at=f"{at}/{key}")
+    elif isinstance(golden, list) and isinstance(flown, list) and len(golden) == len(flown):
+        for number, (kept, new) in enumerate(zip(golden, flown, strict=True)):
+            yield from differences(kept, new, alike=alike, at=f"{at}/{number}")
+    elif alike and isinstance(golden, int | float) and isinstance(flown, int | float):
+        if abs(golden - flown) > max(_NEAR, _ALIKE * abs(golden)):
+            yield f"{at}: {golden} -> {flown}"
+    elif golden != flown:
+        yield f"{at}: {_short(golden)} -> {_short(flown)}"
+
+
+def _trajectory(rows: list[list[float]]) -> dict[str, Any]:
+    samples, due = [], 0
+    for row in rows:
+        if row[0] >= due or row is rows[-1]:
+            samples.append([_seconds(int(row[0])), *row[1:]])
+            due = int(row[0]) + _SAMPLE
+    return {"digest": _digest(rows), "samples": samples}
+
+
+def _decided(rows: list[list[Any]]) -> dict[str, Any]:
+    return {
+        "digest": _digest(rows),
+        "actions": dict(sorted(Counter(row[2] for row in rows).items())),
+        "first": rows[0],
+        "last": rows[-1],
+    }
+
+
+def _digest(rows: list[list[Any]]) -> str:
+    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:16]
+
+
+def _seconds(stamp: int) -> float:
+    return round(stamp / NANOSECONDS, 6)
+
+
+def _short(value: Any) -> str:  # noqa: ANN401 - JSON
+    text = json.dumps(value)
+    longest = 160
+    return text if len(text) <= longest else f"{text[:longest]}…"
