@@ -18,6 +18,12 @@ _SAMPLE = 5 * NANOSECONDS
 """Mission time between two recorded samples of a trajectory."""
 _MEASURED = ("aerodaas.Vitals", "aerodaas.Latency")
 """Schemas whose messages tell of the machine, not of the flight."""
+_STALLS = ("actor_silent:", "actor_back:")
+"""Alerts by the wall clock, of a machine too busy to answer."""
+_LOGS = ("/alerts", "/log")
+"""Topics whose messages are compared themselves, less stalls."""
+_PLANNING = "waiting for a plan"
+"""A state that a fast machine may not show."""
 _NEAR, _ALIKE = 1.5, 0.15
 """Metres and shares within which flights in real time are alike."""
 
@@ -41,7 +47,7 @@ def summary(path: Path) -> dict[str, Any]:
     with Recording.open(path) as recording:
         for record in recording.records():
             value = record.value
-            if record.schema not in _MEASURED:
+            if record.schema not in _MEASURED and record.topic not in _LOGS:
                 counts[record.topic] += 1
             if record.schema == "aerodaas.VehicleState":
                 pose = value["odometry"]
@@ -56,7 +62,7 @@ def summary(path: Path) -> dict[str, Any]:
             elif record.schema == "aerodaas.Decision":
                 row = [value["stamp"], value["task"], value["action"], value["reason"]]
                 decisions[record.topic].append(row)
-            elif record.schema == "foxglove.Log":
+            elif record.schema == "foxglove.Log" and not value.message.startswith(_STALLS):
                 alerts.append([_seconds(record.captured), value.level, value.name, value.message])
     return {
         "trajectories": {robot: _trajectory(rows) for robot, rows in sorted(tracks.items())},
@@ -74,7 +80,8 @@ def milestones(whole: dict[str, Any]) -> dict[str, Any]:
     return {
         "ends": {robot: track["samples"][-1] for robot, track in whole["trajectories"].items()},
         "states": {
-            robot: [state for _, *state in entries] for robot, entries in whole["states"].items()
+            robot: [state for _, *state in entries if state[1] != _PLANNING]
+            for robot, entries in whole["states"].items()
         },
         "visited": whole["visited"],
         "given_up": whole["given_up"],
