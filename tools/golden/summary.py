@@ -78,12 +78,13 @@ def summary(path: Path) -> dict[str, Any]:
 def milestones(whole: dict[str, Any]) -> dict[str, Any]:
     """The part of a summary in which two flights in real time are alike."""
     return {
-        "ends": {robot: track["samples"][-1] for robot, track in whole["trajectories"].items()},
+        "ends": {robot: track["samples"][-1][:4] for robot, track in whole["trajectories"].items()},
         "states": {
-            robot: [state for _, *state in entries if state[1] != _PLANNING]
+            robot: [state for _, state, reason in entries if reason != _PLANNING]
             for robot, entries in whole["states"].items()
         },
-        "visited": whole["visited"],
+        # Of two places as near as each other, noise decides which comes first.
+        "visited": {robot: sorted(names) for robot, names in whole["visited"].items()},
         "given_up": whole["given_up"],
     }
 
