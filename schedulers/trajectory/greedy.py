@@ -15,8 +15,6 @@ from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["greedy_route", "route_value"]
 
-Value = tuple[float, float]
-
 
 def greedy_route(
     waypoints: Sequence[Waypoint],
@@ -52,7 +50,7 @@ def greedy_route(
 
 def route_value(
     route: Sequence[int], travel: TravelCosts, costs: Matrix, prizes: NDArray[np.float64]
-) -> Value:
+) -> tuple[float, float]:
     """What a route is worth: its prizes first, then how little it costs."""
     return float(prizes[list(route)].sum()), -travel.cost(route, costs)
 
