@@ -11,10 +11,11 @@ import threading
 import time
 from typing import Any
 
-from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
+from aerodaas.actors.base import ActorInfo, StreamActor
 from aerodaas.actors.process_variables import ProcessVariables
-from aerodaas.actors.session import Session
 from aerodaas.actors.worker import NodeSpec, Worker
+from aerodaas.runtime.reports import StreamCount
+from aerodaas.runtime.session import Session
 
 __all__ = ["AnalyticsActor"]
 

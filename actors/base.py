@@ -13,28 +13,26 @@ import os
 import threading
 from abc import abstractmethod
 from collections import deque
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import ray
 
 from aerodaas.actors.cluster.dead_man import exit_soon, leave
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
-from aerodaas.actors.session import Session
-from aerodaas.actors.stream_names import alert_stream
 from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
+from aerodaas.runtime.reports import ActorReport, Phase, SentCount, StreamCount
+from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import alert_stream
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
-from aerodaas.types.vitals import Vitals, read_vitals
+from aerodaas.types.vitals import read_vitals
 
 __all__ = [
     "ActorInfo",
-    "ActorReport",
-    "SentCount",
     "StreamActor",
-    "StreamCount",
 ]
 
 _ALERTS_KEPT = 50
@@ -42,7 +40,6 @@ _REPEATED = 5 * NANOSECONDS
 """Mission time within which an alert with the same text is suppressed, nanoseconds."""
 _LISTENING = 5.0
 """Wall seconds that an actor's own thread may take to subscribe to further streams."""
-Phase = Literal["new", "ready", "running", "done", "failed"]
 
 
 @dataclass(frozen=True)
@@ -56,42 +53,6 @@ class ActorInfo:
     reads: tuple[str, ...]
     clock: int
     """Host time of its machine when it was ready, nanoseconds."""
-
-
-@dataclass(frozen=True)
-class StreamCount:
-    """Messages of one stream received and dropped by an actor."""
-
-    received: int
-    dropped: int
-
-
-@dataclass(frozen=True)
-class SentCount:
-    """Messages published by an actor on one stream, and their latency."""
-
-    count: int
-    median_ms: float | None
-    """Latency from capture to publishing of the newest messages; None before the first."""
-    p99_ms: float | None
-
-
-@dataclass(frozen=True)
-class ActorReport:
-    """Status of an actor: phase, counters, vitals, alerts and problems."""
-
-    phase: Phase
-    error: AeroDaaSError | None = None
-    streams: dict[str, StreamCount] = field(default_factory=dict)
-    sent: dict[str, SentCount] = field(default_factory=dict)
-    vitals: Vitals | None = None
-    """Vitals of its process; None before its first report."""
-    alerts: tuple[Alert, ...] = ()
-    """The newest alerts, oldest first."""
-    problems: tuple[str, ...] = ()
-    """Descriptions of items that could not be sent or read."""
-    values: dict[str, Any] = field(default_factory=dict)
-    """Figures specific to the kind of actor."""
 
 
 class _AlertHandler(logging.Handler):

@@ -20,10 +20,11 @@ from typing import Any, cast
 import ray
 from ray.exceptions import GetTimeoutError, RayError
 
-from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, pinned
+from aerodaas.actors.cluster.ray_cluster import nodes_at, pinned
 from aerodaas.actors.process_variables import ray_variables
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import cleaned
+from aerodaas.runtime.placement import Placement
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["isolation_options"]

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from aerodaas.actors.base import StreamActor
 from aerodaas.actors.batch_pause import BatchPause
 from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
-from aerodaas.actors.session import Session
-from aerodaas.actors.stream_names import vitals_stream
 from aerodaas.config.options import LiveViews
 from aerodaas.recording.provenance import Provenance
+from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import vitals_stream
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
 from aerodaas.types.errors import RecordingError, failure_line

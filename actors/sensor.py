@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
-from aerodaas.actors.session import Session, next_due
-from aerodaas.actors.stream_names import end_stream
+from aerodaas.actors.base import ActorInfo, StreamActor
 from aerodaas.cameras.base import (
     Camera,
     GimballedCamera,
@@ -19,6 +17,9 @@ from aerodaas.cameras.base import (
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
+from aerodaas.runtime.reports import StreamCount
+from aerodaas.runtime.session import Session, next_due
+from aerodaas.runtime.stream_names import end_stream
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.memory_limit import limit_memory

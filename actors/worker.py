@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors.base import StreamActor
-from aerodaas.actors.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
 from aerodaas.actors.drone.mission_link import StreamLink
-from aerodaas.actors.session import FRAME_DEPTH, next_due
 from aerodaas.actors.triggers import Triggers, TriggerSpec
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
+from aerodaas.runtime.session import FRAME_DEPTH, next_due
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import failure_line

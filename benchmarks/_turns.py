@@ -15,10 +15,10 @@ from typing import Any, cast
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
-from aerodaas.actors.session import CONTROL_PERIOD_NS, Session
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import LockstepClock

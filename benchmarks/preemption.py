@@ -33,9 +33,9 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.actors.run.live import LiveReader
-from aerodaas.actors.session import CONTROL_PERIOD_NS
 from aerodaas.analytics.base import Context
 from aerodaas.config.options import RunOptions, current_options
+from aerodaas.runtime.session import CONTROL_PERIOD_NS
 
 RATE = 13
 """Frames per second; no divisor of the loop's 20, so that events fall anywhere in its period."""

@@ -8,7 +8,6 @@ import logging
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import ray
@@ -20,10 +19,10 @@ from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_internals import forbid_start, silence_nodes
 from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES, VARIABLES
 from aerodaas.config.model import ComputeConfig
+from aerodaas.runtime.placement import Placement
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 __all__ = [
-    "Placement",
     "begin",
     "connect",
     "disconnect",
@@ -50,15 +49,6 @@ _NAMESPACE = "aerodaas"
 
 _local: LocalRay | None = None
 """Local Ray started by this process, if any."""
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Kind of node, or the node, on which to place an actor."""
-
-    kind: Literal["edge", "cloud"] = "edge"
-    node: str | None = None
-    """Address, name or id of one node, if the kind alone is ambiguous."""
 
 
 def begin(address: str | None) -> None:

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from aerodaas.actors.stream_names import DECISIONS
 from aerodaas.actors.streams import Publisher
+from aerodaas.runtime.stream_names import DECISIONS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Result, Task, TaskOutcome
 from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.types.clock import host_time_ns

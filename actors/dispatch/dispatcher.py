@@ -22,17 +22,17 @@ from typing import Any
 
 from aerodaas.actors.base import StreamActor
 from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
-from aerodaas.actors.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.actors.dispatch.decisions import Counts, DecisionLog
 from aerodaas.actors.dispatch.edge_turns import EdgeTurns
-from aerodaas.actors.dispatch.estimates import Estimates
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
-from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
-from aerodaas.actors.dispatch.recent_frames import FrameReferences, MissingFrame
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
-from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
-from aerodaas.actors.stream_names import ACKS, DECISIONS, done_stream, task_stream
 from aerodaas.actors.triggers import Triggers, TriggerSpec
+from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
+from aerodaas.runtime.dispatch.estimates import Estimates
+from aerodaas.runtime.dispatch.guarded_scheduler import GuardedDispatch
+from aerodaas.runtime.dispatch.recent_frames import FrameReferences, MissingFrame
+from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
+from aerodaas.runtime.stream_names import ACKS, DECISIONS, done_stream, task_stream
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Drop,

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import ray
 
 from aerodaas.actors.cluster.dead_man import leave
-from aerodaas.actors.dispatch.frame_codec import CodedFrame, decoded, load
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Analytics, ComputeKind
+from aerodaas.runtime.dispatch.frame_codec import CodedFrame, decoded, load
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert
 from aerodaas.types.errors import AeroDaaSError

@@ -10,9 +10,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors.dispatch.costs import LinkEstimate, Uplink
-from aerodaas.actors.dispatch.frame_codec import Codec, load
 from aerodaas.actors.streams import encode_message
+from aerodaas.runtime.dispatch.costs import LinkEstimate, Uplink
+from aerodaas.runtime.dispatch.frame_codec import Codec, load
 from aerodaas.types.data import Frame
 from aerodaas.types.status import Message
 

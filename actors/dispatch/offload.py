@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.actors.cluster.ray_cluster import Placement
-from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
 from aerodaas.dataflow.graph import Node
+from aerodaas.runtime.dispatch.frame_codec import Codec
+from aerodaas.runtime.placement import Placement
 from aerodaas.schedulers.analytics.base import Profile
 
 __all__ = ["CloudProcess", "allowed", "cloud_processes", "priced", "short_name"]

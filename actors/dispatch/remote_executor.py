@@ -17,17 +17,17 @@ from typing import Any
 from pydantic import SecretStr
 from ray.exceptions import RayError, RayTaskError
 
-from aerodaas.actors.dispatch.costs import ExecutionEstimates
 from aerodaas.actors.dispatch.executor import (
     FRAMES_KEPT,
     Executed,
     MissingFrameError,
     UnpreparedError,
 )
-from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.frame_uplink import FrameTransfer, FrameUplink
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import UnreadableError, decode_message
+from aerodaas.runtime.dispatch.costs import ExecutionEstimates
+from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import Task
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.status import Message

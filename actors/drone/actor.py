@@ -14,24 +14,24 @@ from aerodaas.actors.base import ActorInfo, StreamActor
 from aerodaas.actors.cluster.run_lock import RunLock
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.change_signal import ChangeSignal
-from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
-from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.priority import Slack, punctual, raise_niceness
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.losses import ALONE
-from aerodaas.actors.session import (
+from aerodaas.config.file_lock import actor_lock, exclusive
+from aerodaas.drivers.loading import link_of
+from aerodaas.mission.commands import Answer, Command, ReturnHome
+from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
+from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.reports import RobotReport
+from aerodaas.runtime.session import (
     CONTROL_PERIOD_NS,
     CONTROL_RATE,
     MESSAGE_DEPTH,
     Session,
     next_due,
 )
-from aerodaas.actors.stream_names import reply_stream, request_stream, whereabouts_stream
-from aerodaas.config.file_lock import actor_lock, exclusive
-from aerodaas.drivers.loading import link_of
-from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
+from aerodaas.runtime.stream_names import reply_stream, request_stream, whereabouts_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message

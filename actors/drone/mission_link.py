@@ -9,10 +9,10 @@ from concurrent.futures import Future
 from typing import Any
 
 from aerodaas.actors.base import StreamActor
-from aerodaas.actors.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import Answer, Command, Reply, Request, StreamItem
 from aerodaas.mission.state_machine import TERMINAL
+from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.status import Message, MissionStatus

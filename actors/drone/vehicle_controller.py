@@ -11,16 +11,6 @@ import numpy as np
 
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.planner import PlannerExecutor
-from aerodaas.actors.drone.robot_report import Latencies
-from aerodaas.actors.session import NEVER, Session
-from aerodaas.actors.stream_names import (
-    photo_stream,
-    reply_stream,
-    request_stream,
-    setpoint_stream,
-    state_stream,
-    status_stream,
-)
 from aerodaas.actors.streams import Publisher
 from aerodaas.config.model import RobotConfig, SensorConfig
 from aerodaas.drivers.loading import load_vehicle
@@ -39,6 +29,16 @@ from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.runtime.reports import Latencies
+from aerodaas.runtime.session import NEVER, Session
+from aerodaas.runtime.stream_names import (
+    photo_stream,
+    reply_stream,
+    request_stream,
+    setpoint_stream,
+    state_stream,
+    status_stream,
+)
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.terrain.ground import agreed_sea_level
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns

@@ -6,10 +6,10 @@ from typing import Any
 
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.lockstep.actor import LockstepActor
-from aerodaas.actors.session import MESSAGE_DEPTH
-from aerodaas.actors.stream_names import ACKS
 from aerodaas.actors.streams import Publisher
 from aerodaas.actors.worker import NodeSpec, Worker
+from aerodaas.runtime.session import MESSAGE_DEPTH
+from aerodaas.runtime.stream_names import ACKS
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState

@@ -8,7 +8,7 @@ from typing import Any
 
 from aerodaas.actors.dispatch.dispatcher import DispatcherActor, Managed
 from aerodaas.actors.lockstep.actor import LockstepActor
-from aerodaas.actors.session import Session
+from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.types.status import Message
 

@@ -8,17 +8,17 @@ from typing import Any
 
 from aerodaas.actors.base import ActorInfo
 from aerodaas.actors.drone.actor import ANSWER_TIMEOUT, DroneActor
-from aerodaas.actors.drone.loop_calls import LoopOverError
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.lockstep.actor import LockstepActor
 from aerodaas.actors.lockstep.barrier import Barrier
 from aerodaas.actors.lockstep.growth_gate import GrowthGate
 from aerodaas.actors.lockstep.progress import Progress
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.session import CONTROL_RATE, MESSAGE_DEPTH, NEVER, Session, next_due
-from aerodaas.actors.stream_names import ACKS, ADVANCE, end_stream
 from aerodaas.actors.streams import Publisher
 from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.runtime.loop_calls import LoopOverError
+from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, NEVER, Session, next_due
+from aerodaas.runtime.stream_names import ACKS, ADVANCE, end_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import LockstepClock, host_time_ns
 from aerodaas.types.data import Header

@@ -6,7 +6,7 @@ from collections import Counter
 
 from aerodaas.actors.lockstep.actor import LockstepActor
 from aerodaas.actors.recorder import RecorderActor
-from aerodaas.actors.stream_names import ACKS
+from aerodaas.runtime.stream_names import ACKS
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from aerodaas.actors.lockstep.actor import LockstepActor
 from aerodaas.actors.sensor import SensorActor
-from aerodaas.actors.session import MESSAGE_DEPTH
 from aerodaas.cameras.base import Picture
+from aerodaas.runtime.session import MESSAGE_DEPTH
 from aerodaas.types.data import Header
 
 __all__ = ["LockstepSensorActor"]

@@ -20,12 +20,12 @@ from typing import Any
 
 from aerodaas.actors.cluster.liveness import Life
 from aerodaas.actors.dispatch.dispatcher import Managed
-from aerodaas.actors.dispatch.recent_frames import MissingFrame
 from aerodaas.actors.lockstep.dispatcher import LockstepDispatcherActor
-from aerodaas.actors.lockstep.executions import Executions
 from aerodaas.actors.lockstep.progress import Progress
-from aerodaas.actors.session import MESSAGE_DEPTH, Session
-from aerodaas.actors.stream_names import ADVANCE, PROGRESS
+from aerodaas.runtime.dispatch.executions import Executions
+from aerodaas.runtime.dispatch.recent_frames import MissingFrame
+from aerodaas.runtime.session import MESSAGE_DEPTH, Session
+from aerodaas.runtime.stream_names import ADVANCE, PROGRESS
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources, Task, TaskOutcome
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header

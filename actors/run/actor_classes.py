@@ -15,7 +15,7 @@ from aerodaas.actors.lockstep.sensor import LockstepSensorActor
 from aerodaas.actors.lockstep.timed_dispatcher import TimedDispatcherActor
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
-from aerodaas.actors.session import Session
+from aerodaas.runtime.session import Session
 
 __all__ = ["ActorClasses", "actor_classes"]
 

@@ -16,22 +16,20 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
-from aerodaas.actors.base import ActorInfo, ActorReport, StreamActor
+from aerodaas.actors.base import ActorInfo, StreamActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
 from aerodaas.actors.cluster.orphan_reaper import REAPER, OrphanReaperActor, ReaperHost, Watched
-from aerodaas.actors.cluster.ray_cluster import Placement, options_for
+from aerodaas.actors.cluster.ray_cluster import options_for
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
-from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.environment_options import environment_options
-from aerodaas.actors.run.flight_state import FlightState
 from aerodaas.actors.run.growth import Growth, growth
 from aerodaas.actors.run.losses import (
     DeadError,
@@ -43,10 +41,12 @@ from aerodaas.actors.run.losses import (
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.actors.run.shutdown import end_actors, may_fly
-from aerodaas.actors.stream_names import done_stream
 from aerodaas.config.options import LiveViews
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
+from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
+from aerodaas.runtime.stream_names import done_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert, Header

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.drone.vehicle_controller import RobotSpec
-from aerodaas.actors.session import Session
 from aerodaas.drivers.loading import link_of
+from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.session import Session
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["MOST_ALONE", "MOST_TOGETHER", "by_actor"]

@@ -11,13 +11,13 @@ from typing import Any, Protocol
 import ray
 from ray.exceptions import RayError
 
-from aerodaas.actors.session import Session
 from aerodaas.actors.streams import (
     Subscriber,
     UnreadableError,
     decode_message,
     shared_memory_available,
 )
+from aerodaas.runtime.session import Session
 from aerodaas.types.status import Message
 
 __all__ = ["LiveReader"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from aerodaas.actors.base import ActorReport
+from aerodaas.runtime.reports import ActorReport
 from aerodaas.types.errors import MissionError
 
 __all__ = [

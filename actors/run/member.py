@@ -9,8 +9,9 @@ from typing import Any
 import ray
 from ray.exceptions import GetTimeoutError, RayActorError, RayTaskError
 
-from aerodaas.actors.base import ActorInfo, ActorReport
+from aerodaas.actors.base import ActorInfo
 from aerodaas.actors.run.losses import DeadError, SilentError
+from aerodaas.runtime.reports import ActorReport
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.errors import AeroDaaSError, MissionError
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.dispatch.dispatcher import Managed
 from aerodaas.actors.dispatch.offload import (
     CloudProcess,
@@ -16,24 +15,8 @@ from aerodaas.actors.dispatch.offload import (
 )
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.lockstep.barrier import paths, widest
-from aerodaas.actors.lockstep.executions import Executions
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.run.checks import check_graph, check_places, check_plugins, check_tasks
 from aerodaas.actors.run.hosting import by_actor
-from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
-from aerodaas.actors.stream_names import (
-    ACKS,
-    ADVANCE,
-    DECISIONS,
-    PROGRESS,
-    alert_stream,
-    done_stream,
-    end_stream,
-    guest_actor,
-    state_stream,
-    task_stream,
-    trigger_stream,
-)
 from aerodaas.actors.triggers import TriggerSpec
 from aerodaas.actors.worker import NodeSpec, Wake
 from aerodaas.analytics.base import Analytics
@@ -50,6 +33,23 @@ from aerodaas.config.model import (
 from aerodaas.dataflow.graph import Graph, NavigationEdge, Node
 from aerodaas.dataflow.handles import SENSOR_ITEMS
 from aerodaas.mission.commands import TRIGGERED, initial_commands
+from aerodaas.runtime.checks import check_graph, check_places, check_plugins, check_tasks
+from aerodaas.runtime.dispatch.executions import Executions
+from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
+from aerodaas.runtime.stream_names import (
+    ACKS,
+    ADVANCE,
+    DECISIONS,
+    PROGRESS,
+    alert_stream,
+    done_stream,
+    end_stream,
+    guest_actor,
+    state_stream,
+    task_stream,
+    trigger_stream,
+)
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler

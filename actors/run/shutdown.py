@@ -9,7 +9,7 @@ from typing import Any, cast
 import ray
 from ray.exceptions import GetTimeoutError, RayActorError, RayError
 
-from aerodaas.actors.base import ActorReport
+from aerodaas.runtime.reports import ActorReport
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["end_actors", "may_fly"]

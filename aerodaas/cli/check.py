@@ -138,7 +138,7 @@ def _is_environment(file: Path) -> bool:
 
 def _environment_alone(environment: Environment, *, connect: bool) -> Iterator[Finding]:
     """Findings of an environment that no application uses yet."""
-    from aerodaas.actors.run.checks import check_plugins  # noqa: PLC0415 - slow to load
+    from aerodaas.runtime.checks import check_plugins  # noqa: PLC0415 - slow to load
 
     config = environment.config
     cameras = [one for one in config.all_sensors() if config.has_pictures(one)]

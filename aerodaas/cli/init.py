@@ -196,9 +196,9 @@ def _compute(address: str | None) -> list[dict[str, str]] | None:
 def _write(
     beginning: Beginning, compute: list[dict[str, str]] | None, output: Path, *, force: bool
 ) -> None:
-    from aerodaas.actors.run.checks import check_environment  # noqa: PLC0415 - slow to load
     from aerodaas.config.model import validated  # noqa: PLC0415 - slow to load
     from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
+    from aerodaas.runtime.checks import check_environment  # noqa: PLC0415 - slow to load
 
     if compute is not None:
         beginning = replace(beginning, compute=compute)

@@ -13,8 +13,7 @@ from aerodaas.types.clock import host_time_ns, seconds
 from aerodaas.types.status import GROUNDED
 
 if TYPE_CHECKING:
-    from aerodaas.actors.base import ActorReport
-    from aerodaas.actors.run.flight_state import FlightState
+    from aerodaas.runtime.reports import ActorReport, FlightState
 
 __all__ = ["FlightMeter"]
 

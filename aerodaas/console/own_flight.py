@@ -17,9 +17,9 @@ from aerodaas.protocol.schemas import MissionOut, MissionPhase, PictureForm
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 if TYPE_CHECKING:
-    from aerodaas.actors.run.flight_state import FlightState
     from aerodaas.config.model import EnvironmentConfig
     from aerodaas.dataflow.graph import Graph
+    from aerodaas.runtime.reports import FlightState
     from aerodaas.terrain.ground import Ground
 
 __all__ = ["OWN", "Flown", "OwnFlight"]

@@ -8,7 +8,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
-from aerodaas.actors.run.checks import check_environment, sensor_properties
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import load_plugin
@@ -23,6 +22,8 @@ from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
 from aerodaas.mission.commands import AddNavigation, Command, End, initial_commands
+from aerodaas.runtime.checks import check_environment, sensor_properties
+from aerodaas.runtime.placement import Placement
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
@@ -309,7 +310,7 @@ class Environment(PaperNames, IEnvironment):
         if resource.kind == "http" or self.provider is not None:
             return {}
         cluster = _connected_cluster()
-        found: dict[str, Any] = cluster.hardware(cluster.Placement(resource.kind, resource.node))
+        found: dict[str, Any] = cluster.hardware(Placement(resource.kind, resource.node))
         return found
 
     def compute(self) -> list[ComputeConfig]:

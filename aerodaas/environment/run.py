@@ -11,8 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from aerodaas.actors.run.checks import check_served
-from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import LiveViews, Speed, current_options
@@ -26,6 +24,8 @@ from aerodaas.environment.signals import (
 )
 from aerodaas.mission.commands import Answer, Command, End
 from aerodaas.ros.link import require_dds
+from aerodaas.runtime.checks import check_served
+from aerodaas.runtime.stream_names import is_guest_actor
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -39,13 +39,12 @@ from aerodaas.types.identifiers import told
 from aerodaas.types.status import MissionState
 
 if TYPE_CHECKING:
-    from aerodaas.actors.base import ActorReport
     from aerodaas.actors.run.application import Application
     from aerodaas.actors.run.flight import Flight
-    from aerodaas.actors.run.flight_state import FlightState
     from aerodaas.actors.run.plan import FlightPlan
     from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment
+    from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
     from aerodaas.terminal.console import FlightView
 
@@ -329,8 +328,8 @@ class Run:
     def plan(self) -> FlightPlan:
         """Plan the actors of the flight; raises the errors of a graph that cannot fly."""
         from aerodaas.actors.run.plan import make_plan  # noqa: PLC0415
-        from aerodaas.actors.session import Session  # noqa: PLC0415
         from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
+        from aerodaas.runtime.session import Session  # noqa: PLC0415
 
         self._check_world()
         self._take_tasks()

@@ -24,7 +24,7 @@ from aerodaas.types.errors import RecordingError
 from aerodaas.types.identifiers import is_internal
 
 if TYPE_CHECKING:
-    from aerodaas.actors.run.flight_state import FlightState
+    from aerodaas.runtime.reports import FlightState
 
 __all__ = [
     "FlightView",

@@ -12,11 +12,11 @@ from aerodaas.actors.drone.actor import DroneActor
 from aerodaas.actors.drone.vehicle_controller import RobotSpec
 from aerodaas.actors.lockstep.drone import LockstepDroneActor
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.session import Session
-from aerodaas.actors.stream_names import state_stream
 from aerodaas.actors.streams import Subscriber
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.mission.commands import Command
+from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
 __all__ = ["DroneByHand", "LockstepDroneByHand", "drone_by_hand", "spec_by_hand"]

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict
 
 from aerodaas import Analytics, Environment, Frame
-from aerodaas.actors.run.checks import check_served
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import LimitsConfig, validated
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.runtime.checks import check_served
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError, UnknownIdError
 

@@ -12,10 +12,10 @@ import pytest
 
 from aerodaas.actors.dispatch.executor import Executed
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
-from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteExecutor, RemoteResult
 from aerodaas.actors.streams import encode_message
+from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Header

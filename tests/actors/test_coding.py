@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerodaas.actors.dispatch.frame_codec import Codec, CodedFrame, decoded
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
+from aerodaas.runtime.dispatch.frame_codec import Codec, CodedFrame, decoded
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import SourceError
 from aerodaas.types.status import Message

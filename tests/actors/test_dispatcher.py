@@ -18,11 +18,11 @@ from flying import Flyer, hop, robot
 
 from aerodaas import AeroStreamData, Environment
 from aerodaas.actors.dispatch.dispatcher import DispatcherActor
-from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
+from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.types.clock import NANOSECONDS

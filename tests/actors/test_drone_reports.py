@@ -15,13 +15,13 @@ from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.change_signal import ChangeSignal
-from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
-from aerodaas.actors.drone.robot_report import LATENCIES_KEPT, Latencies
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.session import Session
-from aerodaas.actors.stream_names import state_stream
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
+from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.reports import LATENCIES_KEPT, Latencies
+from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import state_stream
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.errors import MissionError

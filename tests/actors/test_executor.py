@@ -19,10 +19,10 @@ from aerodaas.actors.dispatch.executor import (
     MissingFrameError,
     UnpreparedError,
 )
-from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Context
+from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message
 
@@ -117,7 +117,7 @@ def test_the_first_frame_waits_for_no_library() -> None:
     """Whoever times the coding of frames has loaded what codes them."""
     code = (
         "import sys\n"
-        "from aerodaas.actors.dispatch.frame_codec import Codec\n"
+        "from aerodaas.runtime.dispatch.frame_codec import Codec\n"
         "from aerodaas.actors.dispatch.frame_uplink import FrameUplink\n"
         "assert 'cv2' not in sys.modules\n"
         "FrameUplink(Codec())\n"

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
+from aerodaas.runtime.dispatch.guarded_scheduler import GuardedDispatch
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,

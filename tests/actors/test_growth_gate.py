@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 import time
 
-from aerodaas.actors.drone.loop_calls import LoopCalls
 from aerodaas.actors.lockstep.growth_gate import GrowthGate
+from aerodaas.runtime.loop_calls import LoopCalls
 
 
 class Loop:

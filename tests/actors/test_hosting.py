@@ -12,11 +12,11 @@ import pytest
 from drone_by_hand import DroneByHand, spec_by_hand
 from flying import FLAT, hop, robot
 
-from aerodaas.actors.session import MESSAGE_DEPTH, Session
-from aerodaas.actors.stream_names import setpoint_stream
 from aerodaas.actors.streams import Subscriber
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, End
+from aerodaas.runtime.session import MESSAGE_DEPTH, Session
+from aerodaas.runtime.stream_names import setpoint_stream
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.status import MissionState
 

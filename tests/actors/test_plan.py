@@ -10,12 +10,12 @@ from analyses import Above, Broken, Jitter, ProcessId, Ticker, Weave
 from flying import FLAT, Flyer, hop, robot
 
 from aerodaas import Environment
-from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.run.plan import FlightPlan, make_plan
-from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.types.errors import GraphError, SchedulerError
 

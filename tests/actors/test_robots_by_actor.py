@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from drone_by_hand import spec_by_hand
 
-from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.run.hosting import MOST_ALONE, by_actor
-from aerodaas.actors.session import Session
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.session import Session
 from aerodaas.types.errors import ConfigError
 
 LINK = "udpin:127.0.0.1:14550"

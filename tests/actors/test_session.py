@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors.session import CONTROL_PERIOD_NS, NEVER, Session, next_due
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.runtime.session import CONTROL_PERIOD_NS, NEVER, Session, next_due
 from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
 
 rates = st.floats(0.1, 240.0) | st.integers(1, 240).map(float)

@@ -18,9 +18,9 @@ from ray.exceptions import RayActorError
 from aerodaas import Analytics, Frame
 from aerodaas.actors.dispatch.executor import FRAMES_KEPT, CloudExecutor
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
-from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.analytics.base import Context, TimedContext
+from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Header

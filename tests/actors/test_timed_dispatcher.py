@@ -23,15 +23,15 @@ from aerodaas import (
     VelocityCommand,
 )
 from aerodaas.actors.dispatch.dispatcher import Managed
-from aerodaas.actors.lockstep.executions import Executions
 from aerodaas.actors.lockstep.timed_dispatcher import TimedDispatcherActor
-from aerodaas.actors.session import Session
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.runtime.dispatch.executions import Executions
+from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,

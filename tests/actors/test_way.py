@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.actors.dispatch.deadline_reserve import DeadlineReserve
+from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message, TraceSpan

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.actors.run.checks import check_environment
 from aerodaas.cameras import devices
 from aerodaas.cameras.devices import VideoDevice, capability, video_devices
 from aerodaas.cli.app import main
@@ -26,6 +25,7 @@ from aerodaas.drivers.mavlink.discovery import HeardVehicle, MavlinkDiscovery, h
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.tello import discovery as tello_discovery
 from aerodaas.drivers.tello.discovery import TelloDiscovery, find_tello
+from aerodaas.runtime.checks import check_environment
 
 LOOPBACK = "127.0.0.1"
 Command = Callable[..., tuple[int, str]]

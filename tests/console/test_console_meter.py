@@ -13,8 +13,7 @@ from aerodaas.types.status import MissionState, MissionStatus
 from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
-    from aerodaas.actors.base import ActorReport
-    from aerodaas.actors.run.flight_state import FlightState
+    from aerodaas.runtime.reports import ActorReport, FlightState
 
 
 def flying_to(target: int, *pending: int, stamp: int = 10**9) -> FlightState:

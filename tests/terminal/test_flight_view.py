@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.actors.base import ActorReport
-from aerodaas.actors.run.flight_state import FlightState
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
+from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.terminal.console import FlightView, StartupView, show_left, show_results
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header

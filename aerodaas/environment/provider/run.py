@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from aerodaas.actors.run.checks import check_graph
 from aerodaas.config.extras import require_extra
 from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
@@ -25,6 +24,7 @@ from aerodaas.environment.provider.submission import submit
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals
 from aerodaas.mission.commands import Answer, Command, initial_commands
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.runtime.checks import check_graph
 from aerodaas.types.errors import (
     AeroDaaSError,
     ConfigError,

@@ -7,8 +7,8 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
 from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, LockstepClock, ScaledClock
@@ -51,8 +51,8 @@ class Session:
     """Share of an edge that other flights use, too; None in lockstep, which waits for all work."""
     locks: Path | None = None
     """Folder of a provider's locks, which the drones' actors on its machine hold."""
-    application: Application = field(default_factory=Application)
-    """Definitions from the application's own files."""
+    application: Any = None
+    """Definitions of the application, which an actor's process unpickles with its session."""
     epoch: HostEpoch = field(default_factory=HostEpoch)
     """Clock of the application's process, which the actors on its machine take over."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors.session import FRAME_DEPTH
+from aerodaas.runtime.session import FRAME_DEPTH
 from aerodaas.types.data import Frame
 from aerodaas.types.records import fast_pickle
 from aerodaas.types.status import Message

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from aerodaas.actors.dispatch.costs import ExecutionEstimates
+from aerodaas.runtime.dispatch.costs import ExecutionEstimates
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 from aerodaas.types.clock import NANOSECONDS
 

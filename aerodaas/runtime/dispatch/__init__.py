@@ -1,0 +1,1 @@
+"""Dispatch of analyses by an analytics scheduler, and what it estimates from."""

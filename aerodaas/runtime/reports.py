@@ -1,0 +1,119 @@
+"""Reports of a run: of each robot, of each part that runs nodes, and of the whole."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from aerodaas.types.data import Alert
+from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.health import HealthReport
+from aerodaas.types.status import MissionStatus
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.vitals import Vitals
+
+__all__ = [
+    "LATENCIES_KEPT",
+    "ActorReport",
+    "FlightState",
+    "Latencies",
+    "Phase",
+    "RobotReport",
+    "SentCount",
+    "StreamCount",
+]
+
+LATENCIES_KEPT = 20_000
+"""A quarter of an hour's at 20 Hz, or ten minutes' of a fast camera."""
+Phase = Literal["new", "ready", "running", "done", "failed"]
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """Status and state of one robot at one time; made by the setpoint loop, immutable."""
+
+    status: MissionStatus
+    state: VehicleState | None
+    latencies: tuple[float, ...]
+    """Milliseconds from capture to command, newest last."""
+    health: HealthReport | None = None
+    """The list before take-off as it was gone through last."""
+
+
+class Latencies:
+    """The newest latencies, appended by one thread and read by others."""
+
+    def __init__(self) -> None:
+        self._values = array("d")
+
+    def append(self, value: float) -> None:
+        """Append the newest value; of the others, at least the newest `LATENCIES_KEPT` stay."""
+        self._values.append(value)
+        if len(self._values) > 2 * LATENCIES_KEPT:
+            del self._values[:-LATENCIES_KEPT]
+
+    def newest(self, count: int) -> tuple[float, ...]:
+        """The newest `count` values, newest last."""
+        return tuple(self._values[-count:]) if count > 0 else ()
+
+
+@dataclass(frozen=True)
+class StreamCount:
+    """Messages of one stream received and dropped by an actor."""
+
+    received: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class SentCount:
+    """Messages published by an actor on one stream, and their latency."""
+
+    count: int
+    median_ms: float | None
+    """Latency from capture to publishing of the newest messages; None before the first."""
+    p99_ms: float | None
+
+
+@dataclass(frozen=True)
+class ActorReport:
+    """Status of an actor: phase, counters, vitals, alerts and problems."""
+
+    phase: Phase
+    error: AeroDaaSError | None = None
+    streams: dict[str, StreamCount] = field(default_factory=dict)
+    sent: dict[str, SentCount] = field(default_factory=dict)
+    vitals: Vitals | None = None
+    """Vitals of its process; None before its first report."""
+    alerts: tuple[Alert, ...] = ()
+    """The newest alerts, oldest first."""
+    problems: tuple[str, ...] = ()
+    """Descriptions of items that could not be sent or read."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """Figures specific to the kind of actor."""
+
+
+@dataclass(frozen=True)
+class FlightState:
+    """State of a run at one time."""
+
+    robots: dict[str, RobotReport]
+    reports: dict[str, ActorReport]
+    over: bool
+    """True after every mission has ended."""
+    notes: tuple[Alert, ...] = ()
+    """The newest alerts of the application's own process."""
+
+    @property
+    def alerts(self) -> list[Alert]:
+        """The newest alerts of all actors and of the application's process, oldest first."""
+        noted = {(note.kind, note.text) for note in self.notes}
+        alerts = [
+            alert
+            for report in self.reports.values()
+            for alert in report.alerts
+            # The drones' actors repeat the application's, so that they are recorded.
+            if (alert.kind, alert.text) not in noted
+        ]
+        return sorted([*self.notes, *alerts], key=lambda alert: alert.header.stamp)
