@@ -3,8 +3,9 @@
 Farm Survey flies whole, in lockstep: physics, a camera of 640 x 360 at 15 a second, streams,
 recording with JPEG pictures. The processor's time is that of the actors in flight, as the recording
 has it; Ray's threads cost some of it for each second of the wall, so it wants a quiet machine, too.
-A turn of the setpoint loop, by itself (`_turns.py`), does not. "side by side" is `aerodaas run
---seeds`, whose wall time includes all that comes before and after the flights.
+"parts, in one process" (`_parts.py`) wants less of one: drone, camera and recorder by themselves.
+"side by side" is `aerodaas run --seeds`, whose wall time includes all that comes before and after
+the flights.
 """
 
 from __future__ import annotations
@@ -36,10 +37,13 @@ _ACTORS = {"drone": "drone", "sensor": "camera", "analytics": "analyses", "recor
 """Name of an actor's figure, by the first part of its own."""
 UNITS = {"simulated": "s", "wall": "s", "factor": "s/s", "ready after": "s"}
 UNITS |= dict.fromkeys((*_ACTORS.values(), "actors"), "ms of processor/s")
-UNITS |= {"turn": "us of processor"}
 _NONE = dict.fromkeys(UNITS, float("nan"))
 _LINE = re.compile(r"flew ([\d.]+) s in ([\d.]+) s, .*ready after ([\d.]+) s")
 _SIDE_BY_SIDE = "side by side"
+_PARTS = {
+    "parts, in one process": ("--camera", "--record"),
+    "parts, no camera": ("--record",),
+}
 
 
 def run(checkout: Path | None, folder: Path, *words: str) -> str:
@@ -86,13 +90,13 @@ def processor(recording: Path) -> dict[str, float]:
     return dict(used)
 
 
-def turn(checkout: Path | None) -> float:
-    """Microseconds of the processor that a turn of a drone takes, by itself."""
-    command = [sys.executable, str(Path(__file__).with_name("_turns.py"))]
+def parts(checkout: Path | None, words: Sequence[str]) -> dict[str, float]:
+    """Milliseconds of the processor for a simulated second, by part of a flight in one process."""
+    command = [sys.executable, str(Path(__file__).with_name("_parts.py")), *words]
     done = subprocess.run(  # noqa: S603 - ours
         command, capture_output=True, text=True, check=True, env=_environment(checkout)
     )
-    return float(done.stdout)
+    return {**_NONE, **jsons.loads(done.stdout)}
 
 
 def _environment(checkout: Path | None) -> dict[str, str]:
@@ -137,13 +141,14 @@ def main(
                 for prefix, checkout in checkouts.items():
                     place = folder / f"{number}-{prefix}{case}"
                     flights[prefix + case].append(fly(checkout, place, words))
+            for case, words in _PARTS.items():
+                for prefix, checkout in checkouts.items():
+                    flights[prefix + case].append(parts(checkout, words))
         if seeds:
             flights[_SIDE_BY_SIDE].append(fly_seeds(folder / _SIDE_BY_SIDE, seeds))
     for case, flown in flights.items():
         report.row(case, {unit: statistics.median(one[unit] for one in flown) for unit in UNITS})
     report.note(f"medians of {rounds} flights; {seeds} seeds side by side, once")
-    for prefix, checkout in checkouts.items():
-        report.row(f"{prefix}a drone's turn, alone", {**_NONE, "turn": turn(checkout)})
     report.show()
     if json is not None:
         report.write(json)
