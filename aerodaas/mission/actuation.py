@@ -62,8 +62,8 @@ class _Release:
 class Actuation:
     """Actuators of one mission, called by it once a turn."""
 
-    vehicle: object
-    """Uses the actuators of this one, if it has any (see `ActuatedVehicle`)."""
+    vehicle: ActuatedVehicle | None
+    """Uses the actuators of this one; None for a vehicle that moves none."""
     robot: RobotConfig
     log: MissionLog
     released: str = ""
@@ -113,8 +113,7 @@ class Actuation:
         `now` is the mission clock, nanoseconds.
         """
         try:
-            vehicle = self.vehicle
-            actuators = vehicle.actuators if isinstance(vehicle, ActuatedVehicle) else None
+            actuators = None if self.vehicle is None else self.vehicle.actuators
             for result in () if actuators is None else actuators.results():
                 self._note(result, now)
             for task in self._tasks.values():
@@ -220,8 +219,7 @@ class Actuation:
             task.number = actuators.move(*task.left[0])
 
     def _actuators(self) -> Actuators:
-        vehicle = self.vehicle
-        actuators = vehicle.actuators if isinstance(vehicle, ActuatedVehicle) else None
+        actuators = None if self.vehicle is None else self.vehicle.actuators
         if actuators is None:
             raise VehicleError("the vehicle has no actuators")
         return actuators

@@ -56,12 +56,14 @@ from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
+from aerodaas.types.actuators import ActuatedVehicle
 from aerodaas.types.braking import stopping_point
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert
 from aerodaas.types.energy import EnergyMeter, EnergyModel
 from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.mission_mode import MissionModeVehicle
 from aerodaas.types.status import RECENT, MissionState, MissionStatus
 from aerodaas.types.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.types.waypoints import HeightDatum
@@ -122,7 +124,9 @@ class Mission:
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
         self.photographer = Photographer(payload, self._log, robot.mission.photo_timeout)
-        self.actuation = Actuation(payload, robot, self._log)
+        # Once: to ask a protocol about an object looks up all its members each time.
+        actuated = payload if isinstance(payload, ActuatedVehicle) else None
+        self.actuation = Actuation(actuated, robot, self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -142,7 +146,8 @@ class Mission:
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
         self._cornering = Cornering(self._navigator, self.photographer, self._route, limits)
-        self.handover = Handover(payload, robot, self._route, clearance, self._log)
+        autonomous = payload if isinstance(payload, MissionModeVehicle) else None
+        self.handover = Handover(autonomous, robot, self._route, clearance, self._log)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
         self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)

@@ -48,8 +48,8 @@ _UPLOADS = 3
 class Handover:
     """Hand-over of one mission, called by it once a turn."""
 
-    vehicle: object
-    """Uses the mission mode of this one, if it has any (see `MissionModeVehicle`)."""
+    vehicle: MissionModeVehicle | None
+    """Uses the mission mode of this one; None for a vehicle that has none."""
     robot: RobotConfig
     route: Route
     clearance: GroundClearance | None
@@ -108,13 +108,12 @@ class Handover:
         return MissionState.ENROUTE, f"flying to {stop.id} by the autopilot's mission mode"
 
     def _mode(self) -> MissionMode | None:
-        vehicle = self.vehicle
-        return vehicle.mission_mode if isinstance(vehicle, MissionModeVehicle) else None
+        return None if self.vehicle is None else self.vehicle.mission_mode
 
     def _upload(self, stops: list[QueuedWaypoint], state: VehicleState) -> str:
         """Begin to upload `stops`; returns why not, empty if it is under way."""
         mode, limits = self._mode(), self.robot.limits
-        if mode is None or not isinstance(self.vehicle, MissionModeVehicle):
+        if self.vehicle is None or mode is None:
             return f"its driver, {self.robot.driver}, knows no mission mode"
         if state.mode not in _STEERED or not has_position(state):
             return f"the vehicle is {state.mode.value}"

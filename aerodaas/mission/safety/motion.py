@@ -6,6 +6,7 @@ all although it is commanded to, as on the ground with its motors running.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -55,8 +56,8 @@ class MotionWatch:
         """m/s along the ground that no command of the last seconds explains."""
         self._limits = limits
         self._setpoint: Setpoint | None = None
-        self._commands: deque[tuple[int, Vector]] = deque()
-        """Time (ns) and commanded velocity, newest last."""
+        self._commands: deque[tuple[int, float, float]] = deque()
+        """Time (ns) and commanded velocity to the east and north (m/s), newest last."""
         self._adrift_since: int | None = None
         self._patience = 0.0
         self._stands_since: int | None = None
@@ -90,13 +91,12 @@ class MotionWatch:
         if self._setpoint is None:
             self.forget()
             return
-        velocity = state.odometry.velocity
         wanted = self._velocity(self._setpoint, state.odometry)
-        self._commands.append((now, wanted))
+        self._commands.append((now, float(wanted[0]), float(wanted[1])))
         while now - self._commands[0][0] > _REMEMBERED:
             self._commands.popleft()
         if state.mode in _STEERED:
-            self._observe_drift(velocity[:2])
+            self._observe_drift(*state.odometry.velocity[:2].tolist())
         else:
             self._adrift_since = None
         position = state.odometry.position
@@ -115,8 +115,8 @@ class MotionWatch:
         """Seconds for which the drone has not moved against its commands; 0 if it moves."""
         return 0.0 if self._stands_since is None else seconds(self._now - self._stands_since)
 
-    def _observe_drift(self, velocity: Vector) -> None:
-        self.drift = min(_beside(velocity, wanted[:2]) for _, wanted in self._commands)
+    def _observe_drift(self, east: float, north: float) -> None:
+        self.drift = min(_beside(east, north, x, y) for _, x, y in self._commands)
         if self.drift < _CARRIED:
             self._adrift_since = None
             return
@@ -142,11 +142,11 @@ class MotionWatch:
         ).velocity
 
 
-def _beside(velocity: Vector, wanted: Vector) -> float:
-    """How far `velocity` is from following `wanted` at any speed from 0 to `_FASTER` times it."""
-    speed = length(wanted)
-    if speed == 0.0:
-        return length(velocity)
-    along = wanted / speed
-    share = float(np.clip(velocity @ along, 0.0, _FASTER * speed))
-    return length(velocity - share * along)
+def _beside(east: float, north: float, x: float, y: float) -> float:
+    """How far a velocity is from following the command (x, y) at up to `_FASTER` times its speed.
+
+    The setpoint loop asks it of each command of the last seconds, so it calculates with floats.
+    """
+    squared = x * x + y * y
+    share = min(max((east * x + north * y) / squared, 0.0), _FASTER) if squared else 0.0
+    return math.hypot(east - share * x, north - share * y)
