@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -31,6 +32,7 @@ from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
 from aerodaas.types.clock import seconds
+from aerodaas.types.data import Frame
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import Message
@@ -40,6 +42,10 @@ __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
 FLUSH_SECONDS = 0.5
 """Most data that a killed process loses, in seconds of host time."""
 _CHUNK = 1 << 20
+_BATCH = 64
+"""Most messages that gather before they are written; a frame ends a batch, too."""
+_AHEAD = 4
+"""Most batches that wait to be written; then `write` waits, too."""
 _MILLISECOND = 1_000_000
 
 DROPS = json_schema("Drops", stream="string", dropped="integer", total="integer")
@@ -61,6 +67,9 @@ class FlightRecorder:
     A message's log time is its mission time of publishing, its publish time that of the
     measurement, both counted from `provenance.started_ns`. Data written more than half a second
     ago survives a kill of this process and, soon after, a loss of power.
+
+    A thread of its own encodes and writes, so that a second core compresses pictures. It gets
+    messages in batches, because a change of threads for each would cost more than the writing.
     """
 
     def __init__(
@@ -91,6 +100,7 @@ class FlightRecorder:
             require_encoder()
         self.path = Path(path)
         self._session = Session(config, provenance.started_ns, home)
+        """Used by the writing thread alone, once that has begun."""
         self._live = live
         self._output = Output(self.path)
         self._writer = Writer(self._output, chunk_size=_CHUNK)  # type: ignore[arg-type]
@@ -105,6 +115,13 @@ class FlightRecorder:
         self._told = False
         self._summary: RecordingSummary | None = None
         self._lock = threading.Lock()
+        """Held to write to the file, and to count."""
+        self._batch: list[Message[Any]] = []
+        self._most = 1 if live else _BATCH
+        self._batching = threading.Lock()
+        """Held to add to the batch, and to pass it on; taken before the other lock."""
+        self._ahead = threading.Semaphore(_AHEAD)
+        self._thread = ThreadPoolExecutor(1, "recorder")
         self._closing = threading.Event()
         try:
             self._begin(provenance, fences or {})
@@ -117,37 +134,29 @@ class FlightRecorder:
     def write(self, message: Message[Any]) -> None:
         """Record a message: its item, converted by type, and its latency per hop.
 
+        The item must not change afterwards.
+
         Raises:
-            RecordingError: Once, if recording had to stop (disk full); afterwards lost messages
-                are only counted.
+            RecordingError: Once, if recording had to stop (disk full), by this message or an
+                earlier one; afterwards lost messages are only counted.
         """
-        entries = self._entries(message)
-        with self._lock:
+        with self._batching:
             if self._failure or self._summary is not None:
-                self._lose(message.stream)
+                with self._lock:
+                    self._lose(message.stream)
                 return
-            try:
-                for entry in entries:
-                    self._add(entry, message)
-            except OSError as error:
-                self._fail(error)
-                self._lose(message.stream)
+            self._batch.append(message)
+            if len(self._batch) >= self._most or isinstance(message.item, Frame):
+                self._pass_on()
 
     def drops(self, stream: str, count: int = 1) -> None:
         """Count `count` messages of `stream` that were dropped before the recorder."""
-        with self._lock:
-            self._drops[stream] += count
-            value = {"stream": stream, "dropped": count, "total": self._drops[stream]}
-            entry = Entry("/drops", DROPS, json_bytes(value), self._last)
-            if self._failure or self._summary is not None:
-                return
-            try:
-                self._put(entry, self._last, self._last, self._counts["/drops"])
-            except OSError as error:
-                self._fail(error)
+        self._settle()
+        self._write_drops(stream, count)
 
     def flush(self) -> None:
         """Pass everything written so far to the operating system."""
+        self._settle()
         with self._lock:
             if self._failure or self._summary is not None:
                 return
@@ -160,23 +169,12 @@ class FlightRecorder:
         """Finish the file and return its summary. May be called again; never raises."""
         self._closing.set()
         self._flusher.join()
-        with self._lock:
+        with self._batching:
             if self._summary is None:
-                if not self._failure:
-                    try:
-                        self._finish()
-                    except OSError as error:
-                        self._fail(error)
-                with suppress(OSError):
-                    self._output.close()
-                self._summary = RecordingSummary(
-                    path=self.path,
-                    channels=dict(self._counts),
-                    drops=dict(self._drops),
-                    duration=seconds(self._last - (self._first or 0)),
-                    size=self._output.tell(),
-                    stopped=self._failure,
-                )
+                self._pass_on()
+                self._thread.shutdown()
+                with self._lock:
+                    self._summary = self._finish()
             return self._summary
 
     def __enter__(self) -> Self:
@@ -190,6 +188,39 @@ class FlightRecorder:
     ) -> None:
         self.close()
 
+    def _settle(self) -> None:
+        """Wait until the thread has written what was recorded so far."""
+        with self._batching:
+            if self._summary is None:
+                self._pass_on().result()
+
+    def _pass_on(self) -> Future[None]:
+        """Have the thread write the batch; the result is there once that is done."""
+        self._ahead.acquire()
+        batch, self._batch = self._batch, []
+        return self._thread.submit(self._write_batch, batch)
+
+    def _write_batch(self, batch: list[Message[Any]]) -> None:
+        try:
+            for message in batch:
+                entries = self._entries(message)
+                with self._lock:
+                    self._add(entries, message)
+        finally:
+            self._ahead.release()
+
+    def _write_drops(self, stream: str, count: int) -> None:
+        with self._lock:
+            self._drops[stream] += count
+            value = {"stream": stream, "dropped": count, "total": self._drops[stream]}
+            entry = Entry("/drops", DROPS, json_bytes(value), self._last)
+            if self._failure or self._summary is not None:
+                return
+            try:
+                self._put(entry, self._last, self._last, self._counts["/drops"])
+            except OSError as error:
+                self._fail(error)
+
     def _entries(self, message: Message[Any]) -> list[Entry]:
         entries = []
         if message.item is not None:
@@ -197,7 +228,7 @@ class FlightRecorder:
                 entries = list(convert(message.item, message, self._session))
             except Exception as error:  # noqa: BLE001 - an object of the application's may raise anything
                 # An item that contradicts its own type must not end the flight or the recording.
-                self.drops(message.stream)
+                self._write_drops(message.stream, 1)
                 text = f"cannot record a {type(message.item).__name__}: {error}"
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
@@ -224,12 +255,20 @@ class FlightRecorder:
                 self._put(entry, 0, 0, 0)
         self._writer.flush()
 
-    def _add(self, entry: Entry, message: Message[Any]) -> None:
-        if self._first is None:
-            self._first = self._last = message.stamp
-        self._last = max(self._last, message.stamp)
-        captured = message.header.stamp if entry.stamp is None else entry.stamp
-        self._put(entry, message.stamp, captured, message.seq)
+    def _add(self, entries: list[Entry], message: Message[Any]) -> None:
+        if self._failure:
+            self._drops[message.stream] += 1
+            return
+        if entries:
+            self._first = message.stamp if self._first is None else self._first
+            self._last = max(self._last, message.stamp)
+        try:
+            for entry in entries:
+                captured = message.header.stamp if entry.stamp is None else entry.stamp
+                self._put(entry, message.stamp, captured, message.seq)
+        except OSError as error:
+            self._fail(error)
+            self._drops[message.stream] += 1
 
     def _put(self, entry: Entry, recorded: int, captured: int, sequence: int) -> None:
         channel = self._channels.get(entry.topic) or self._register(entry.topic, entry.schema)
@@ -253,12 +292,26 @@ class FlightRecorder:
         self._channels[topic] = self._writer.register_channel(topic, encoding, self._schemas[name])
         return self._channels[topic]
 
-    def _finish(self) -> None:
-        if self._drops:
-            figures = {stream: str(count) for stream, count in self._drops.items()}
-            self._writer.add_metadata("aerodaas.drops", figures)
-        self._writer.finish()
-        self._output.sync()
+    def _finish(self) -> RecordingSummary:
+        if not self._failure:
+            try:
+                if self._drops:
+                    figures = {stream: str(count) for stream, count in self._drops.items()}
+                    self._writer.add_metadata("aerodaas.drops", figures)
+                self._writer.finish()
+                self._output.sync()
+            except OSError as error:
+                self._fail(error)
+        with suppress(OSError):
+            self._output.close()
+        return RecordingSummary(
+            path=self.path,
+            channels=dict(self._counts),
+            drops=dict(self._drops),
+            duration=seconds(self._last - (self._first or 0)),
+            size=self._output.tell(),
+            stopped=self._failure,
+        )
 
     def _fail(self, error: OSError) -> None:
         self._failure = (

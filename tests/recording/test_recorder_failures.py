@@ -76,8 +76,10 @@ def test_a_disk_that_fills_up_is_told_once_and_costs_what_follows(
     made.write(text("kept"))
     made.flush()
     disk.full = True
+    made.write(text(LONG))
+    made.flush()
     with pytest.raises(RecordingError, match="No space left") as told:
-        made.write(text(LONG))
+        made.write(text("refused"))
     assert str(path) in str(told.value)
     assert "free space on the disk" in str(told.value)
     disk.full = False
@@ -86,7 +88,7 @@ def test_a_disk_that_fills_up_is_told_once_and_costs_what_follows(
     made.drops("cam", 4)
     summary = made.close()
     assert summary.stopped == str(told.value)
-    assert summary.drops == {"nav/note": 2, "nav/other": 1, "cam": 4}
+    assert summary.drops == {"nav/note": 3, "nav/other": 1, "cam": 4}
     assert summary.size == path.stat().st_size
     assert lines(path) == ["kept"]
 

