@@ -6,7 +6,7 @@ import socket
 import threading
 from types import TracebackType
 
-from mavlink_flights import LOOPBACK
+from emulated import LOOPBACK
 from typing_extensions import Self
 
 __all__ = ["Router"]

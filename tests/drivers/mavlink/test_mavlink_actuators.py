@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from payload_flights import fly_to
-from stepped import Stepped
+from emulated import Stepped
 
 from aerodaas.config.actuators import (
     ActuatorConfig,
@@ -224,7 +223,7 @@ def fly(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Miss
         Waypoint("a", 3, 0, 2, actuate={"hatch": "open", "hook": "release"}),
         Waypoint("b", 3, 3, 2, hover_duration=2.5, actuate={"hatch": "closed"}),
     ]
-    return fly_to(ends, stops, MissionConfig(actuator_timeout=4.0), each)
+    return ends.mission(stops, MissionConfig(actuator_timeout=4.0), ends.vehicle).fly(each)
 
 
 def test_a_mission_drops_its_load(ends: Stepped) -> None:

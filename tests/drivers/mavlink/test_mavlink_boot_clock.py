@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from emulated import Flight, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
-from mavlink_flights import Pair, flight, wait_for
 
 from aerodaas.drivers.mavlink.state.boot_clock import BootClock
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -178,36 +178,36 @@ def test_one_contradiction_is_doubted_and_two_are_a_start_anew() -> None:
     assert world.now - doubted < 2.0
 
 
-def test_states_tell_its_clock_and_how_surely() -> None:
+def test_states_tell_its_clock_and_how_surely(flight: Flight) -> None:
     """By exchanges with an emulated vehicle, and anew when that starts anew."""
 
-    def clock(pair: Pair) -> float:
+    def clock(pair: Stepped) -> float:
         return pair.autopilot.firmware.now
 
-    def right(pair: Pair) -> bool:
+    def right(pair: Stepped) -> bool:
         extra = pair.vehicle.read().extra
         near = abs(extra["autopilot_time"] - clock(pair)) < 0.5
         return near and extra.get("autopilot_time_error", 1.0) < 0.5
 
-    with flight(fallback="ignore") as pair:
-        wait_for(lambda: right(pair))
+    with flight() as pair:
+        pair.wait(lambda: right(pair))
         pair.autopilot.firmware.now += 100.0
-        wait_for(lambda: pair.vehicle.telemetry.boot_time > 100.0)
+        pair.wait(lambda: pair.vehicle.telemetry.boot_time > 100.0)
         pair.autopilot.restart()
-        wait_for(lambda: pair.vehicle.telemetry.reboots == 1)
-        wait_for(lambda: right(pair))
+        pair.wait(lambda: pair.vehicle.telemetry.reboots == 1)
+        pair.wait(lambda: right(pair))
 
 
 @pytest.mark.slow
-def test_an_uplink_that_is_lost_alone_is_told() -> None:
+def test_an_uplink_that_is_lost_alone_is_told(flight: Flight) -> None:
     """The vehicle is heard and answers nothing; as soon as it answers again all is well."""
 
-    def deaf(pair: Pair) -> bool:
+    def deaf(pair: Stepped) -> bool:
         return any(fault.startswith("link:") for fault in pair.vehicle.read().faults)
 
     with flight() as pair:
-        wait_for(lambda: "autopilot_time_error" in pair.vehicle.read().extra)
+        pair.wait(lambda: "autopilot_time_error" in pair.vehicle.read().extra)
         pair.autopilot.spoil(up=Impairment(loss=1.0))
-        wait_for(lambda: deaf(pair))
+        pair.wait(lambda: deaf(pair))
         pair.autopilot.spoil(up=Impairment())
-        wait_for(lambda: not deaf(pair))
+        pair.wait(lambda: not deaf(pair))

@@ -6,10 +6,9 @@ import math
 from dataclasses import replace
 
 import pytest
+from emulated import Stepped, told
 from hypothesis import given
 from hypothesis import strategies as st
-from payload_flights import fly_to, found, outcome, take, told, wait
-from stepped import Stepped
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.config.preflight import PreflightConfig
@@ -45,8 +44,8 @@ def payload(ends: Stepped) -> EmulatedPayload:
 
 def ready(ends: Stepped) -> None:
     """Wait until the camera has told how many pictures it took."""
-    found(ends)
-    wait(ends, lambda: [one.taken for one in ends.vehicle.payload.cameras()] != [None])
+    ends.find_payload()
+    ends.wait(lambda: [one.taken for one in ends.vehicle.payload.cameras()] != [None])
 
 
 def camera_item(ends: Stepped, **policy: str) -> HealthItem | None:
@@ -90,8 +89,8 @@ def test_a_camera_that_knows_the_former_requests_alone(ends: Stepped) -> None:
         camera.former = True
         payload(ends).free, payload(ends).video = 12_000.0, "rtsp://127.0.0.1/main"
         ready(ends)
-        wait(ends, lambda: ends.vehicle.payload.cameras()[0].free == 12_000.0)
-        wait(ends, ends.vehicle.payload.streams)
+        ends.wait(lambda: ends.vehicle.payload.cameras()[0].free == 12_000.0)
+        ends.wait(ends.vehicle.payload.streams)
         wanted = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
         ends.watch(8.0)
         newer = [one.command for one in camera.heard if one.get_type() == "COMMAND_LONG"]
@@ -142,11 +141,11 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
         ends.vehicle.payload.clock = clock
         payload(ends).mute = True
         asked = ends.now
-        number = take(ends)
+        number = ends.take_photo()
         # Time and place are those of the camera's word, not of its count.
-        wait(ends, lambda: payload(ends).taken)
+        ends.wait(lambda: payload(ends).taken)
         clock.advance_to(NANOSECONDS)
-        photo = outcome(ends, 6.0)
+        photo = ends.photo_outcome(6.0)
         assert isinstance(photo, Photo)
         assert photo.stamp == 0
         assert (photo.number, photo.label, photo.place, photo.file) == (number, "wp1", None, "")
@@ -155,8 +154,8 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
         assert ends.now - asked < 4.0
         # The next one is told as ever, with its own name.
         payload(ends).mute = False
-        second = take(ends)
-        photo = outcome(ends)
+        second = ends.take_photo()
+        photo = ends.photo_outcome()
         assert isinstance(photo, Photo)
         assert (photo.number, photo.file) == (second, "DCIM/0002.JPG")
         (status,) = ends.vehicle.payload.cameras()
@@ -168,14 +167,14 @@ def test_a_message_that_comes_late_is_no_second_picture(ends: Stepped) -> None:
     with ends:
         ready(ends)
         payload(ends).mute = True
-        take(ends)
-        assert isinstance(outcome(ends, 6.0), Photo)
-        second = take(ends, "wp2")
+        ends.take_photo()
+        assert isinstance(ends.photo_outcome(6.0), Photo)
+        second = ends.take_photo("wp2")
         late = mavlink.MAVLink_camera_image_captured_message(
             0, 0, 1, 0, 0, 0, 0, [1.0, 0, 0, 0], 0, 1, b"DCIM/0001.JPG"
         )
         ends.autopilot.components[CAMERA].say(late)
-        photo = outcome(ends, 6.0)
+        photo = ends.photo_outcome(6.0)
         assert isinstance(photo, Photo)
         assert (photo.number, photo.label, photo.file) == (second, "wp2", "")
 
@@ -196,12 +195,12 @@ def _busy(camera: EmulatedPayload) -> None:
 def test_a_picture_that_nothing_tells_of_is_lost(ends: Stepped, strike: object) -> None:
     """Not taken; no count; or the camera takes others by itself, and whose is it then."""
     with ends:
-        found(ends)
+        ends.find_payload()
         assert callable(strike)
         strike(payload(ends))
         ends.watch(12.0)
-        number = take(ends)
-        failure = outcome(ends, 10.0)
+        number = ends.take_photo()
+        failure = ends.photo_outcome(10.0)
         assert failure == PhotoFailure(number, "the camera does not tell of the picture")
 
 
@@ -214,9 +213,9 @@ def test_a_survey_goes_on_where_messages_are_lost(ends: Stepped) -> None:
     with ends:
         ready(ends)
         payload(ends).mute = True
-        mission = fly_to(ends, stops, MissionConfig(photo_timeout=6.0))
+        mission = ends.mission(stops, MissionConfig(photo_timeout=6.0), ends.vehicle).fly()
         assert mission.status.photos == (2, 0)
-        assert told(mission) == []
+        assert told(mission, "photo") == []
 
 
 @given(
@@ -285,19 +284,19 @@ def test_zoom_and_focus_are_set_in_percent(ends: Stepped) -> None:
     """Acknowledged before it counts; what the camera says that it has not is refused at once."""
     with ends:
         payload(ends).flags = ABLE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS
-        found(ends)
+        ends.find_payload()
         camera = lens_of(ends)
         camera.adjust(LensTarget(40.0, 100.0))
         assert not camera.adjusted
-        wait(ends, lambda: camera.adjusted)
+        ends.wait(lambda: camera.adjusted)
         assert payload(ends).lens == {"zoom": 40.0, "focus": 100.0}
         payload(ends).lens_refuses = True
         camera.adjust(LensTarget(10.0))
-        wait(ends, lambda: camera.lens_fault)
+        ends.wait(lambda: camera.lens_fault)
         assert (camera.adjusted, camera.lens_fault) == (False, "zoom: denied")
         payload(ends).lens_refuses = False
         camera.adjust(LensTarget(20.0))
-        wait(ends, lambda: camera.adjusted)
+        ends.wait(lambda: camera.adjusted)
         assert payload(ends).lens["zoom"] == 20.0
 
 
@@ -305,13 +304,13 @@ def test_a_lens_without_zoom_or_focus_is_told(ends: Stepped) -> None:
     """By the flags of its CAMERA_INFORMATION; the drone flies on."""
     with ends:
         payload(ends).flags = ABLE
-        found(ends)
+        ends.find_payload()
         with pytest.raises(VehicleError, match="focus of the camera cannot be set"):
             lens_of(ends).adjust(LensTarget(focus=3.0))
         stop = Waypoint("a", 3, 0, 2, zoom=30.0, focus=5.0, photo=True)
-        mission = fly_to(ends, [stop], MissionConfig(photo_timeout=4.0))
+        mission = ends.mission([stop], MissionConfig(photo_timeout=4.0), ends.vehicle).fly()
         assert mission.status.photos == (0, 1)
-        assert told(mission) == ["a: no picture: the focus of the camera cannot be set"]
+        assert told(mission, "photo") == ["a: no picture: the focus of the camera cannot be set"]
         camera = lens_of(ends)
         ends.autopilot.components[CAMERA].vanished = True
         ends.watch(6.0)

@@ -7,8 +7,7 @@ import socket
 from collections.abc import Callable
 
 import pytest
-from payload_flights import fly, found, outcome, take, told
-from stepped import Stepped
+from emulated import Stepped, fly_pictures, told
 
 from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -40,7 +39,7 @@ def commands(ends: Stepped, component: int, number: int) -> int:
 def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Stepped) -> None:
     """Pictures by the camera, angles by the gimbal; the autopilot gets none of it."""
     with ends:
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         gimbal.aim(GimbalTarget(-0.8, 0.5))
@@ -50,8 +49,8 @@ def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Ste
         seen = ends.vehicle.read().gimbal
         assert seen is not None
         assert (seen.pitch, seen.yaw) == pytest.approx((-0.8, 0.5))
-        take(ends)
-        photo = outcome(ends)
+        ends.take_photo()
+        photo = ends.photo_outcome()
         assert isinstance(photo, Photo)
         assert photo.gimbal is not None
         assert photo.file == "DCIM/0001.JPG"
@@ -67,9 +66,9 @@ def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Ste
 def test_a_mission_takes_its_pictures_with_them(ends: Stepped) -> None:
     """As with what the autopilot manages."""
     with ends:
-        mission = fly(ends)
+        mission = fly_pictures(ends)
         assert mission.state is MissionState.LANDED, mission.status.reason
-        assert told(mission) == []
+        assert told(mission, "photo") == []
         first, second = mission.photographer.photos
         assert first.gimbal is not None
         assert second.gimbal is not None
@@ -106,20 +105,20 @@ def test_what_fails_in_flight_costs_the_second_picture_alone(
             strike(ends)
 
     with ends:
-        mission = fly(ends, each)
+        mission = fly_pictures(ends, each)
         assert mission.state is MissionState.LANDED, mission.status.reason
         assert list(mission.status.visited) == ["a", "b"]
         assert mission.status.photos == (1, 1)
-        assert any(text.startswith("b: no picture: ") for text in told(mission))
+        assert any(text.startswith("b: no picture: ") for text in told(mission, "photo"))
 
 
 def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
     """A picture that is awaited is given up; with its next heartbeat it is back."""
     with ends:
-        found(ends)
-        number = take(ends)
+        ends.find_payload()
+        number = ends.take_photo()
         ends.autopilot.components[CAMERA].vanished = True
-        failure = outcome(ends, 7.0)
+        failure = ends.photo_outcome(7.0)
         assert isinstance(failure, PhotoFailure)
         assert failure.number == number
         assert "says nothing any more" in failure.reason
@@ -129,8 +128,8 @@ def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
         ends.autopilot.components[CAMERA].vanished = False
         ends.watch(2.0)
         assert ends.vehicle.read().faults == ()
-        assert take(ends) > number
-        assert isinstance(outcome(ends), Photo)
+        assert ends.take_photo() > number
+        assert isinstance(ends.photo_outcome(), Photo)
 
 
 def test_a_camera_that_comes_late_is_found_in_flight(ends: Stepped) -> None:
@@ -142,7 +141,7 @@ def test_a_camera_that_comes_late_is_found_in_flight(ends: Stepped) -> None:
         assert ends.vehicle.photo_camera is None
         for component in ends.autopilot.components.values():
             component.vanished = False
-        found(ends)
+        ends.find_payload()
 
 
 def test_one_that_answered_nothing_is_asked_anew_when_it_is_back(ends: Stepped) -> None:
@@ -158,7 +157,7 @@ def test_one_that_answered_nothing_is_asked_anew_when_it_is_back(ends: Stepped) 
         camera.vanished, camera.stalls = True, False
         ends.watch(7.0)
         camera.vanished = False
-        found(ends)
+        ends.find_payload()
 
 
 def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,10 +168,10 @@ def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) 
         capture = mavlink.MAV_CMD_IMAGE_START_CAPTURE
         numbers = []
         for component in (101, 103, 1):
-            numbers.append(take(ends))
+            numbers.append(ends.take_photo())
             ends.watch(1.0)
             assert commands(ends, component, capture) == 1
-            photo = outcome(ends)
+            photo = ends.photo_outcome()
             assert isinstance(photo, Photo)
             assert photo.number == numbers[-1]
             if component != 1:
@@ -256,8 +255,8 @@ def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, comp
         ((name, stream),) = ends.vehicle.payload.streams()
         assert str(stream) == "rtsp://10.0.0.9:8554/main (main), 1920x1080, 30/s"
         assert name == ("the autopilot's camera" if component == 1 else "camera (component 100)")
-        take(ends)
-        assert isinstance(outcome(ends), Photo)
+        ends.take_photo()
+        assert isinstance(ends.photo_outcome(), Photo)
         payload.video = "rtsp://10.6.6.6/other"
         ends.watch(8.0)
         assert ends.vehicle.read().video == state.video

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from mavlink_flights import wait_for
+from emulated import wait_for
 from rtcm_station import BaseStation, rtcm
 
 from aerodaas.drivers.mavlink.wire import corrections as module

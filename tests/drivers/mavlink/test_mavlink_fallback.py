@@ -8,21 +8,20 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mavlink_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
+from autopilot import robot_of
+from emulated import LOOPBACK, Flight, Stepped, free_port, inject, wait_for
 from typing_extensions import Self
 
-from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
-from aerodaas.drivers.mavlink.microservices import journal, parameters, plans
+from aerodaas.drivers.mavlink.microservices import journal
 from aerodaas.drivers.mavlink.microservices.journal import (
     Changes,
     Journal,
@@ -33,7 +32,7 @@ from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 from tools.mavlink_vehicle.store import PlanStore
@@ -42,24 +41,12 @@ TESTS = Path(__file__).parents[2]
 ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
 AS_PX4 = AutopilotOptions(family="px4", ready_after=0.0)
 WAY = [[6.0, 6.0, 4.0], [6.0, 0.0, 3.0]]
-SENDER = mavlink.MAVLink(None, 1, 1)
 OWN = {"FS_GCS_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
 """What its owner has set, and what is set for a flight."""
 OURS = {"FS_GCS_ENABLE": 1.0, "MAV_GCS_SYSID": 245.0, "FS_OPTIONS": 24.0}
 
 
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait less for an autopilot that says nothing."""
-    for module, name, seconds in (
-        (parameters, "_TIMEOUT", 0.1),
-        (plans, "_TIMEOUT", 0.1),
-        (plans, "_ITEM_TIMEOUT", 0.02),
-    ):
-        monkeypatch.setattr(module, name, seconds)
-
-
-def values(pair: Pair) -> dict[str, float]:
+def values(pair: Stepped) -> dict[str, float]:
     """What is set on the vehicle, of what matters here."""
     held = pair.autopilot.firmware.parameters.values
     return {name: held[name] for name in OWN}
@@ -69,39 +56,6 @@ def mission(autopilot: EmulatedAutopilot) -> list[int]:
     """Commands of the mission that it holds."""
     held = autopilot.firmware.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, [])
     return [item.command for item in held]
-
-
-@contextmanager
-def started(
-    options: AutopilotOptions,
-    **settings: Any,  # noqa: ANN401
-) -> Iterator[tuple[EmulatedAutopilot, MavlinkVehicle]]:
-    """Both ends, not connected yet."""
-    port = free_port()
-    robot = robot_of(port, **settings)
-    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
-    with EmulatedAutopilot(replace(options, peer=(LOOPBACK, port))) as autopilot:
-        yield autopilot, vehicle
-        vehicle.close()
-
-
-@contextmanager
-def again(pair: Pair, **settings: Any) -> Iterator[MavlinkVehicle]:  # noqa: ANN401
-    """Another process' driver of the same vehicle."""
-    robot = robot_of(int(pair.robot.settings["url"].rpartition(":")[2]), **settings)
-    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
-    vehicle.connect()
-    try:
-        yield vehicle
-    finally:
-        vehicle.close()
-
-
-def die(pair: Pair) -> None:
-    """As when our process is killed: the wire is cut, nobody says goodbye."""
-    assert pair.vehicle._link is not None
-    pair.vehicle._link.close()
-    pair.vehicle._link = None
 
 
 @pytest.mark.slow
@@ -167,17 +121,17 @@ def away(autopilot: EmulatedAutopilot) -> float:
     return float(np.linalg.norm(autopilot.truth.position[:2]))
 
 
-def test_its_place_in_its_own_mission_is_told() -> None:
+def test_its_place_in_its_own_mission_is_told(flight: Flight) -> None:
     """As far as it tells it."""
     with flight(ARDUPILOT, fallback="set", way_home=WAY) as pair:
-        wait_for(lambda: "mission_item" in pair.vehicle.read().extra)
+        pair.wait(lambda: "mission_item" in pair.vehicle.read().extra)
         assert pair.vehicle.read().extra["mission_item"] == 0.0
         assert "mission_reached" not in pair.vehicle.read().extra
-        pair.autopilot.inject(mavlink.MAVLink_mission_item_reached_message(3).pack(SENDER))
-        wait_for(lambda: pair.vehicle.read().extra.get("mission_reached") == 3.0)
+        inject(pair, mavlink.MAVLink_mission_item_reached_message(3))
+        pair.wait(lambda: pair.vehicle.read().extra.get("mission_reached") == 3.0)
 
 
-def test_the_owner_gets_everything_back(state_folder: Path) -> None:
+def test_the_owner_gets_everything_back(flight: Flight, state_folder: Path) -> None:
     """While we are connected it would come home; afterwards it is as it was."""
     with flight(ARDUPILOT, fallback="set") as pair:
         assert values(pair) == OURS
@@ -188,7 +142,7 @@ def test_the_owner_gets_everything_back(state_folder: Path) -> None:
     assert not list(state_folder.rglob("*.json"))
 
 
-def test_what_is_set_already_is_left_alone(state_folder: Path) -> None:
+def test_what_is_set_already_is_left_alone(flight: Flight, state_folder: Path) -> None:
     """Nothing is written to a vehicle that comes home by its owner's own settings."""
     options = AutopilotOptions(
         family="ardupilot", ready_after=0.0, parameters={**OURS, "FS_GCS_ENABLE": 3.0}
@@ -200,7 +154,9 @@ def test_what_is_set_already_is_left_alone(state_folder: Path) -> None:
 
 
 @pytest.mark.parametrize("policy", ["report", "require", "ignore"])
-def test_nothing_is_changed_unasked(policy: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_nothing_is_changed_unasked(
+    flight: Flight, policy: str, caplog: pytest.LogCaptureFixture
+) -> None:
     """It is told, and with "require" it does not take off; only "set" sets."""
     with flight(ARDUPILOT, fallback=policy) as pair:
         reasons = pair.vehicle.preflight()
@@ -215,51 +171,51 @@ def test_nothing_is_changed_unasked(policy: str, caplog: pytest.LogCaptureFixtur
         assert not pair.heard("PARAM_SET")
 
 
-def test_who_only_watches_changes_nothing(state_folder: Path) -> None:
+def test_who_only_watches_changes_nothing(flight: Flight, state_folder: Path) -> None:
     """By the driver's own settings for that, over those of a flight that sets all there is."""
     wanted = {"fallback": "set", "failsafes": "set", "fence": "land", "way_home": WAY}
-    with started(ARDUPILOT, **{**wanted, **MavlinkVehicle.observing}) as (autopilot, vehicle):
-        held = autopilot.firmware.parameters.values
+    with flight(ARDUPILOT, **{**wanted, **MavlinkVehicle.observing}).unconnected() as ends:
+        held = ends.firmware.parameters.values
         before = dict(held)
-        vehicle.connect()
+        ends.vehicle.connect()
         assert held == before
-        assert not any(autopilot.firmware.plans.plans.values())
-        vehicle.close()
+        assert not any(ends.firmware.plans.plans.values())
+        ends.vehicle.close()
         assert held == before
     assert not any(state_folder.rglob("*.json"))
 
 
 def test_after_a_kill_the_next_flight_puts_it_back(
-    state_folder: Path, caplog: pytest.LogCaptureFixture
+    flight: Flight, state_folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """With the values of before the first flight; a flight that sets nothing says what is due."""
     with flight(ARDUPILOT, fallback="set") as pair:
-        die(pair)
+        pair.die()
         caplog.clear()
-        with again(pair, fallback="report") as vehicle:
+        with pair.again(fallback="report") as vehicle:
             assert vehicle.preflight() == []
         assert "FS_GCS_ENABLE 0" in caplog.text
         assert "--restore" in caplog.text
         assert values(pair) == OURS
-        with again(pair, fallback="set", way_home="retrace"):
+        with pair.again(fallback="set", way_home="retrace"):
             assert values(pair) == {**OURS, "FS_GCS_ENABLE": 3.0}
         assert values(pair) == OWN
         assert not list(state_folder.rglob("*.json"))
 
 
-def test_who_only_watches_puts_nothing_back() -> None:
+def test_who_only_watches_puts_nothing_back(flight: Flight) -> None:
     """Nor does it, where a flight was killed: that is the next flight's to do."""
     with flight(ARDUPILOT, fallback="set") as pair:
-        die(pair)
-        with again(pair, fallback="set", **MavlinkVehicle.observing):
+        pair.die()
+        with pair.again(fallback="set", **MavlinkVehicle.observing):
             pass
         assert values(pair) == OURS
-        with again(pair, fallback="set"):
+        with pair.again(fallback="set"):
             pass
         assert values(pair) == OWN
 
 
-def test_what_its_owner_sets_meanwhile_stays() -> None:
+def test_what_its_owner_sets_meanwhile_stays(flight: Flight) -> None:
     """By a ground station beside us: not our value any more, so not ours to put back."""
     with flight(ARDUPILOT, fallback="set") as pair:
         held = pair.autopilot.firmware.parameters.values
@@ -267,28 +223,28 @@ def test_what_its_owner_sets_meanwhile_stays() -> None:
     assert values(pair) == {**OWN, "FS_OPTIONS": 25.0}
 
 
-def test_in_flight_it_stays_set() -> None:
+def test_in_flight_it_stays_set(flight: Flight) -> None:
     """What brings it home is not taken from it before it is home."""
     with flight(ARDUPILOT, fallback="set") as pair:
         connection = pair.vehicle.connection
-        connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
-        wait_for(lambda: pair.vehicle.read().armed)
+        connection.commander.give(connection.autopilot.arm(), now=pair.now)
+        pair.wait(lambda: pair.vehicle.read().armed)
         pair.vehicle.close()
         assert values(pair) == OURS
 
 
-def test_older_firmware_has_other_names() -> None:
+def test_older_firmware_has_other_names(flight: Flight) -> None:
     """ArduCopter before 4.7: SYSID_MYGCS, and heights in centimetres."""
     options = AutopilotOptions(
         family="ardupilot",
         parameters={"SYSID_MYGCS": 255.0, "RTL_ALT": 1500.0, "RTL_ALT_FINAL": 200.0},
     )
     limits = {"geofence": {"ceiling": 10.0}}
-    with started(options, fallback="set", limits=limits) as (autopilot, vehicle):
-        held = autopilot.firmware.parameters.values
+    with flight(options, fallback="set", limits=limits).unconnected() as ends:
+        held = ends.firmware.parameters.values
         for name in ("MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "RTL_ALT_M", "RTL_ALT_FINAL_M"):
             held.pop(name)
-        vehicle.connect()
+        ends.vehicle.connect()
         changed = held["SYSID_MYGCS"], held["RTL_ALT"], held["RTL_ALT_FINAL"]
         assert changed == (245.0, 800.0, 0.0)
     assert (held["SYSID_MYGCS"], held["RTL_ALT"], held["RTL_ALT_FINAL"]) == (255.0, 1500.0, 200.0)
@@ -314,7 +270,7 @@ KEEPING_AWAY = {
 
 
 @pytest.mark.parametrize("family", ["ardupilot", "px4"])
-def test_each_that_keeps_it_away_is_named(family: str) -> None:
+def test_each_that_keeps_it_away_is_named(flight: Flight, family: str) -> None:
     """One at a time, with all others as they should be."""
     good = OURS if family == "ardupilot" else {"COM_OBL_RC_ACT": 3.0}
     options = AutopilotOptions(family=family, ready_after=0.0, parameters=good)  # type: ignore[arg-type]
@@ -353,7 +309,7 @@ def test_what_is_judged_goes_with_role_version_and_way() -> None:
         assert fitting == ([1, 3, 6] if way == "return" else [value])
 
 
-def test_the_way_home_takes_the_owners_mission_for_a_flight() -> None:
+def test_the_way_home_takes_the_owners_mission_for_a_flight(flight: Flight) -> None:
     """Their own comes back, item by item."""
     own = [
         MissionItem(16, (0.0, 0.0, 0.0, 0.0), 1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL),
@@ -362,9 +318,9 @@ def test_the_way_home_takes_the_owners_mission_for_a_flight() -> None:
     with flight(ARDUPILOT, fallback="ignore") as pair:
         pair.vehicle.upload_mission(own)
         pair.vehicle.close()
-        with again(pair, fallback="set", way_home=WAY):
+        with pair.again(fallback="set", way_home=WAY):
             assert mission(pair.autopilot) == [16, 188, 16, 16, 21]
-        with again(pair, fallback="ignore") as vehicle:
+        with pair.again(fallback="ignore") as vehicle:
             assert vehicle.download_mission() == own
 
 
@@ -409,7 +365,6 @@ class Faulty(PlanStore):
         return super().handle(message)
 
 
-@pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize(
     ("fault", "word"),
     [
@@ -421,16 +376,16 @@ class Faulty(PlanStore):
     ],
 )
 def test_a_way_home_that_is_not_there_is_no_fallback(
-    fault: str, word: str, state_folder: Path
+    flight: Flight, fault: str, word: str, state_folder: Path
 ) -> None:
     """The connection fails, so that nothing takes off, and the vehicle is as it was."""
-    with started(ARDUPILOT, fallback="set", way_home=WAY) as (autopilot, vehicle):
-        autopilot.firmware.plans = store = Faulty(fault, autopilot)
+    with flight(ARDUPILOT, fallback="set", way_home=WAY).unconnected() as ends:
+        ends.firmware.plans = store = Faulty(fault, ends.autopilot)
         with pytest.raises(VehicleError, match=f"(?s){word}"):
-            vehicle.connect()
-        assert not vehicle.connected
-        assert autopilot.firmware.motions == []
-        held = autopilot.firmware.parameters.values
+            ends.vehicle.connect()
+        assert not ends.vehicle.connected
+        assert ends.firmware.motions == []
+        held = ends.firmware.parameters.values
         assert {name: held[name] for name in OWN} == OWN
         assert bool(list(state_folder.rglob("*.json"))) is (fault == "vanishes")
         if fault != "vanishes":
@@ -461,59 +416,47 @@ def test_a_way_home_keeps_to_the_geofence(way: list[tuple[float, float, float]],
     assert (landing.x, landing.y) == (470_000_000, 80_000_000)
 
 
-def test_px4_flies_no_way_home_of_ours() -> None:
+def test_px4_flies_no_way_home_of_ours(flight: Flight) -> None:
     """Its mission return goes by the mission's progress: said, nothing is changed."""
     with (
-        started(AS_PX4, fallback="set", way_home="retrace") as (_, vehicle),
+        flight(AS_PX4, fallback="set", way_home="retrace").unconnected() as ends,
         pytest.raises(VehicleError, match=r'PX4 cannot fly this settings.way_home.*"return"'),
     ):
-        vehicle.connect()
+        ends.vehicle.connect()
 
 
-@pytest.mark.usefixtures("impatient")
-def test_a_parameter_that_is_not_told_is_no_fallback() -> None:
+def test_a_parameter_that_is_not_told_is_no_fallback(flight: Flight) -> None:
     """Unknown is not good, and nothing is set half."""
-    with started(ARDUPILOT, fallback="set") as (autopilot, vehicle):
-        autopilot.firmware.parameters.values.pop("FS_GCS_ENABLE")
+    with flight(ARDUPILOT, fallback="set").unconnected() as ends:
+        ends.firmware.parameters.values.pop("FS_GCS_ENABLE")
         with pytest.raises(VehicleError, match="does not tell FS_GCS_ENABLE"):
-            vehicle.connect()
-        held = autopilot.firmware.parameters.values
+            ends.vehicle.connect()
+        held = ends.firmware.parameters.values
         assert held["MAV_GCS_SYSID"] == 255.0
 
 
-def test_a_journal_that_cannot_be_read_stops_it(state_folder: Path) -> None:
+def test_a_journal_that_cannot_be_read_stops_it(flight: Flight, state_folder: Path) -> None:
     """Rather than to forget what the vehicle was like."""
     with flight(ARDUPILOT, fallback="set") as pair:
-        die(pair)
+        pair.die()
         (file,) = state_folder.rglob("*.json")
         file.write_text('{"parameters": {"FS_')
-        port = int(pair.robot.settings["url"].rpartition(":")[2])
-        robot = robot_of(port, fallback="set")
-        vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
-        with pytest.raises(VehicleError, match="cannot be read: compare its parameters"):
-            vehicle.connect()
+        wrong = pytest.raises(VehicleError, match="cannot be read: compare its parameters")
+        with wrong, pair.again(fallback="set"):
+            pass
 
 
-def test_a_journal_that_cannot_be_written_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_journal_that_cannot_be_written_changes_nothing(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """First it is kept, then it is changed."""
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(journal, "write_private", full)
-    with started(ARDUPILOT, fallback="set") as (autopilot, vehicle):
+    with flight(ARDUPILOT, fallback="set").unconnected() as ends:
         with pytest.raises(VehicleError, match=r"so nothing is.*XDG_STATE_HOME"):
-            vehicle.connect()
-        held = autopilot.firmware.parameters.values
+            ends.vehicle.connect()
+        held = ends.firmware.parameters.values
         assert {name: held[name] for name in OWN} == OWN
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [{"way_home": []}, {"way_home": "loiter"}, {"fallback_after": 1}, {"fallback": "on"}],
-)
-def test_settings_of_a_fallback_are_checked(settings: dict[str, object]) -> None:
-    """By name, before anything is connected."""
-    robot = robot_of(1, **settings)
-    with pytest.raises(ConfigError, match=next(iter(settings))):
-        MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stepped import Stepped
-from stepped_missions import started
+from autopilot import SETPOINT
+from emulated import FAMILIES, FlownMission, Stepped, inject
 
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
@@ -32,91 +32,37 @@ from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.flight import MavFlight
 
-FAMILIES = ["ardupilot", "px4"]
 SQUARE = [
     Waypoint("a", 0, 15, 3),
     Waypoint("b", 15, 15, 3, hover_duration=2.0),
     Waypoint("c", 15, 0, 3, speed=1.0),
     Waypoint("d", 5, 0, 3),
 ]
-SENDER = mavlink.MAVLink(None, 1, 1)
 LIMITS = {"cruise_speed": 3.0, "takeoff_height": 3.0, "arrival_radius": 0.5}
 
 
-class Handed:
-    """A mission on an emulated autopilot, turn by turn."""
-
-    def __init__(self, ends: Stepped, stops: list[Waypoint]) -> None:
-        self.ends = ends
-        self.loop = started(ends, stops, payload=ends.vehicle)
-        self.mission = self.loop.mission
-        self.neighbours: list[Neighbour] = []
-        self.states: list[S] = []
-
-    def turn(self) -> None:
-        """One turn of the loop."""
-        self.ends.advance(0.05)
-        self.loop.turn(self.now, self.neighbours)
-        if self.states[-1:] != [self.mission.state]:
-            self.states.append(self.mission.state)
-
-    @property
-    def now(self) -> int:
-        """The mission's clock, nanoseconds."""
-        return round(self.ends.now * 1e9)
-
-    def until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Turn until it holds."""
-        end = self.ends.now + seconds
-        while not condition():
-            assert self.ends.now < end, self.story
-            self.turn()
+class Handed(FlownMission):
+    """A mission whose waypoints are handed over to the autopilot."""
 
     def tell(self, command: Command) -> Answer:
         """Give the mission a command."""
-        return self.mission.handle(command, self.now)
+        return self.mission.handle(command, self.now())
 
     def hand_over(self) -> None:
         """On the way to the first waypoint, and wait until the autopilot flies."""
-        self.until(lambda: self.mission.state is S.ENROUTE)
+        self.until(S.ENROUTE)
         answer = self.tell(HandOver())
         assert answer.accepted, answer.text
         self.until(lambda: self.mission.handover.flies)
 
     @property
-    def mode(self) -> VehicleMode:
-        """What the vehicle does."""
-        assert self.loop.state is not None
-        return self.loop.state.mode
-
-    @property
-    def told(self) -> list[str]:
-        """Of the hand-over."""
-        return [alert.text for alert in self.mission.alerts if alert.kind == "handover"]
-
-    @property
-    def visited(self) -> list[str]:
-        """Waypoints that count as visited."""
-        return list(self.mission.status.visited)
-
-    @property
-    def story(self) -> str:
-        """For a failed assertion."""
-        status = self.mission.status
-        alerts = [alert.text for alert in self.mission.alerts]
-        return f"{self.states} {status.reason!r} {status.visited} {alerts}"
+    def plan(self) -> list[Any]:
+        """The mission that the autopilot holds."""
+        return self.ends.firmware.plans.plans[mavlink.MAV_MISSION_TYPE_MISSION]
 
     def setpoints(self) -> int:
         """How many the autopilot has heard."""
-        return len(self.heard("SET_POSITION_TARGET_LOCAL_NED"))
-
-    def heard(self, kind: str) -> list[Any]:
-        """Messages that the autopilot has heard."""
-        return [one for _, one in self.ends.autopilot.heard if one.get_type() == kind]
-
-    def say(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Have the vehicle say something."""
-        self.ends.autopilot.inject(message.pack(SENDER))
+        return len(self.ends.heard(SETPOINT))
 
 
 @contextmanager
@@ -130,7 +76,7 @@ def handed(
     limits = {**LIMITS, **settings.pop("limits", {})}
     options = AutopilotOptions(family=family)  # type: ignore[arg-type]
     with Stepped(monkeypatch, options, limits=limits, **settings) as ends:
-        yield Handed(ends, SQUARE if stops is None else stops)
+        yield Handed(ends, SQUARE if stops is None else stops, payload=ends.vehicle)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -138,21 +84,21 @@ def test_the_autopilot_flies_them_all(monkeypatch: pytest.MonkeyPatch, family: s
     """Each waypoint is visited in order, without a setpoint of ours; then the mission goes home."""
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
-        assert flight.mode is VehicleMode.MISSION
+        assert flight.modes[-1] is VehicleMode.MISSION
         sent = flight.setpoints()
         flight.until(lambda: flight.visited == ["a"])
         status = flight.mission.status
         assert status.target is not None
         assert status.target.id == "b"
         assert "mission mode" in status.reason
-        flight.until(lambda: flight.mission.state is S.LOITERING)
+        flight.until(S.LOITERING)
         flight.until(lambda: flight.visited == ["a", "b", "c"])
         assert flight.setpoints() == sent
-        flight.until(lambda: flight.mission.state is S.RETURNING)
+        flight.until(S.RETURNING)
         assert flight.visited == ["a", "b", "c", "d"]
         flight.until(lambda: flight.mission.finished)
         assert flight.mission.state is S.LANDED, flight.story
-        assert flight.told == [
+        assert flight.told("handover") == [
             "handed over to the autopilot: 4 waypoints",
             "the hand-over has ended: all waypoints are flown",
         ]
@@ -167,7 +113,7 @@ def test_what_is_uploaded(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
     """
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
-        plan = flight.ends.autopilot.firmware.plans.plans[mavlink.MAV_MISSION_TYPE_MISSION]
+        plan = flight.plan
         if family == "ardupilot":
             assert plan[0].frame == mavlink.MAV_FRAME_GLOBAL
             plan = plan[1:]
@@ -198,10 +144,10 @@ def test_taken_back_it_flies_on_from_what_was_not_reached(
         flight.until(lambda: flight.visited == ["a"])
         assert flight.tell(TakeBack()).accepted
         assert not flight.tell(TakeBack()).accepted
-        flight.until(lambda: flight.mode is VehicleMode.GUIDED, 5.0)
-        flight.until(lambda: flight.mission.state is S.LANDING, 120.0)
+        flight.until(VehicleMode.GUIDED, 5.0)
+        flight.until(S.LANDING, 120.0)
         assert flight.visited == ["a", "b", "c", "d"]
-        assert flight.told[-1] == "the hand-over has ended: asked to"
+        assert flight.told("handover")[-1] == "the hand-over has ended: asked to"
 
 
 def test_a_stay_goes_on_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,7 +155,7 @@ def test_a_stay_goes_on_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     stay = [Waypoint("a", 0, 8, 3, hover_duration=20.0)]
     with handed(monkeypatch, stops=stay) as flight:
         flight.hand_over()
-        flight.until(lambda: flight.mission.state is S.LOITERING)
+        flight.until(S.LOITERING)
         began = flight.ends.now
         flight.until(lambda: flight.ends.now > began + 12.0)
         flight.tell(TakeBack())
@@ -236,7 +182,7 @@ def test_every_command_takes_them_back(
         flight.turn()
         assert flight.mission.state is state
         assert not flight.mission.handover.active
-        flight.until(lambda: flight.mode is mode, 5.0)
+        flight.until(mode, 5.0)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -245,13 +191,11 @@ def test_taken_back_it_stops_at_once(monkeypatch: pytest.MonkeyPatch, family: st
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
         flight.until(lambda: float(np.linalg.norm(velocity(flight))) > 2.5)
-        for _ in range(20):
-            flight.turn()
-        motions = flight.ends.autopilot.firmware.motions
+        flight.run(1)
+        motions = flight.ends.firmware.motions
         before = len(motions)
         flight.tell(Pause())
-        for _ in range(4):
-            flight.turn()
+        flight.run(0.2)
         assert "hold" in motions[before:]
         flight.until(lambda: float(np.linalg.norm(velocity(flight))) < 0.3, 3.0)
         assert flight.tell(Resume()).accepted
@@ -270,8 +214,11 @@ def test_new_navigation_takes_them_back(monkeypatch: pytest.MonkeyPatch) -> None
         more = AddNavigation(AeroNavigation(data=[Waypoint("e", 0, 5, 3)]))
         assert flight.tell(more).accepted
         flight.turn()
-        assert flight.told[-1] == "the hand-over has ended: what is to be flown has changed"
-        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        assert (
+            flight.told("handover")[-1]
+            == "the hand-over has ended: what is to be flown has changed"
+        )
+        flight.until(S.RETURNING, 120.0)
         assert sorted(flight.visited) == ["a", "b", "c", "d", "e"]
 
 
@@ -280,8 +227,8 @@ def test_a_low_battery_takes_them_back(monkeypatch: pytest.MonkeyPatch) -> None:
     with handed(monkeypatch, limits={"battery_return": 0.85}) as flight:
         flight.hand_over()
         monkeypatch.setattr(MavFlight, "charge", 0.8)
-        flight.until(lambda: flight.mission.state is S.RETURNING, 10.0)
-        flight.until(lambda: flight.mode is VehicleMode.GUIDED, 5.0)
+        flight.until(S.RETURNING, 10.0)
+        flight.until(VehicleMode.GUIDED, 5.0)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -290,11 +237,11 @@ def test_a_lost_link_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: st
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
         flight.ends.autopilot.cut()
-        flight.until(lambda: flight.mission.state is S.RETURNING, 5.0)
-        assert "no word from the vehicle" in flight.told[-1]
+        flight.until(S.RETURNING, 5.0)
+        assert "no word from the vehicle" in flight.told("handover")[-1]
         flight.ends.autopilot.cut(off=False)
-        flight.until(lambda: flight.mode is VehicleMode.GUIDED, 10.0)
-        flight.until(lambda: flight.mission.state is S.LANDED, 60.0)
+        flight.until(VehicleMode.GUIDED, 10.0)
+        flight.until(S.LANDED, 60.0)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -307,13 +254,13 @@ def test_a_short_loss_of_the_link_leaves_them_handed_over(
         flight.ends.autopilot.cut()
         cut = flight.ends.now
         flight.until(lambda: flight.ends.now > cut + 4.0)
-        assert flight.mode is VehicleMode.LOST
+        assert flight.modes[-1] is VehicleMode.LOST
         assert flight.mission.handover.flies, flight.story
         flight.ends.autopilot.cut(off=False)
-        flight.until(lambda: flight.mode is VehicleMode.MISSION, 3.0)
-        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        flight.until(VehicleMode.MISSION, 3.0)
+        flight.until(S.RETURNING, 120.0)
         assert flight.visited == ["a", "b", "c", "d"]
-        assert flight.told[1:] == ["the hand-over has ended: all waypoints are flown"]
+        assert flight.told("handover")[1:] == ["the hand-over has ended: all waypoints are flown"]
 
 
 def test_a_stall_of_the_whole_process_leaves_them_handed_over(
@@ -323,11 +270,11 @@ def test_a_stall_of_the_whole_process_leaves_them_handed_over(
     with handed(monkeypatch) as flight:
         flight.hand_over()
         for _ in range(200):
-            flight.ends.now += 0.01
+            flight.ends.clock.now += 0.01
             flight.ends.autopilot.turn(flight.ends.now)
-        flight.until(lambda: flight.mode is VehicleMode.MISSION, 3.0)
-        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
-        assert flight.told[1:] == ["the hand-over has ended: all waypoints are flown"]
+        flight.until(VehicleMode.MISSION, 3.0)
+        flight.until(S.RETURNING, 120.0)
+        assert flight.told("handover")[1:] == ["the hand-over has ended: all waypoints are flown"]
 
 
 def test_a_loop_that_hangs_is_told_as_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,7 +283,7 @@ def test_a_loop_that_hangs_is_told_as_the_reason(monkeypatch: pytest.MonkeyPatch
         flight.hand_over()
         flight.ends.advance(2.0)
         flight.until(lambda: not flight.mission.handover.flies, 3.0)
-        assert "the control loop hung" in flight.told[-1]
+        assert "the control loop hung" in flight.told("handover")[-1]
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -347,16 +294,16 @@ def test_a_home_that_is_moved_is_told_and_moves_nothing(
     """Within two seconds it is told and taken back; the drone stays at its height."""
     with handed(monkeypatch, family) as flight:
         flight.hand_over()
-        flight.ends.autopilot.firmware.home = flight.ends.autopilot.firmware.home + moved
+        flight.ends.firmware.home = flight.ends.firmware.home + moved
         began = flight.ends.now
         while flight.ends.now < began + 2.0:
             flight.turn()
             assert flight.ends.autopilot.truth.position[2] == pytest.approx(3.0, abs=0.5)
         off = f"{np.linalg.norm(moved):.0f} m from where it took off"
-        assert flight.told[-1] == f"the hand-over has ended: its home has moved, {off}"
+        assert flight.told("handover")[-1] == f"the hand-over has ended: its home has moved, {off}"
         alerts = [alert.text for alert in flight.mission.alerts]
         assert alerts.count(f"home: its own return leads {off}") == 1
-        flight.until(lambda: flight.mission.state is S.LANDED, 120.0)
+        flight.until(S.LANDED, 120.0)
         assert flight.visited == ["a", "b", "c", "d"]
 
 
@@ -369,10 +316,9 @@ def test_a_pilot_who_takes_over_is_respected(monkeypatch: pytest.MonkeyPatch, fa
         flight.until(lambda: flight.mission.finished, 5.0)
         assert flight.mission.state is S.ABORTED
         assert "pilot" in flight.mission.status.reason
-        sent = flight.setpoints(), len(flight.heard("COMMAND_LONG"))
-        for _ in range(60):
-            flight.turn()
-        assert (flight.setpoints(), len(flight.heard("COMMAND_LONG"))) == sent
+        sent = flight.setpoints(), len(flight.ends.heard("COMMAND_LONG"))
+        flight.run(3)
+        assert (flight.setpoints(), len(flight.ends.heard("COMMAND_LONG"))) == sent
 
 
 def test_a_pilots_own_mission_is_a_pilots(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -380,10 +326,9 @@ def test_a_pilots_own_mission_is_a_pilots(monkeypatch: pytest.MonkeyPatch) -> No
     with handed(monkeypatch) as flight:
         flight.hand_over()
         flight.tell(TakeBack())
-        flight.until(lambda: flight.mode is VehicleMode.GUIDED, 5.0)
-        for _ in range(80):
-            flight.turn()
-        flight.ends.autopilot.firmware.obey(
+        flight.until(VehicleMode.GUIDED, 5.0)
+        flight.run(4)
+        flight.ends.firmware.obey(
             mavlink.MAV_CMD_DO_SET_MODE, (1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0), None
         )
         flight.until(lambda: flight.mission.finished, 5.0)
@@ -404,11 +349,11 @@ def test_a_boundary_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: str
     limits = {"geofence": fence, "max_acceleration": 2.0}
     with handed(monkeypatch, family, limits=limits) as flight:
         flight.hand_over()
-        plan = flight.ends.autopilot.firmware.plans.plans[mavlink.MAV_MISSION_TYPE_MISSION]
+        plan = flight.plan
         for item in plan:
             item.x += 10_000  # a hundred metres north: whoever changed it
         flight.until(lambda: not flight.mission.handover.flies, 20.0)
-        assert flight.told[-1].endswith("it came too near to a boundary (geofence)")
+        assert flight.told("handover")[-1].endswith("it came too near to a boundary (geofence)")
         flight.until(lambda: flight.visited == ["a"], 20.0)
         assert flight.ends.autopilot.truth.position[1] < 19.0
 
@@ -420,9 +365,8 @@ def test_another_drone_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: 
         flight.hand_over()
         flight.neighbours = [Neighbour(np.array([0.0, 12.0, 3.0]), np.zeros(3))]
         flight.until(lambda: not flight.mission.handover.flies, 10.0)
-        assert "separation" in flight.told[-1]
-        for _ in range(100):
-            flight.turn()
+        assert "separation" in flight.told("handover")[-1]
+        flight.run(5)
         away = np.linalg.norm(flight.ends.autopilot.truth.position - [0.0, 12.0, 3.0])
         assert away > 2.5
 
@@ -432,8 +376,8 @@ def test_a_hung_loop_holds_it(monkeypatch: pytest.MonkeyPatch) -> None:
     with handed(monkeypatch) as flight:
         flight.hand_over()
         flight.ends.advance(3.0)
-        assert "hold" in flight.ends.autopilot.firmware.motions
-        assert flight.ends.autopilot.firmware.custom_mode == 17
+        assert "hold" in flight.ends.firmware.motions
+        assert flight.ends.firmware.custom_mode == 17
 
 
 LIES = {
@@ -458,12 +402,12 @@ def test_what_cannot_be_is_not_believed(monkeypatch: pytest.MonkeyPatch, lie: st
     message, told = LIES[lie]
     with handed(monkeypatch) as flight:
         flight.hand_over()
-        flight.say(message)
+        inject(flight.ends, message)
         flight.turn()
         flight.turn()
         assert not flight.mission.handover.active
-        assert told in flight.told[-1]
-        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        assert told in flight.told("handover")[-1]
+        flight.until(S.RETURNING, 120.0)
         assert flight.visited == ["a", "b", "c", "d"]
 
 
@@ -472,31 +416,31 @@ def test_going_back_is_not_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     with handed(monkeypatch) as flight:
         flight.hand_over()
         flight.until(lambda: flight.ends.autopilot.truth.position[0] > 5.0)
-        flight.ends.autopilot.firmware.route.select(2)
+        flight.ends.firmware.route.select(2)
         flight.until(lambda: not flight.mission.handover.active, 5.0)
-        assert "to a place again" in flight.told[-1]
+        assert "to a place again" in flight.told("handover")[-1]
 
 
 def test_one_that_comes_no_nearer_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """It stands still in its mission mode, and says nothing more."""
     with handed(monkeypatch) as flight:
         flight.hand_over()
-        firmware = flight.ends.autopilot.firmware
+        firmware = flight.ends.firmware
         monkeypatch.setattr(firmware.route, "advance", lambda _: None)
         firmware.flight.hold()
         flight.until(lambda: not flight.mission.handover.active, 70.0)
-        assert "no nearer to a for 60 s" in flight.told[-1]
+        assert "no nearer to a for 60 s" in flight.told("handover")[-1]
         flight.until(lambda: flight.visited == ["a"])
 
 
 def refuse_mode(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
     """The mode is refused."""
-    monkeypatch.setattr(flight.ends.autopilot.firmware.route, "begin", lambda: False)
+    monkeypatch.setattr(flight.ends.firmware.route, "begin", lambda: False)
 
 
 def ignore_mode(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
     """The mode is accepted, and never shown."""
-    firmware = flight.ends.autopilot.firmware
+    firmware = flight.ends.firmware
     obey = firmware.obey
 
     def half(number: int, values: tuple[float, ...], frame: int | None) -> Any:  # noqa: ANN401
@@ -511,7 +455,7 @@ _MISSIONS = {(3.0, 0.0), (4.0, 4.0)}
 
 def stall(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
     """It stops answering in the middle of the upload."""
-    plans = flight.ends.autopilot.firmware.plans
+    plans = flight.ends.firmware.plans
     answer = plans.handle
 
     def half(message: Any) -> list[Any]:  # noqa: ANN401
@@ -523,14 +467,14 @@ def stall(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def deny(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
     """It takes no mission."""
-    plans = flight.ends.autopilot.firmware.plans
+    plans = flight.ends.firmware.plans
     ack = mavlink.MAVLink_mission_ack_message(245, 191, mavlink.MAV_MISSION_NO_SPACE, 0)
     monkeypatch.setattr(plans, "handle", lambda _: [ack])
 
 
 def ignore_selection(flight: Handed, monkeypatch: pytest.MonkeyPatch) -> None:
     """It never says that it would begin with the first item."""
-    route = flight.ends.autopilot.firmware.route
+    route = flight.ends.firmware.route
     monkeypatch.setattr(route, "select", lambda _: False)
     monkeypatch.setattr(route, "_selected", 7)
 
@@ -552,15 +496,15 @@ def test_a_hand_over_that_fails_leaves_the_drone_as_it_was(
     stops = [Waypoint("a", 0, 40, 3), Waypoint("b", 4, 40, 3)]
     family = "px4" if failure is refuse_mode else "ardupilot"
     with handed(monkeypatch, family, stops=stops) as flight:
-        flight.until(lambda: flight.mission.state is S.ENROUTE)
+        flight.until(S.ENROUTE)
         failure(flight, monkeypatch)
         assert flight.tell(HandOver()).accepted
         assert not flight.tell(HandOver()).accepted
         flight.until(lambda: not flight.mission.handover.active, 15.0)
-        assert flight.told[-1].startswith("not handed over: ")
-        assert FAILURES[failure] in flight.told[-1]
-        flight.until(lambda: flight.mode is VehicleMode.GUIDED, 5.0)
-        flight.until(lambda: flight.mission.state is S.RETURNING, 120.0)
+        assert flight.told("handover")[-1].startswith("not handed over: ")
+        assert FAILURES[failure] in flight.told("handover")[-1]
+        flight.until(VehicleMode.GUIDED, 5.0)
+        flight.until(S.RETURNING, 120.0)
         assert flight.visited == ["a", "b"]
         assert flight.states[flight.states.index(S.ENROUTE) :] == [S.ENROUTE, S.RETURNING]
 
@@ -571,8 +515,8 @@ def test_a_waypoint_that_is_reached_meanwhile_is_not_flown_again(
     """The rest is uploaded anew."""
     stops = [Waypoint("a", 0, 3, 3), Waypoint("b", 0, 20, 3), Waypoint("c", 0, 30, 3)]
     with handed(monkeypatch, stops=stops) as flight:
-        flight.until(lambda: flight.mission.state is S.ENROUTE)
-        plans = flight.ends.autopilot.firmware.plans
+        flight.until(S.ENROUTE)
+        plans = flight.ends.firmware.plans
         answer = plans.handle
 
         def slowly(message: Any) -> list[Any]:  # noqa: ANN401
@@ -581,8 +525,8 @@ def test_a_waypoint_that_is_reached_meanwhile_is_not_flown_again(
         monkeypatch.setattr(plans, "handle", slowly)
         assert flight.tell(HandOver()).accepted
         flight.until(lambda: flight.mission.handover.flies)
-        assert flight.told == ["handed over to the autopilot: 2 waypoints"]
-        flight.until(lambda: flight.mission.state is S.RETURNING)
+        assert flight.told("handover") == ["handed over to the autopilot: 2 waypoints"]
+        flight.until(S.RETURNING)
         assert flight.visited == ["a", "b", "c"]
 
 
@@ -607,11 +551,11 @@ def test_what_an_autopilot_cannot_fly_is_refused(
     zone = {"no_fly": [[(-2, 4), (2, 4), (2, 6), (-2, 6)]]} if what == "no-fly zone" else {}
     fence = {"polygon": [(-50, -50), (50, -50), (50, 50), (-50, 50)], "margin": 0.5, **zone}
     with handed(monkeypatch, stops=[waypoint], limits={"geofence": fence}) as flight:
-        flight.until(lambda: flight.mission.state is S.ENROUTE)
+        flight.until(S.ENROUTE)
         answer = flight.tell(HandOver())
         assert not answer.accepted
         assert reason in answer.text
-        assert not flight.heard("MISSION_COUNT")
+        assert not flight.ends.heard("MISSION_COUNT")
 
 
 def test_px4_turns_at_a_waypoint(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -619,14 +563,14 @@ def test_px4_turns_at_a_waypoint(monkeypatch: pytest.MonkeyPatch) -> None:
     stops = [Waypoint("a", 0, 15, 3, yaw=0.0)]
     with handed(monkeypatch, "px4", stops=stops) as flight:
         flight.hand_over()
-        plan = flight.ends.autopilot.firmware.plans.plans[mavlink.MAV_MISSION_TYPE_MISSION]
+        plan = flight.plan
         assert plan[1].param4 == pytest.approx(90.0)
 
 
 def test_the_plan_on_the_vehicle_stays_its_way_home(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plan that would replace it is refused."""
     with handed(monkeypatch) as flight:
-        flight.until(lambda: flight.mission.state is S.ENROUTE)
+        flight.until(S.ENROUTE)
         mode = flight.ends.vehicle.mission_mode
         planned = {"way_home": [(0.0, 0.0, 3.0)], "fallback": "report"}
         assert mode is not None
@@ -639,8 +583,8 @@ def test_on_the_ground_nothing_is_handed_over(monkeypatch: pytest.MonkeyPatch) -
     """Nor while it takes off, nor once it comes home."""
     with handed(monkeypatch) as flight:
         assert "preflight" in flight.tell(HandOver()).text
-        flight.until(lambda: flight.mission.state is S.TAKING_OFF)
+        flight.until(S.TAKING_OFF)
         assert "taking_off" in flight.tell(HandOver()).text
-        flight.until(lambda: flight.mission.state is S.ENROUTE)
+        flight.until(S.ENROUTE)
         flight.tell(ReturnHome())
         assert not flight.tell(HandOver()).accepted

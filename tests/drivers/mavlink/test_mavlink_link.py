@@ -1,53 +1,29 @@
-"""The link to an autopilot on a clock that the test moves: whom it hears, and whom it answers."""
+"""The link to an autopilot: whom it hears and answers; what strangers send moves nothing."""
 
 from __future__ import annotations
 
-import threading
+import socket
 from collections.abc import Callable
-from types import SimpleNamespace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from autopilot import HERE, SETPOINT, THERE, Bench, Wire
+from emulated import LOOPBACK, Flight, wait_for
 
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.wire import forwarding
+from aerodaas.drivers.mavlink.wire import forwarding, transport
 from aerodaas.drivers.mavlink.wire import link as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
+from aerodaas.drivers.mavlink.wire.transport import is_exposed
 from aerodaas.drivers.pin import Peer
+from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle import AutopilotOptions
 
 KEY = bytes(range(32))
-HERE, THERE = ("10.0.0.1", 14550), ("10.0.0.2", 14550)
-
-
-class _Wire:
-    """One end of a wire, or a ground station to which all is passed on."""
-
-    def __init__(self) -> None:
-        self.inbox: list[Any] = []
-        self.sent: list[tuple[bytes, tuple[Peer, ...]]] = []
-        self.closed = False
-
-    def receive(self) -> list[Any]:
-        """What has arrived."""
-        arrived, self.inbox = self.inbox, []
-        return arrived
-
-    def send(self, packet: bytes, peers: tuple[Peer, ...] = ()) -> None:
-        """Send it."""
-        assert not self.closed
-        self.sent.append((packet, peers))
-
-    def close(self) -> None:
-        """Cut it."""
-        self.closed = True
-
-    @staticmethod
-    def fileno() -> int:
-        """It is never waited for."""
-        return -1
 
 
 class World:
@@ -56,11 +32,11 @@ class World:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
         monkeypatch.delenv(MAVLINK_KEY, raising=False)
         monkeypatch.setattr(MavlinkLink, "_start", lambda _: None)
-        self.wire, self.station = _Wire(), _Wire()
+        self.wire, self.station = Wire(), Wire()
         self.opened: list[tuple[str, str]] = []
 
-        def opening(wire: _Wire) -> Callable[[str, str], _Wire]:
-            def opened(url: str, name: str) -> _Wire:
+        def opening(wire: Wire) -> Callable[[str, str], Wire]:
+            def opened(url: str, name: str) -> Wire:
                 self.opened.append((url, name))
                 return wire
 
@@ -146,13 +122,6 @@ def test_what_its_heartbeats_say(
     assert (beat.type, beat.autopilot) == (kind, mavlink.MAV_AUTOPILOT_INVALID)
     assert (beat.base_mode, beat.custom_mode) == (0, 0)
     assert (beat.system_status, beat.mavlink_version) == (mavlink.MAV_STATE_ACTIVE, 3)
-
-
-def test_the_driver_gets_a_turn_each_twentieth_of_a_second(world: World) -> None:
-    """However often the thread comes round."""
-    for hundredth in range(21):
-        world.link.turn(100.0 + hundredth / 100)
-    assert world.turns == pytest.approx([100.0, 100.05, 100.1, 100.15, 100.2], abs=0.011)
 
 
 def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
@@ -247,14 +216,6 @@ def test_senders_are_put_together_apart(world: World) -> None:
     assert len(world.heard) == 1
 
 
-def test_messages_that_nobody_reads_are_passed_over(world: World) -> None:
-    """They are not even strangers."""
-    world.says(SPEED)
-    world.link.turn(100.0)
-    counts = world.link.counts
-    assert (counts.received, counts.strangers, counts.damaged, world.heard) == (0, 0, 0, [])
-
-
 def test_a_crowd_on_one_port_is_forgotten(world: World) -> None:
     """64 senders' addresses are remembered, and all go on to be heard."""
     for system in range(1, 81):
@@ -265,30 +226,6 @@ def test_a_crowd_on_one_port_is_forgotten(world: World) -> None:
     ((_, peers),) = world.wire.sent
     assert peers == tuple((f"10.0.0.{system}", 1) for system in range(1, 65))
     assert len(world.heard) == 80
-    assert len(world.link._framers) <= 17
-
-
-def test_with_a_key_it_signs_and_hears_the_signed_alone(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Any,  # noqa: ANN401
-) -> None:
-    """What was signed by another key, or not at all, is damaged."""
-    path = tmp_path / "key"
-    path.write_bytes(KEY)
-    world = World(monkeypatch, signing_key=str(path))
-    world.says(LOOK, 1, key=KEY)
-    world.link.turn(100.0)
-    assert [kind for kind, _ in world.heard] == ["ATTITUDE"]
-    world.says(LOOK, 2, key=bytes(32))
-    world.says(LOOK, 3)
-    world.link.turn(101.0)
-    assert len(world.heard) == 1
-    assert world.link.counts.damaged >= 2
-    ear = mavlink.MAVLink(None, 9, 9)
-    sign_with(ear, KEY)
-    packet, _ = world.wire.sent[0]
-    assert ear.decode(bytearray(packet)).get_type() == "HEARTBEAT"
-    assert packet[2] & 1, "it says that it is signed"
 
 
 def test_everything_is_passed_on_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -323,83 +260,294 @@ def test_without_a_station_nothing_is_passed_on(world: World) -> None:
     assert not world.station.closed
 
 
-class _Over(Exception):  # noqa: N818 - no error
-    """The time that the test has given is over."""
+def forged(key: bytes | None = None, system: int = 1) -> bytes:
+    """A forged HEARTBEAT: armed, and in PX4's manual mode."""
+    mav = mavlink.MAVLink(None, system, 1)
+    if key is not None:
+        sign_with(mav, key)
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    return bytes(mavlink.MAVLink_heartbeat_message(2, 12, armed, 1 << 16, 4, 3).pack(mav))
 
 
-class Thread:
-    """The link's thread, run by the test: what it waits for, how long, and what it finds then."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, start: Callable[[Any], None]) -> None:
-        self.now, self.end = 100.0, 101.0
-        self.waits: list[tuple[list[int], float]] = []
-        self.how: dict[str, object] = {}
-        self.joined: list[float] = []
-        self.broken = False
-        self.run: Callable[[], None] = lambda: None
-        quiet = SimpleNamespace(Thread=self._made, Lock=threading.Lock, Event=threading.Event)
-        monkeypatch.setattr(module, "threading", quiet)
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
-        monkeypatch.setattr(module, "select", SimpleNamespace(select=self._select))
-        monkeypatch.setattr(MavlinkLink, "_start", start)
-
-    def _made(self, target: Callable[[], None], **how: object) -> Any:  # noqa: ANN401
-        self.run, self.how = target, how
-        return SimpleNamespace(start=lambda: None, join=self._join)
-
-    def _join(self, timeout: float) -> None:
-        self.joined.append(timeout)
-
-    def _select(self, wires: list[int], out: list[int], odd: list[int], longest: float) -> None:
-        assert out == odd == []
-        self.waits.append((wires, longest))
-        if self.now >= self.end:
-            raise _Over
-        self.now += max(longest, 0.001)
-        if self.broken:
-            raise OSError
+@pytest.fixture
+def keyed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> World:
+    """An open link that signs."""
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    return World(monkeypatch, signing_key=str(path))
 
 
-START = MavlinkLink._start
+def test_an_impostor_moves_nothing_while_the_vehicle_speaks(world: World) -> None:
+    """Not its telemetry, not an answer that is waited for, and it is told by its address once."""
+    world.link.adopt((1, 1), HERE, 100.0)
+    with world.link.listen("ATTITUDE") as answers:
+        for second in range(20):
+            world.says(BEAT)
+            world.says(BEAT, peer=THERE)
+            world.says(LOOK, peer=THERE)
+            world.says(LOOK, peer=("10.0.0.2", 777))
+            world.link.turn(101.0 + second)
+        assert answers.empty()
+    assert {kind for kind, _ in world.heard} == {"HEARTBEAT"}
+    assert (world.link.counts.received, world.link.counts.impostors) == (20, 60)
+    said = ["link: 10.0.0.2:14550 sends as the vehicle, and is not heard"]
+    assert world.link.reports(130.0) == said
+    assert world.link.reports(130.1) == []
 
 
-@pytest.mark.parametrize("broken", [False, True])
-def test_its_thread_waits_for_the_wire_and_the_next_turn(
-    monkeypatch: pytest.MonkeyPatch, *, broken: bool
+@pytest.mark.parametrize(
+    ("silent", "stands", "message", "moves"),
+    [
+        (5.1, True, BEAT, True),
+        (4.9, True, BEAT, False),
+        (5.1, True, LOOK, False),
+        (60.0, False, BEAT, False),
+    ],
+)
+def test_a_vehicle_that_starts_anew_elsewhere(
+    world: World,
+    silent: float,
+    message: Any,  # noqa: ANN401
+    *,
+    stands: bool,
+    moves: bool,
 ) -> None:
-    """20 turns a second, whatever comes; a wire that is cut is not waited for."""
-    world = World(monkeypatch, forward="udpout:127.0.0.1:14550")
-    thread = Thread(monkeypatch, START)
-    thread.broken = broken
-    monkeypatch.setattr(world.station, "fileno", lambda: 77)
-    world.link._start()
-    assert thread.how == {"name": "d-link", "daemon": True}
-    with pytest.raises(_Over):
-        thread.run()
-    assert 19 <= len(world.turns) <= 21
-    assert all(0.0 <= longest <= 0.05 for _, longest in thread.waits)
-    wires = thread.waits[0][0]
-    assert len(wires) == 2
-    assert wires[-1] == 77
-    assert -1 not in wires
-    monkeypatch.setattr(world.wire, "fileno", lambda: 66)
-    thread.end = 102.0
-    with pytest.raises(_Over):
-        thread.run()
-    assert thread.waits[-1][0] == [66, *wires]
-    world.link.close()
-    assert thread.joined == [2.0]
-    turns = len(world.turns)
-    thread.end = 200.0
-    thread.run()
-    assert len(world.turns) == turns, "it has ended"
-
-
-def test_packets_without_a_name_are_nothing(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A message of a dialect that is not ours is damaged, not the vehicle's."""
-    unknown = SimpleNamespace(get_type=lambda: "UNKNOWN_30")
-    monkeypatch.setattr(world.link._mav, "decode", lambda _: unknown)
+    """Is adopted by its HEARTBEAT after 5 s of silence on the ground, and never in flight."""
+    world.stands = stands
+    world.link.adopt((1, 1), HERE, 90.0)
     world.says(LOOK)
     world.link.turn(100.0)
-    assert world.heard == []
-    assert world.link.counts.damaged > 0
+    world.says(message, peer=THERE)
+    world.link.turn(100.0 + silent)
+    world.link.send(BEAT)
+    assert world.wire.sent[-1][1] == ((THERE,) if moves else (HERE,))
+    assert world.link.counts.impostors == (not moves)
+    told = world.link.reports(100.0 + silent)
+    assert ("link: the vehicle is heard from 10.0.0.2:14550 now" in told) is moves
+
+
+def test_a_signed_vehicle_is_followed_even_in_flight(keyed: World) -> None:
+    """After the same silence; its key tells that it is the same."""
+    keyed.stands = False
+    keyed.link.adopt((1, 1), HERE, 100.0)
+    keyed.says(BEAT, key=KEY, peer=THERE)
+    keyed.link.turn(104.0)
+    assert keyed.link.counts.impostors == 1
+    keyed.says(BEAT, key=KEY, peer=THERE)
+    keyed.link.turn(106.0)
+    keyed.link.send(BEAT)
+    assert keyed.wire.sent[-1][1] == (THERE,)
+
+
+def test_unsigned_wrongly_signed_and_replayed_packets_are_told(keyed: World) -> None:
+    """Each is dropped; what is merely damaged is no forgery."""
+    keyed.link.adopt((1, 1), HERE, 100.0)
+    packet = keyed.says(LOOK, key=KEY)
+    keyed.link.turn(100.0)
+    assert (keyed.link.counts.received, keyed.link.reports(100.0)) == (1, [])
+    damaged = bytearray(packet)
+    damaged[12] ^= 1
+    keyed.wire.inbox.append((bytes(damaged), HERE))
+    keyed.link.turn(110.0)
+    assert (keyed.link.counts.refused, keyed.link.reports(110.0)) == (0, [])
+    for count, sent in enumerate((packet, forged(), forged(bytes(32))), 1):
+        keyed.wire.inbox.append((sent, HERE))
+        keyed.link.turn(120.0)
+        assert keyed.link.counts.refused == count
+    assert keyed.link.counts.received == 1
+    said = "link: packets that are unsigned, wrongly signed or replayed are dropped"
+    assert keyed.link.reports(130.0) == [said]
+    assert keyed.link.reports(131.0) == []
+
+
+def test_a_forged_time_does_not_lock_the_vehicle_out(keyed: World) -> None:
+    """A wrongly signed packet from the future leaves the true one's timestamps alone."""
+    forger = mavlink.MAVLink(None, 1, 1)
+    sign_with(forger, bytes(32))
+    forger.signing.timestamp += 10**9
+    keyed.wire.inbox.append((bytes(BEAT.pack(forger)), HERE))
+    keyed.link.turn(100.0)
+    keyed.says(LOOK, key=KEY)
+    keyed.link.turn(100.1)
+    assert [kind for kind, _ in keyed.heard] == ["ATTITUDE"]
+
+
+def test_the_ground_station_gets_nothing_forged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What uses the vehicle's ids from elsewhere stays here, and so does what cannot be read."""
+    world = World(monkeypatch, forward="udpout:127.0.0.1:14550")
+    world.link.adopt((1, 1), HERE, 100.0)
+    passed = [world.says(BEAT), world.says(BEAT, 2, peer=THERE), world.says(SPEED)]
+    world.says(BEAT, peer=THERE)
+    world.says(SPEED, peer=THERE)
+    world.says(BEAT, 2, peer=("10.0.0.3", 1))
+    world.wire.inbox.append((b"noise" + passed[0], ("10.0.0.3", 1)))
+    world.wire.inbox.append((passed[1] + passed[0], THERE))
+    world.link.turn(100.1)
+    assert [packet for packet, _ in world.station.sent] == passed
+
+
+def test_a_second_ground_station_commands_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first to send to the forwarding port keeps it until it is silent and the drone stands."""
+    world = World(monkeypatch, forward="udpin:127.0.0.1:14550")
+    world.healthy = False
+    world.link.adopt((1, 1), HERE, 100.0)
+    station, attacker = ("127.0.0.1", 1), ("127.0.0.1", 2)
+    world.station.inbox = [(b"first", station), (b"attack", attacker)]
+    world.link.turn(101.0)
+    world.stands = False
+    world.station.inbox = [(b"attack", attacker)]
+    world.link.turn(200.0)
+    world.says(BEAT)
+    world.link.turn(200.1)
+    assert [packet for packet, _ in world.wire.sent] == [b"first"]
+    assert [peers for _, peers in world.station.sent] == [(station,)]
+    assert world.link.counts.strangers == 2
+    said = "link: 127.0.0.1:2 sends as the ground station, and is not heard"
+    assert world.link.reports(200.1) == [said]
+    world.stands = True
+    world.station.inbox = [(b"next", attacker)]
+    world.link.turn(201.0)
+    assert world.wire.sent[-1][0] == b"next"
+
+
+@pytest.mark.parametrize(
+    ("url", "exposed"),
+    [
+        ("udpin:127.0.0.1:14540", False),
+        ("udpout:localhost:14540", False),
+        ("tcp:127.0.0.2:5760", False),
+        ("serial:/dev/ttyUSB0:57600", False),
+        ("udpin:0.0.0.0:14540", True),
+        ("udpout:192.0.2.1:14540", True),
+        ("tcp:203.0.113.9:5760", True),
+    ],
+)
+def test_what_others_can_send_to_is_warned_of(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    url: str,
+    *,
+    exposed: bool,
+) -> None:
+    """Off loopback, unless all is signed; the forwarding port, too."""
+    assert is_exposed(url) is exposed
+    key = tmp_path / "key"
+    key.write_bytes(KEY)
+    World(monkeypatch, url=url, forward=url, signing_key=str(key))
+    assert caplog.messages == []
+    World(monkeypatch, forward=url)
+    assert len(caplog.messages) == exposed
+    World(monkeypatch, url=url)
+    assert len(caplog.messages) == 2 * exposed
+    assert all(url in one and "signing_key" in one for one in caplog.messages)
+
+
+def test_it_listens_on_loopback_unless_told_otherwise() -> None:
+    """Of the settings and of the command that checks a vehicle."""
+    assert MavlinkSettings().url == "udpin:127.0.0.1:14540"
+
+
+def test_a_server_is_found_again_at_its_own_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name that leads to another host after the TCP connection was cut is not followed."""
+    monkeypatch.setattr(transport, "_RETRY", 0.05)
+    places = [LOOPBACK, "127.0.0.9"]
+    resolve = socket.getaddrinfo
+
+    def resolved(host: str, port: int, *more: Any, **rest: Any) -> Any:  # noqa: ANN401
+        return resolve(places[0] if host == "vehicle.test" else host, port, *more, **rest)
+
+    monkeypatch.setattr(socket, "getaddrinfo", resolved)
+    with socket.create_server((LOOPBACK, 0)) as true:
+        port = true.getsockname()[1]
+        with socket.create_server(("127.0.0.9", port)) as false:
+            true.settimeout(5.0)
+            false.settimeout(0.0)
+            wire = transport.open_transport(f"tcp:vehicle.test:{port}", "d")
+            true.accept()[0].close()
+            del places[0]
+            again: list[socket.socket] = []
+
+            def back() -> bool:
+                wire.receive()
+                true.settimeout(0.01)
+                try:
+                    again.append(true.accept()[0])
+                except TimeoutError:
+                    return False
+                return True
+
+            wait_for(back, 5.0)
+            with pytest.raises(BlockingIOError):
+                false.accept()
+            wire.close()
+            again[0].close()
+
+
+def test_a_forged_heartbeat_takes_no_vehicle(flight: Flight) -> None:
+    """It neither gets the commands nor is believed, and people are told."""
+    with flight() as ends, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as attacker:
+        attacker.bind((LOOPBACK, 0))
+        attacker.settimeout(0.0)
+        for _ in range(20):
+            attacker.sendto(forged(), (LOOPBACK, ends.port))
+            state = ends.turn()
+        assert state.extra["impostor_packets"] >= 20
+        assert state.mode is VehicleMode.GROUNDED
+        name = f"{LOOPBACK}:{attacker.getsockname()[1]}"
+        assert f"link: {name} sends as the vehicle, and is not heard" in state.faults
+        ends.guide()
+        with pytest.raises(BlockingIOError):
+            attacker.recv(4096)
+        assert ends.heard(SETPOINT)
+
+
+def test_a_jammed_vehicle_is_not_taken_in_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither its word nor its place is another's; the true one is heard as before."""
+    bench = Bench(monkeypatch)
+    bench.connect()
+    bench.fly()
+    bench.autopilot.speaks, bench.autopilot.result = False, None
+    for _ in range(200):
+        bench.autopilot.wire.inbox.append((forged(), THERE))
+        bench.turn()
+    state = bench.vehicle.read()
+    assert state.mode is VehicleMode.LOST
+    assert state.extra["impostor_packets"] == 200
+    assert "link: 10.0.0.2:14550 sends as the vehicle, and is not heard" in state.faults
+    bench.autopilot.speaks = True
+    assert bench.turn(1.5) is VehicleMode.HOLDING
+    bench.close()
+
+
+def test_a_signed_flight_over_a_wire_with_strangers(flight: Flight, tmp_path: Path) -> None:
+    """With one key at both ends it flies, whatever else is sent to its port."""
+    key = tmp_path / "key"
+    key.write_bytes(KEY)
+    with (
+        flight(AutopilotOptions(key=KEY), signing_key=str(key)) as ends,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as attacker,
+    ):
+        for _ in range(50):
+            attacker.sendto(forged(), (LOOPBACK, ends.port))
+            attacker.sendto(forged(bytes(32)), (LOOPBACK, ends.port))
+        ends.take_off()
+        assert ends.vehicle.read().extra["refused_packets"] >= 100
+
+
+def test_forwarding_is_bytes_as_they_are() -> None:
+    """Over a socket, both ways, unread."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind((LOOPBACK, 0))
+        station.settimeout(5.0)
+        forwarder = forwarding.Forwarder(
+            f"udpout:{LOOPBACK}:{station.getsockname()[1]}", "a", lambda: True
+        )
+        forwarder.send(b"\xfd anything")
+        content, ours = station.recvfrom(100)
+        assert content == b"\xfd anything"
+        station.sendto(b"back", ours)
+        received: list[bytes] = []
+        wait_for(lambda: bool(received.extend(forwarder.receive(0.0)) or received))
+        assert received == [b"back"]
+        forwarder.close()

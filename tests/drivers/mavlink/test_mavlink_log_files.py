@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from mavlink_flights import Pair, flight, wait_for
+from emulated import Flight, Stepped
 
-from aerodaas.drivers.mavlink.microservices import ftp as module
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.testing.channel import Impairment
@@ -30,24 +28,16 @@ PART = "log-2-100003.part"
 ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
 
 
-@pytest.fixture(scope="module")
-def connected() -> Iterator[Pair]:
-    """A vehicle on the ground; little patience with its silence."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_TIMEOUT", 0.2)
-        patch.setattr(module, "_PAUSE", 0.05)
-        with flight(ARDUPILOT, fallback="ignore") as flown:
-            yield flown
-
-
 @pytest.fixture
-def pair(connected: Pair) -> Pair:
-    """The same with two logs, as numbers and as files."""
-    put(connected, FileServer())
-    return connected
+def pair(flight: Flight) -> Iterator[Stepped]:
+    """A vehicle on the ground with two logs, as numbers and as files."""
+    with flight(ARDUPILOT) as ends:
+        ends.watch(1.0)
+        put(ends, FileServer())
+        yield ends
 
 
-def put(pair: Pair, server: FileServer) -> None:
+def put(pair: Stepped, server: FileServer) -> None:
     """Give the vehicle these files, and mend its link."""
     pair.autopilot.spoil(up=Impairment(), down=Impairment())
     server.files = {"/APM/LOGS/00000006.BIN": DATAFLASH[:90], PATH: DATAFLASH}
@@ -59,14 +49,14 @@ def put(pair: Pair, server: FileServer) -> None:
     pair.autopilot.heard.clear()
 
 
-def begins(pair: Pair) -> list[int]:
+def begins(pair: Stepped) -> list[int]:
     """From which bytes on bursts were asked for."""
     payloads = [bytes(one.payload) for one in pair.heard("FILE_TRANSFER_PROTOCOL")]
     burst = mavlink.MAV_FTP_OPCODE_BURSTREADFILE
     return [int.from_bytes(one[8:12], "little") for one in payloads if one[3] == burst]
 
 
-def test_a_log_is_fetched_as_a_file(pair: Pair, tmp_path: Path) -> None:
+def test_a_log_is_fetched_as_a_file(pair: Stepped, tmp_path: Path) -> None:
     """Found by its size, named after its number; progress is told, and the session ends."""
     told: list[tuple[int, int]] = []
     file = pair.vehicle.fetch_log(LOG, tmp_path / "new", lambda *done: told.append(done))
@@ -79,16 +69,16 @@ def test_a_log_is_fetched_as_a_file(pair: Pair, tmp_path: Path) -> None:
     assert len(told) == 5
     assert not pair.heard("LOG_REQUEST_DATA")
     terminate = mavlink.MAV_FTP_OPCODE_TERMINATESESSION
-    wait_for(lambda: any(one.payload[3] == terminate for one in pair.heard(KIND)))
+    pair.wait(lambda: any(one.payload[3] == terminate for one in pair.heard(KIND)))
 
 
 KIND = "FILE_TRANSFER_PROTOCOL"
 
 
-def test_px4_has_a_folder_for_each_day(tmp_path: Path) -> None:
+def test_px4_has_a_folder_for_each_day(flight: Flight, tmp_path: Path) -> None:
     """On its card."""
     ulog = b"ULog\x01\x12\x35" + random.Random(2).randbytes(5_000)
-    with flight(fallback="ignore") as pair:
+    with flight() as pair:
         pair.autopilot.firmware.files.files = {
             "/fs/microsd/log/2027-01-14/07_00_00.ulg": ulog[:90],
             "/fs/microsd/log/2027-01-15/08_00_00.ulg": ulog,
@@ -99,7 +89,7 @@ def test_px4_has_a_folder_for_each_day(tmp_path: Path) -> None:
     assert file.read_bytes() == ulog
 
 
-def test_lost_doubled_and_overtaken_packets(pair: Pair, tmp_path: Path) -> None:
+def test_lost_doubled_and_overtaken_packets(pair: Stepped, tmp_path: Path) -> None:
     """A twentieth of them, both ways."""
     bad = Impairment(loss=0.05, duplicates=0.05, jitter=0.02)
     pair.autopilot.spoil(up=bad, down=bad)
@@ -107,12 +97,12 @@ def test_lost_doubled_and_overtaken_packets(pair: Pair, tmp_path: Path) -> None:
     assert not pair.heard("LOG_REQUEST_DATA")
 
 
-def cut_at(pair: Pair, byte: int) -> Callable[[int, int], None]:
+def cut_at(pair: Stepped, byte: int) -> Callable[[int, int], None]:
     """The vehicle goes away once so many bytes have come."""
     return lambda done, _: pair.autopilot.cut() if done >= byte else None
 
 
-def test_a_vehicle_that_goes_away_and_comes_back(pair: Pair, tmp_path: Path) -> None:
+def test_a_vehicle_that_goes_away_and_comes_back(pair: Stepped, tmp_path: Path) -> None:
     """What came is kept, and the next fetch goes on from there."""
     with pytest.raises(VehicleError, match=r"stopped sending .* next fetch goes on from .*part"):
         pair.vehicle.fetch_log(LOG, tmp_path, cut_at(pair, 40_000))
@@ -122,7 +112,7 @@ def test_a_vehicle_that_goes_away_and_comes_back(pair: Pair, tmp_path: Path) -> 
     assert part.read_bytes() == DATAFLASH[:held]
 
     pair.autopilot.spoil(up=Impairment(), down=Impairment())
-    wait_for(lambda: not pair.vehicle.preflight())
+    pair.wait(lambda: not pair.vehicle.preflight())
     pair.autopilot.heard.clear()
     later = replace(LOG, began=BEGAN + 60.0)
     assert pair.vehicle.fetch_log(later, tmp_path).read_bytes() == DATAFLASH
@@ -132,7 +122,7 @@ def test_a_vehicle_that_goes_away_and_comes_back(pair: Pair, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("held", [b"\xff" * 50_000, b"\xff" * 200_000])
 def test_what_is_held_of_another_log_is_fetched_anew(
-    pair: Pair, tmp_path: Path, held: bytes
+    pair: Stepped, tmp_path: Path, held: bytes
 ) -> None:
     """The vehicle's checksum tells it, or its size does."""
     (tmp_path / PART).write_bytes(held)
@@ -157,7 +147,9 @@ class Growing(FileServer):
         return super().checksum(name)
 
 
-def test_a_log_that_grows_meanwhile_is_fetched_as_it_was_listed(pair: Pair, tmp_path: Path) -> None:
+def test_a_log_that_grows_meanwhile_is_fetched_as_it_was_listed(
+    pair: Stepped, tmp_path: Path
+) -> None:
     """ArduPilot writes some lines whenever it is asked for one."""
     put(pair, Growing())
     file = pair.vehicle.fetch_log(LOG, tmp_path)
@@ -165,7 +157,7 @@ def test_a_log_that_grows_meanwhile_is_fetched_as_it_was_listed(pair: Pair, tmp_
     assert [one.name for one in tmp_path.iterdir()] == [NAME]
 
 
-def test_a_checksum_that_does_not_fit(pair: Pair, tmp_path: Path) -> None:
+def test_a_checksum_that_does_not_fit(pair: Stepped, tmp_path: Path) -> None:
     """No file is better than a wrong one."""
     put(pair, Liar())
     with pytest.raises(VehicleError, match="has another checksum on the vehicle"):
@@ -185,7 +177,7 @@ class Unsummed(FileServer):
         return super().answer(payload)
 
 
-def test_without_checksums_nothing_is_gone_on_with(pair: Pair, tmp_path: Path) -> None:
+def test_without_checksums_nothing_is_gone_on_with(pair: Stepped, tmp_path: Path) -> None:
     """It comes whole, once more: what was held may be anything."""
     put(pair, Unsummed())
     assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
@@ -203,7 +195,7 @@ class Escaping(FileServer):
         return [f"F../../../{name}.bin\t{size}".encode() for name in ("x", "APM/LOGS/00000007")]
 
 
-def test_a_path_out_of_the_folder_is_not_gone(pair: Pair, tmp_path: Path) -> None:
+def test_a_path_out_of_the_folder_is_not_gone(pair: Stepped, tmp_path: Path) -> None:
     """It is no file of ours; the log comes by its number, into the folder."""
     put(pair, Escaping())
     folder = tmp_path / "a" / "b" / "c" / "d"
@@ -214,17 +206,17 @@ def test_a_path_out_of_the_folder_is_not_gone(pair: Pair, tmp_path: Path) -> Non
     assert not begins(pair)
 
 
-def no_service(pair: Pair) -> None:
+def no_service(pair: Stepped) -> None:
     """It has told of none."""
     pair.vehicle.telemetry.serves_files = False
 
 
-def twins(pair: Pair) -> None:
+def twins(pair: Stepped) -> None:
     """Two of one size."""
     pair.autopilot.firmware.files.files["/APM/LOGS/00000008.BIN"] = DATAFLASH[::-1]
 
 
-def written(pair: Pair) -> None:
+def written(pair: Stepped) -> None:
     """It has grown since it was listed."""
     pair.autopilot.firmware.files.files[PATH] = DATAFLASH + b"more"
 
@@ -238,14 +230,14 @@ class Mute(FileServer):
         return []
 
 
-def silent(pair: Pair) -> None:
+def silent(pair: Stepped) -> None:
     """It says that it has the service, and does not answer."""
     put(pair, Mute())
 
 
 @pytest.mark.parametrize("lacks", [no_service, twins, written, silent])
 def test_without_a_file_that_is_certainly_it_comes_by_its_number(
-    pair: Pair, tmp_path: Path, lacks: Callable[[Pair], None]
+    pair: Stepped, tmp_path: Path, lacks: Callable[[Stepped], None]
 ) -> None:
     """As ever."""
     lacks(pair)
@@ -255,23 +247,23 @@ def test_without_a_file_that_is_certainly_it_comes_by_its_number(
 
 
 @pytest.mark.parametrize("files", [True, False])
-def test_a_pilot_takes_off_in_between(pair: Pair, tmp_path: Path, *, files: bool) -> None:
+def test_a_pilot_takes_off_in_between(pair: Stepped, tmp_path: Path, *, files: bool) -> None:
     """The link is needed: no more is asked for, whichever way it comes."""
     pair.vehicle.telemetry.serves_files = files
     connection = pair.vehicle.connection
 
     def arm(done: int, _: int) -> None:
         if done >= 30_000:
-            connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
-            wait_for(lambda: pair.vehicle.read().armed)
+            connection.commander.give(connection.autopilot.arm(), now=pair.now)
+            pair.wait(lambda: pair.vehicle.read().armed)
 
     with pytest.raises(VehicleError, match="cannot fetch logs in flight"):
         pair.vehicle.fetch_log(LOG, tmp_path, arm)
     asked = begins(pair) if files else [one.ofs for one in pair.heard("LOG_REQUEST_DATA")]
     assert asked
     assert max(asked) < 72_000
-    connection.commander.give(connection.autopilot.disarm(), now=time.monotonic())
-    wait_for(lambda: not pair.vehicle.read().armed)
+    connection.commander.give(connection.autopilot.disarm(), now=pair.now)
+    pair.wait(lambda: not pair.vehicle.read().armed)
 
 
 def test_it_says_whether_it_has_the_service() -> None:

@@ -5,23 +5,21 @@ from __future__ import annotations
 import json
 import random
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
 import pytest
-from mavlink_flights import LOOPBACK, Pair, flight, free_port, wait_for
+from emulated import LOOPBACK, Flight, Stepped
 from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
 
 from aerodaas.cli.app import main
-from aerodaas.drivers.mavlink.microservices import logs as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.recording.reader import Recording
 from aerodaas.testing.channel import Impairment
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle_log import LogEntry
-from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.store import LogStore
 
 DATAFLASH = b"\xa3\x95\x80" + random.Random(1).randbytes(100_000)
@@ -30,25 +28,17 @@ BEGAN = 1_800_000_000.0
 ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
 
 
-@pytest.fixture(scope="module")
-def connected() -> Iterator[Pair]:
-    """A vehicle on the ground; little patience with its silence."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_TIMEOUT", 0.2)
-        with flight(ARDUPILOT, fallback="ignore") as flown:
-            yield flown
-
-
 @pytest.fixture
-def pair(connected: Pair) -> Pair:
-    """The same with two logs."""
-    connected.autopilot.spoil(up=Impairment(), down=Impairment())
-    connected.autopilot.firmware.logs = LogStore()
-    connected.autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
-    return connected
+def pair(flight: Flight) -> Iterator[Stepped]:
+    """A vehicle on the ground with two logs."""
+    with flight(ARDUPILOT) as ends:
+        ends.watch(1.0)
+        ends.firmware.logs = LogStore()
+        ends.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
+        yield ends
 
 
-def test_the_list(pair: Pair) -> None:
+def test_the_list(pair: Stepped) -> None:
     """Numbers, sizes and times, of ArduPilot those of the last writing; of none it is empty."""
     ended = BEGAN
     assert pair.vehicle.logs() == [LogEntry(1, 90, None, ended), LogEntry(2, 100_003, None, ended)]
@@ -56,7 +46,7 @@ def test_the_list(pair: Pair) -> None:
     assert pair.vehicle.logs() == []
 
 
-def test_a_log_is_fetched_whole(pair: Pair, tmp_path: Path) -> None:
+def test_a_log_is_fetched_whole(pair: Stepped, tmp_path: Path) -> None:
     """Byte by byte, in a file named after its number and time; progress is told."""
     told: list[tuple[int, int]] = []
     log = pair.vehicle.logs()[1]
@@ -64,12 +54,12 @@ def test_a_log_is_fetched_whole(pair: Pair, tmp_path: Path) -> None:
     assert file.name == "log-2-20270115-080000.bin"
     assert file.read_bytes() == DATAFLASH
     assert told == [(36_000, 100_003), (72_000, 100_003), (100_003, 100_003)]
-    wait_for(lambda: bool(pair.heard("LOG_REQUEST_END")))
+    pair.wait(lambda: bool(pair.heard("LOG_REQUEST_END")))
 
 
-def test_px4_has_its_own_format(tmp_path: Path) -> None:
+def test_px4_has_its_own_format(flight: Flight, tmp_path: Path) -> None:
     """ULog, numbered from zero."""
-    with flight(fallback="ignore") as pair:
+    with flight() as pair:
         pair.autopilot.firmware.logs.logs = {0: ULOG}
         (log,) = pair.vehicle.logs()
         assert (log.began, log.ended) == (None, BEGAN)
@@ -81,7 +71,7 @@ def test_px4_has_its_own_format(tmp_path: Path) -> None:
     assert file.read_bytes() == ULOG
 
 
-def test_lost_packets_are_asked_for_again(pair: Pair, tmp_path: Path) -> None:
+def test_lost_packets_are_asked_for_again(pair: Stepped, tmp_path: Path) -> None:
     """A tenth of them, both ways."""
     bad = Impairment(loss=0.1)
     pair.autopilot.spoil(up=bad, down=bad)
@@ -130,7 +120,7 @@ def forgets(message: Any) -> Any:  # noqa: ANN401
     ],
 )
 def test_what_goes_wrong_is_said_and_leaves_no_file(
-    pair: Pair, tmp_path: Path, spoil: Callable[[Any], Any], said: str
+    pair: Stepped, tmp_path: Path, spoil: Callable[[Any], Any], said: str
 ) -> None:
     """Neither half a log, nor an endless wait."""
     pair.autopilot.firmware.logs = Faulty({1: DATAFLASH[:90], 2: DATAFLASH}, spoil)
@@ -139,7 +129,7 @@ def test_what_goes_wrong_is_said_and_leaves_no_file(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_damaged_log_is_told_and_kept(pair: Pair, tmp_path: Path) -> None:
+def test_a_damaged_log_is_told_and_kept(pair: Stepped, tmp_path: Path) -> None:
     """Somebody may mend it."""
     pair.autopilot.firmware.logs.logs = {1: b"\xff" * 500}
     with pytest.raises(VehicleError, match="is no log of ArduPilot"):
@@ -149,32 +139,32 @@ def test_a_damaged_log_is_told_and_kept(pair: Pair, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 5 << 30])
-def test_a_size_that_cannot_be_is_refused(pair: Pair, tmp_path: Path, size: int) -> None:
+def test_a_size_that_cannot_be_is_refused(pair: Stepped, tmp_path: Path, size: int) -> None:
     """Before the disk is full."""
     with pytest.raises(VehicleError, match="none to be fetched"):
         pair.vehicle.fetch_log(LogEntry(1, size, None), tmp_path)
 
 
-def test_a_folder_that_cannot_be_written_is_named(pair: Pair, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_named(pair: Stepped, tmp_path: Path) -> None:
     """With the system's own reason."""
     (tmp_path / "file").touch()
     with pytest.raises(VehicleError, match=r"cannot write .*file"):
         pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path / "file")
 
 
-def test_not_in_flight(pair: Pair, tmp_path: Path) -> None:
+def test_not_in_flight(pair: Stepped, tmp_path: Path) -> None:
     """Setpoints and telemetry need the link."""
     connection = pair.vehicle.connection
-    connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
-    wait_for(lambda: pair.vehicle.read().armed)
+    connection.commander.give(connection.autopilot.arm(), now=pair.now)
+    pair.wait(lambda: pair.vehicle.read().armed)
     for deed in (
         pair.vehicle.logs,
         lambda: pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path),
     ):
         with pytest.raises(VehicleError, match="in flight"):
             deed()
-    connection.commander.give(connection.autopilot.disarm(), now=time.monotonic())
-    wait_for(lambda: not pair.vehicle.read().armed)
+    connection.commander.give(connection.autopilot.disarm(), now=pair.now)
+    pair.wait(lambda: not pair.vehicle.read().armed)
 
 
 @pytest.fixture
@@ -194,16 +184,18 @@ def run(
     return ran
 
 
-def test_on_the_command_line(tmp_path: Path, run: Callable[..., tuple[int, str]]) -> None:
+def test_on_the_command_line(
+    flight: Flight, tmp_path: Path, run: Callable[..., tuple[int, str]]
+) -> None:
     """A list, the newest one, and a number that there is not."""
-    port = free_port()
-    settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": "ignore", "failsafes": "ignore"}
+    ends = flight(AutopilotOptions(family="ardupilot"))
+    settings = {"url": f"udpin:{LOOPBACK}:{ends.port}", "fallback": "ignore", "failsafes": "ignore"}
     drone = {"id": "drone", "driver": "mavlink", "settings": settings}
     robots = [drone, {"id": "other"}]
     (tmp_path / "environment.json").write_text(json.dumps({"robots": robots}))
 
-    options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port))
-    with EmulatedAutopilot(options) as autopilot:
+    with ends.unconnected():
+        autopilot = ends.autopilot
         autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
         code, told = run("drone")
         assert code == 0, told
@@ -222,20 +214,21 @@ def test_on_the_command_line(tmp_path: Path, run: Callable[..., tuple[int, str]]
 
 @pytest.mark.parametrize(("family", "write"), [("ardupilot", dataflash), ("px4", ulog)])
 def test_the_log_of_a_recorded_flight_is_attached(
+    flight: Flight,
     tmp_path: Path,
     run: Callable[..., tuple[int, str]],
     family: Literal["ardupilot", "px4"],
     write: Callable[[Flown], bytes],
 ) -> None:
     """The one that was written then, by itself; another one that is named is refused."""
-    port = free_port()
-    settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": "ignore", "failsafes": "ignore"}
+    ends = flight(AutopilotOptions(family=family))
+    settings = {"url": f"udpin:{LOOPBACK}:{ends.port}", "fallback": "ignore", "failsafes": "ignore"}
     drone = {"id": "drone", "driver": "mavlink", "settings": settings}
     (tmp_path / "environment.json").write_text(json.dumps({"robots": [drone]}))
     recording = record_flown(tmp_path / "flight.mcap", Flown(duration=12.0))
     own, other = write(Flown(duration=12.0)), write(Flown(zero=500.0, duration=12.0))
-    options = AutopilotOptions(family=family, peer=(LOOPBACK, port))
-    with EmulatedAutopilot(options) as autopilot:
+    with ends.unconnected():
+        autopilot = ends.autopilot
         store = autopilot.firmware.logs
         store.logs = {1: other, 2: own, 3: other}
         # Of a flight of 12 seconds: they are when a log was last written.
@@ -260,12 +253,12 @@ def test_the_log_of_a_recorded_flight_is_attached(
 
 
 def test_the_command_changes_nothing_at_the_vehicle(
-    tmp_path: Path, run: Callable[..., tuple[int, str]]
+    flight: Flight, tmp_path: Path, run: Callable[..., tuple[int, str]]
 ) -> None:
     """Whatever a flight would set: who looks at logs does not fly."""
-    port = free_port()
+    ends = flight(AutopilotOptions(family="ardupilot"))
     settings = {
-        "url": f"udpin:{LOOPBACK}:{port}",
+        "url": f"udpin:{LOOPBACK}:{ends.port}",
         "fallback": "set",
         "failsafes": "set",
         "fence": "land",
@@ -273,8 +266,8 @@ def test_the_command_changes_nothing_at_the_vehicle(
     limits = {"geofence": {"polygon": [[-9, -9], [9, -9], [9, 9], [-9, 9]]}}
     drone = {"id": "drone", "driver": "mavlink", "limits": limits, "settings": settings}
     (tmp_path / "environment.json").write_text(json.dumps({"robots": [drone]}))
-    options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port))
-    with EmulatedAutopilot(options) as autopilot:
+    with ends.unconnected():
+        autopilot = ends.autopilot
         autopilot.firmware.logs.logs = {1: DATAFLASH[:90]}
         code, told = run("drone")
         assert code == 0, told

@@ -9,7 +9,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from mavlink_flights import LOOPBACK, free_port, robot_of, wait_for
+from autopilot import robot_of
+from emulated import LOOPBACK, free_port, wait_for
 from required import needs_peer, peer
 from router import Router
 

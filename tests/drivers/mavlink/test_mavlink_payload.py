@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
+from emulated import Stepped, fly_pictures, told
 from hypothesis import given
 from hypothesis import strategies as st
-from payload_flights import fly, found, outcome, take, told
-from stepped import Stepped
 
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
@@ -36,7 +35,7 @@ def carried(ends: Stepped) -> EmulatedPayload:
 def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
     """Ours are counted upwards and to the left; MAVLink's upwards and to the right."""
     with ends:
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         assert gimbal.aim(GimbalTarget(-0.8, 0.5)) == GimbalTarget(-0.8, 0.5)
@@ -55,7 +54,7 @@ def test_down_and_left_are_down_and_left(ends: Stepped) -> None:
 def test_a_target_is_clipped_to_what_the_gimbal_told(ends: Stepped) -> None:
     """Its range is in GIMBAL_MANAGER_INFORMATION: 90 degrees down, 20 up, 170 to either side."""
     with ends:
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         clipped = gimbal.aim(GimbalTarget(1.0, -3.1))
@@ -66,9 +65,9 @@ def test_a_target_is_clipped_to_what_the_gimbal_told(ends: Stepped) -> None:
 def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
     """Above the sea, with number and label of the request."""
     with ends:
-        found(ends)
-        number = take(ends)
-        photo = outcome(ends)
+        ends.find_payload()
+        number = ends.take_photo()
+        photo = ends.photo_outcome()
         assert isinstance(photo, Photo)
         assert (photo.number, photo.label) == (number, "wp1")
         assert photo.place is not None
@@ -79,18 +78,18 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
         assert photo.odometry is not None
         assert photo.gimbal is not None
         assert photo.file in {"DCIM/0001.JPG", "picture 1"}
-        assert take(ends) == number + 1
-        assert isinstance(outcome(ends), Photo)
+        assert ends.take_photo() == number + 1
+        assert isinstance(ends.photo_outcome(), Photo)
         assert len(carried(ends).taken) == 2
 
 
 def test_an_altitude_of_zero_with_a_place_is_not_known(ends: Stepped) -> None:
     """Cameras without one send zero, which is not the level of the sea."""
     with ends:
-        found(ends)
+        ends.find_payload()
         carried(ends).knows_height = False
-        take(ends)
-        photo = outcome(ends)
+        ends.take_photo()
+        photo = ends.photo_outcome()
         assert isinstance(photo, Photo)
         assert photo.place is not None
         assert photo.place.latitude == pytest.approx(47.397742, abs=1e-6)
@@ -100,9 +99,9 @@ def test_an_altitude_of_zero_with_a_place_is_not_known(ends: Stepped) -> None:
 def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
     """Such as one by the pilot's switch, or by the autopilot's own distance trigger."""
     with ends:
-        found(ends)
+        ends.find_payload()
         carried(ends)._take()
-        photo = outcome(ends)
+        photo = ends.photo_outcome()
         assert isinstance(photo, Photo)
         assert photo.number is None
 
@@ -114,22 +113,22 @@ def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
 def test_a_picture_that_fails_is_told(ends: Stepped, fault: str, said: str) -> None:
     """At once where it is refused, after some seconds where nothing comes."""
     with ends:
-        found(ends)
+        ends.find_payload()
         setattr(carried(ends), fault, True)
-        number = take(ends)
-        failure = outcome(ends)
+        number = ends.take_photo()
+        failure = ends.photo_outcome()
         assert isinstance(failure, PhotoFailure)
         assert failure.number == number
         assert said in failure.reason
         setattr(carried(ends), fault, False)
-        take(ends)
-        assert isinstance(outcome(ends), Photo)
+        ends.take_photo()
+        assert isinstance(ends.photo_outcome(), Photo)
 
 
 def test_a_gimbal_that_refuses_says_so(ends: Stepped) -> None:
     """The result of the command, in words."""
     with ends:
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         carried(ends).gimbal_refuses = True
@@ -145,7 +144,7 @@ def test_a_gimbal_that_refuses_says_so(ends: Stepped) -> None:
 def test_an_attitude_that_is_none_is_no_word(ends: Stepped) -> None:
     """The last one ages, and in the end the gimbal counts as gone; it may come back."""
     with ends:
-        found(ends)
+        ends.find_payload()
         carried(ends).nonsense = True
         ends.watch(1.0)
         state = ends.turn()
@@ -161,7 +160,7 @@ def test_an_attitude_that_is_none_is_no_word(ends: Stepped) -> None:
 def test_a_gimbal_that_vanishes_is_gone(ends: Stepped) -> None:
     """After five seconds without a word; the vehicle itself is heard all the while."""
     with ends:
-        found(ends)
+        ends.find_payload()
         carried(ends).has_gimbal = False
         ends.watch(6.0)
         assert ends.vehicle.gimbal is None
@@ -242,9 +241,9 @@ def test_no_attitude_is_anything_but_finite(
 def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
     """Each once the gimbal looks there, straight down included."""
     with ends:
-        mission = fly(ends)
+        mission = fly_pictures(ends)
         assert mission.state is MissionState.LANDED, mission.status.reason
-        assert told(mission) == []
+        assert told(mission, "photo") == []
         first, second = mission.photographer.photos
         assert first.gimbal is not None
         assert second.gimbal is not None
@@ -266,17 +265,17 @@ def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, faul
             setattr(theirs, fault, True)
 
     with ends:
-        mission = fly(ends, strike)
+        mission = fly_pictures(ends, strike)
         assert mission.state is MissionState.LANDED, mission.status.reason
         assert list(mission.status.visited) == ["a", "b"]
         assert mission.status.photos == (1, 1)
-        assert any(text.startswith("b: no picture: ") for text in told(mission))
+        assert any(text.startswith("b: no picture: ") for text in told(mission, "photo"))
 
 
 def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:
     """Targets that follow one another go as messages, with a command now and then."""
     with ends:
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         for step in range(60):
@@ -300,7 +299,7 @@ def test_a_gimbal_without_a_yaw_axis_says_so(ends: Stepped) -> None:
     """By its manager's capabilities; a target comes back with the yaw that it keeps."""
     with ends:
         carried(ends).turns = False
-        found(ends)
+        ends.find_payload()
         gimbal = ends.vehicle.gimbal
         assert gimbal is not None
         assert gimbal.aim(GimbalTarget(-0.5, 0.7)) == GimbalTarget(-0.5, 0.0)

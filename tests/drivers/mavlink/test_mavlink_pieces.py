@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from emulated import Flight
 from hypothesis import given
 from hypothesis import strategies as st
-from mavlink_flights import flight
 from numpy.typing import NDArray
 
 from aerodaas.config.model import GeofenceConfig, RobotConfig
@@ -411,7 +411,7 @@ def test_px4s_integers_travel_by_their_bytes(value: int) -> None:
     assert ArduPilot().decode(ArduPilot().encode(7.0, kind), kind) == 7.0
 
 
-def test_missions_go_up_and_come_down() -> None:
+def test_missions_go_up_and_come_down(flight: Flight) -> None:
     """Over a bad link, with progress, item by item."""
     bad = Impairment(loss=0.1, duplicates=0.2)
     options = AutopilotOptions(uplink=bad, downlink=bad, seed=3)
@@ -429,6 +429,7 @@ def test_missions_go_up_and_come_down() -> None:
 
 
 def test_an_upload_whose_acknowledgement_is_lost_begins_anew(
+    flight: Flight,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """An autopilot that has all items answers none of them again."""

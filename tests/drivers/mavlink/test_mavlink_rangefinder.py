@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from stepped import Stepped
-from stepped_missions import started
+from emulated import FAMILIES, Stepped
 
 from aerodaas.drivers.mavlink.state.frames import Attitude
 from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
@@ -18,7 +17,6 @@ from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 
 LEVEL = Attitude()
-FAMILIES = ("px4", "ardupilot")
 
 
 def reading(centimetres: int, **fields: Any) -> Any:  # noqa: ANN401 - pymavlink has no types
@@ -109,11 +107,10 @@ def test_a_drone_climbs_with_the_ground(
     limits = {"rangefinder_clearance": 2.0, "takeoff_height": 3.0, "cruise_speed": 1.5}
     least, highest = math.inf, 0.0
     with Stepped(monkeypatch, options, limits=limits) as ends:
-        loop = started(ends, [Waypoint("far", 25, 0, 3)])
+        flight = ends.mission([Waypoint("far", 25, 0, 3)])
         for _ in range(900):
-            ends.advance(0.05)
-            loop.turn(round(ends.now * 1e9))
-            if loop.mission.state is MissionState.ENROUTE:
+            flight.turn()
+            if flight.mission.state is MissionState.ENROUTE:
                 east, _, up = ends.vehicle.read().odometry.position
                 least = min(least, up - 0.3 * max(0.0, east))
                 highest = max(highest, up)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from mavlink_flights import flight, wait_for
+from emulated import Flight
 
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -84,11 +84,11 @@ def test_vibration_and_fix() -> None:
 
 
 @pytest.mark.parametrize("family", ["px4", "ardupilot"])
-def test_a_connected_vehicle_tells_all_of_it(family: str) -> None:
+def test_a_connected_vehicle_tells_all_of_it(flight: Flight, family: str) -> None:
     """As far as the emulated ones model it; without a connection it is an error."""
-    with flight(AutopilotOptions(family=family)) as pair:  # type: ignore[arg-type]
-        wait_for(lambda: pair.vehicle.health().vibration is not None)
-        wait_for(lambda: pair.vehicle.health().estimator is not None)
+    with flight(AutopilotOptions(family=family), fallback="report") as pair:  # type: ignore[arg-type]
+        pair.wait(lambda: pair.vehicle.health().vibration is not None)
+        pair.wait(lambda: pair.vehicle.health().estimator is not None)
         told = pair.vehicle.health()
         assert told.gps_fix is True
         assert told.cells is None
@@ -99,5 +99,5 @@ def test_a_connected_vehicle_tells_all_of_it(family: str) -> None:
         pair.vehicle.close()
         with pytest.raises(VehicleError, match="not connected"):
             pair.vehicle.health()
-    with flight(AutopilotOptions(family=family), fallback="ignore") as pair:  # type: ignore[arg-type]
+    with flight(AutopilotOptions(family=family)) as pair:  # type: ignore[arg-type]
         assert pair.vehicle.health().stranded is None

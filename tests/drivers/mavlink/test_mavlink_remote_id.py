@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import pytest
-from handmade import Handmade
+from autopilot import HERE, Bench
+from emulated import FAMILIES, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
-from stepped import Stepped
-from stepped_missions import started
 
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.commands import ReturnHome
-from aerodaas.mission.loop import SetpointLoop
-from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.types.health import HealthItem, Verdict
 from aerodaas.types.status import MissionState as S
@@ -27,7 +23,6 @@ from aerodaas.types.vehicle import VehicleMode
 from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 
-FAMILIES = ("px4", "ardupilot")
 NUMBER = "FIN87astrdge12k8"
 WHO = {
     "operator_id": f"{NUMBER}-xyz",
@@ -38,6 +33,7 @@ WHO = {
 }
 REQUIRED = {"remote_id": "require"}
 GOOD, BAD = 0, 1
+READY = mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b"")
 
 
 def ends_of(
@@ -142,8 +138,8 @@ def test_what_is_not_known_is_told_as_unknown() -> None:
 def test_the_place_of_the_take_off_stays_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """While the drone flies away from it."""
     with ends_of(monkeypatch) as ends:
-        flying = started(ends, [Waypoint("far", 40, 0, 3)])
-        fly(flying, ends, until=lambda: bool(flying.mission.status.visited))
+        flying = ends.mission([Waypoint("far", 40, 0, 3)])
+        flying.until(lambda: flying.visited)
         system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
         assert ends.autopilot.truth.position[0] > 39.0
         assert system.operator_longitude == pytest.approx(85455940, abs=30)
@@ -214,20 +210,6 @@ def test_the_list_before_take_off_has_the_transmitters_own_words(
         assert bool(found.remedy) is (verdict in {Verdict.WARNING, Verdict.REFUSED})
 
 
-def fly(
-    loop: SetpointLoop,
-    ends: Stepped,
-    timeout: float = 150.0,
-    until: Callable[[], bool] = lambda: False,
-) -> Mission:
-    """Fly until the mission is over, `until` holds, or the time is."""
-    end = ends.now + timeout
-    while not loop.mission.finished and ends.now < end and not until():
-        ends.advance(0.05)
-        loop.turn(round(ends.now * 1e9))
-    return loop.mission
-
-
 STOP = Waypoint("there", 12, 0, 3)
 
 
@@ -238,7 +220,7 @@ def test_a_take_off_is_refused_with_the_transmitters_own_words(
     """Where the robot requires it; nothing moves."""
     with ends_of(monkeypatch, family) as ends:
         ends.autopilot.transmitter.error = "bad LOC accuracy"
-        mission = fly(started(ends, [STOP]), ends)
+        mission = ends.mission([STOP]).fly()
         assert mission.state is S.ABORTED
         assert "take-off refused: remote_id: bad LOC accuracy" in mission.status.reason
         assert ends.autopilot.firmware.motions == []
@@ -252,12 +234,12 @@ def test_a_transmitter_that_becomes_ready_in_time_is_waited_for(
     with ends_of(monkeypatch) as ends:
         transmitter = ends.autopilot.transmitter
         transmitter.error = "no GPS fix"
-        loop = started(ends, [STOP])
-        fly(loop, ends, 2.0)
-        assert loop.mission.state is S.PREFLIGHT
+        flight = ends.mission([STOP])
+        flight.run(2.0)
+        assert flight.mission.state is S.PREFLIGHT
         transmitter.error = ""
-        assert fly(loop, ends).state is S.LANDED
-        assert [alert.text for alert in loop.mission.alerts] == []
+        assert flight.fly().state is S.LANDED
+        assert flight.told() == []
 
 
 @pytest.mark.parametrize("trouble", ["silent", "unhealthy"])
@@ -269,20 +251,20 @@ def test_a_transmitter_lost_in_flight_is_told_once(
 ) -> None:
     """On the way out as on the way home; the flight goes on as it would have."""
     with ends_of(monkeypatch) as ends:
-        loop = started(ends, [STOP])
-        mission = loop.mission
-        fly(loop, ends, until=lambda: mission.state is S.ENROUTE)
+        flight = ends.mission([STOP])
+        mission = flight.mission
+        flight.until(S.ENROUTE)
         if leaving:
-            fly(loop, ends, 3.0)
-            mission.handle(ReturnHome("the test says so"), round(ends.now * 1e9))
+            flight.run(3.0)
+            mission.handle(ReturnHome("the test says so"), flight.now())
         if trouble == "silent":
             ends.autopilot.transmitter.present = False
         else:
             ends.autopilot.transmitter.error = "TX: power lost"
-        fly(loop, ends)
+        flight.fly()
         assert mission.state is S.LANDED
         assert list(mission.status.visited) == ([] if leaving else ["there"])
-        (told,) = [alert.text for alert in mission.alerts]
+        (told,) = flight.told()
         if trouble == "silent":
             assert told.startswith("Remote ID: the transmitter has said nothing for ")
         else:
@@ -294,7 +276,7 @@ def test_a_flight_without_the_transmitter_that_is_configured_is_told_of(
 ) -> None:
     """By a warning before take-off, where that is all that is asked for, and in flight."""
     with ends_of(monkeypatch, carried=False, preflight={"remote_id": "warn"}) as ends:
-        mission = fly(started(ends, [STOP]), ends)
+        mission = ends.mission([STOP]).fly()
         assert mission.state is S.LANDED
         texts = {alert.text for alert in mission.alerts}
         assert "Remote ID: no transmitter is heard" in texts
@@ -385,15 +367,13 @@ def test_only_the_vehicles_own_transmitter_is_heard(
     heard: bool,  # noqa: FBT001
 ) -> None:
     """Its autopilot's, or a transmitter's of its system, from its own address."""
-    vehicle = Handmade(monkeypatch, remote_id=WHO)
-    vehicle.connect()
-    codec = mavlink.MAVLink(None, system, component)
-    packet = bytes(mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b"").pack(codec))
-    vehicle.receive_also(packet, peer)
-    vehicle.advance(0.1)
-    told = vehicle.vehicle.health().remote_id
+    bench = Bench(monkeypatch, remote_id=WHO)
+    bench.connect()
+    bench.autopilot.say(READY, peer or HERE, (system, component))
+    bench.clock.advance(0.1)
+    told = bench.vehicle.health().remote_id
     assert told == ("" if heard else "no transmitter is heard")
-    vehicle.vehicle.close()
+    bench.close()
 
 
 @pytest.mark.parametrize("flies", [True, False])
@@ -402,22 +382,17 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its words hide no silent autopilot, in the air and on the ground."""
-    vehicle = Handmade(monkeypatch, remote_id=WHO)
-    vehicle.connect()
+    bench = Bench(monkeypatch, remote_id=WHO)
+    bench.connect()
     if flies:
-        vehicle.fly()
-    vehicle.speaks, vehicle.result = False, None
-    codec = mavlink.MAVLink(None, 1, 236)
-    autopilot = mavlink.MAVLink(None, 1, 1)
+        bench.fly()
+    bench.autopilot.speaks, bench.autopilot.result = False, None
     for _ in range(60):
-        for message, own in (
-            (mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b""), codec),
-            (mavlink.MAVLink_open_drone_id_arm_status_message(GOOD, b""), autopilot),
-        ):
-            vehicle.receive_also(bytes(message.pack(own)), None)
-        vehicle.turn()
-    assert vehicle.turn() is VehicleMode.LOST
-    assert "no word from the vehicle for 3 s" in vehicle.vehicle.preflight()
-    assert vehicle.vehicle.health().remote_id == ""
-    assert math.isclose(vehicle.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
-    vehicle.vehicle.close()
+        for ids in ((1, 236), (1, 1)):
+            bench.autopilot.say(READY, HERE, ids)
+        bench.turn()
+    assert bench.turn() is VehicleMode.LOST
+    assert "no word from the vehicle for 3 s" in bench.vehicle.preflight()
+    assert bench.vehicle.health().remote_id == ""
+    assert math.isclose(bench.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
+    bench.close()

@@ -8,42 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mavlink_flights import LOOPBACK, Pair, free_port, robot_of, wait_for
+from autopilot import Wire
+from emulated import FAMILIES, LOOPBACK, Flight, Stepped, inject, wait_for
 
-from aerodaas.config.model import EnvironmentConfig
-from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
 from aerodaas.drivers.mavlink.wire.sharing import WireShare, share_wire
 from aerodaas.drivers.pin import Peer
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle import VehicleMode
-from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.mavlink_vehicle import AutopilotOptions
 
 HERE: Peer = (LOOPBACK, 4)
 ELSEWHERE: Peer = (LOOPBACK, 5)
-
-
-class _Wire:
-    """A wire of the test's."""
-
-    def __init__(self) -> None:
-        self.inbox: list[tuple[bytes, Peer]] = []
-        self.sent: list[tuple[bytes, tuple[Peer, ...]]] = []
-        self.closed = 0
-
-    def fileno(self) -> int:
-        return -1
-
-    def receive(self) -> list[tuple[bytes, Peer]]:
-        arrived, self.inbox = self.inbox, []
-        return arrived
-
-    def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        self.sent.append((packet, peers))
-
-    def close(self) -> None:
-        self.closed += 1
 
 
 class _Member:
@@ -62,12 +39,12 @@ class Shared:
     """Shares of a wire by system id."""
 
     def __init__(self, *systems: int, hears_all: int | None = None) -> None:
-        self.wires: list[_Wire] = []
+        self.wires: list[Wire] = []
         self.shares = [self.share(one, hears_all=one == hears_all) for one in systems]
 
-    def open(self, _url: str, _name: str) -> _Wire:
+    def open(self, _url: str, _name: str) -> Wire:
         """A fresh wire."""
-        self.wires.append(_Wire())
+        self.wires.append(Wire())
         return self.wires[-1]
 
     def share(self, system: int, *, hears_all: bool = False) -> WireShare:
@@ -175,65 +152,31 @@ def test_a_system_id_has_one_share() -> None:
         one.share(1)
 
 
-def _vehicles(
-    port: int, *settings: dict[str, Any]
-) -> tuple[EnvironmentConfig, list[MavlinkVehicle]]:
-    robots = [
-        robot_of(port, system=number, failsafes="ignore", fallback="ignore", **one).model_copy(
-            update={"id": f"drone{number}"}
-        )
-        for number, one in enumerate(settings, 1)
-    ]
-    environment = EnvironmentConfig(robots=robots)
-    return environment, [MavlinkVehicle(robot, environment) for robot in robots]
-
-
-@contextmanager
-def two(
-    *keys: bytes | None, settings: tuple[dict[str, Any], ...] = ({}, {})
-) -> Iterator[tuple[Pair, Pair]]:
-    """Two emulated vehicles that speak to one port, and the driver of each."""
-    port = free_port()
-    environment, drivers = _vehicles(port, *settings)
-    with ExitStack() as opened:
-        pairs = []
-        for number, (driver, family) in enumerate(
-            zip(drivers, ("px4", "ardupilot"), strict=True), 1
-        ):
-            options = AutopilotOptions(
-                family=family,  # type: ignore[arg-type]
-                system=number,
-                peer=(LOOPBACK, port),
-                battery=1.0 - 0.25 * number,
-                key=keys[number - 1] if keys else None,
-            )
-            autopilot = opened.enter_context(EmulatedAutopilot(options))
-            driver.connect()
-            opened.callback(driver.close)
-            pairs.append(Pair(autopilot, driver, environment.robots[number - 1]))
-        yield pairs[0], pairs[1]
-
-
-def test_two_vehicles_fly_on_one_link_each_with_its_own_key(tmp_path: Path) -> None:
+def test_two_vehicles_fly_on_one_link_each_with_its_own_key(flight: Flight, tmp_path: Path) -> None:
     """One takes off; what is forged in the other's name, and its end, do not reach it."""
-    keys = (bytes(range(32)), bytes(range(1, 33)))
-    files = [tmp_path / name for name in ("one", "two")]
-    for file, key in zip(files, keys, strict=True):
-        file.write_text(key.hex())
-    settings = tuple({"signing_key": str(file)} for file in files)
-    with two(*keys, settings=settings) as (left, right):
+    ends: list[Stepped] = []
+    with ExitStack() as opened:
+        for number, family in enumerate(FAMILIES, 1):
+            key = bytes(range(number, 32 + number))
+            file = tmp_path / family
+            file.write_text(key.hex())
+            options = AutopilotOptions(
+                family=family, system=number, battery=1.0 - 0.25 * number, key=key
+            )
+            settings = {"system": number, "signing_key": str(file)}
+            made = flight(options, beside=ends[0] if ends else None, **settings)
+            ends.append(opened.enter_context(made))
+        left, right = ends
         assert left.vehicle.read().battery.fraction == pytest.approx(0.75, abs=0.02)
         assert right.vehicle.read().battery.fraction == pytest.approx(0.5, abs=0.02)
         right.take_off()
         assert right.autopilot.armed
         assert not left.autopilot.armed
-        forged = mavlink.MAVLink(None, 1, 1)
         message = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 9000, 0, 3, 0, 0, 0, 0, 0, 0)
         for _ in range(50):
-            left.autopilot.inject(message.pack(forged))
-        extra = left.vehicle.connection.link.counts
-        wait_for(lambda: extra.refused >= 50)
-        assert right.vehicle.connection.link.counts.refused == 0
-        left.autopilot.stop()
-        wait_for(lambda: left.vehicle.read().mode is VehicleMode.LOST)
+            inject(left, message)
+        left.wait(lambda: left.vehicle.read().extra["refused_packets"] >= 50)
+        assert right.vehicle.read().extra["refused_packets"] == 0
+        left.clock.turns.remove(left.autopilot.turn)
+        left.wait(lambda: left.vehicle.read().mode is VehicleMode.LOST)
         assert right.vehicle.read().mode in {VehicleMode.HOLDING, VehicleMode.GUIDED}

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from emulated import FAMILIES, Stepped, inject
 from hypothesis import given
 from hypothesis import strategies as st
-from stepped import Stepped
-from stepped_missions import started
 
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.microservices.traffic import TrafficTable
@@ -24,7 +23,6 @@ from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.aircraft import EmulatedAircraft
 
-FAMILIES = ("px4", "ardupilot")
 ORIGIN = GeodeticOrigin(47.397742, 8.545594, 0.0)
 SEA = 488.0
 HERE = np.zeros(3)
@@ -318,7 +316,7 @@ def test_traffic_is_asked_for_once_and_again_after_a_restart(
     def asked() -> int:
         number = float(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE)
         wanted = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-        told = [one for _, one in ends.autopilot.heard if one.get_type() == "COMMAND_LONG"]
+        told = ends.heard("COMMAND_LONG")
         return sum(one.command == wanted and one.param1 == number for one in told)
 
     with ends_of(monkeypatch, family) as ends:
@@ -338,26 +336,20 @@ def test_a_receiver_beside_the_autopilot_is_heard_too(monkeypatch: pytest.Monkey
     with ends_of(monkeypatch, "px4") as ends:
         ends.watch(1.0)
         for component, seen in ((157, 0), (156, 1)):
-            codec = mavlink.MAVLink(None, 1, component)
-            ends.autopilot.inject(bytes(report().pack(codec)))
+            inject(ends, report(), (1, component))
             ends.watch(0.2)
             assert len(ends.turn().traffic) == seen
 
 
-def fly(
-    ends: Stepped, stop: Waypoint, timeout: float = 200.0
-) -> tuple[Mission, list[VehicleState]]:
+def fly(ends: Stepped, stop: Waypoint) -> tuple[Mission, list[VehicleState]]:
     """A whole mission to one place, and all that was read."""
-    loop = started(ends, [stop])
-    mission = loop.mission
-    states, end = list[VehicleState](), ends.now + timeout
-    while not mission.finished:
-        assert ends.now < end, mission.status.reason
-        ends.advance(0.05)
-        loop.turn(round(ends.now * 1e9))
-        assert loop.state is not None
-        states.append(loop.state)
-    return mission, states
+    flight, states = ends.mission([stop]), list[VehicleState]()
+
+    def note(_: Mission) -> None:
+        assert flight.loop.state is not None
+        states.append(flight.loop.state)
+
+    return flight.fly(note), states
 
 
 @pytest.mark.parametrize("family", FAMILIES)

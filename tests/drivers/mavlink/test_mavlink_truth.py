@@ -9,12 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from mavlink_flights import flight
-from stepped import Stepped
+from autopilot import STILL, Family
+from emulated import FAMILIES, Flight, Stepped
 
 from aerodaas.drivers.mavlink import connecting
-from aerodaas.drivers.mavlink.state.telemetry import Telemetry
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle import (
     FlightEnd,
@@ -28,24 +26,14 @@ from tools.mavlink_vehicle import AutopilotOptions
 THERE = np.array([6.0, 3.0, 12.0])
 
 
-@pytest.fixture(params=["px4", "ardupilot"])
-def world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stepped]:
+@pytest.fixture(params=FAMILIES)
+def world(request: pytest.FixtureRequest, flight: Flight) -> Iterator[Stepped]:
     """One of each family, 12 m up, guided to a place off home; it does not begin at zero."""
     options = AutopilotOptions(family=request.param, estimator_origin=(20.0, -9.0, 3.0))
-    with Stepped(monkeypatch, options) as flown:
+    with flight(options) as flown:
         flown.guide(12.0)
-        fly(flown, THERE, 8.0)
+        flown.stream(PositionSetpoint(THERE, None, 3.0), 8.0)
         yield flown
-
-
-def fly(world: Stepped, place: np.ndarray, duration: float) -> VehicleState:
-    """Stream a place for `duration` seconds."""
-    world.vehicle.send(PositionSetpoint(place, None, 3.0))
-    state = world.turn()
-    for _ in range(round(duration / 0.05) - 1):
-        world.vehicle.send(PositionSetpoint(place, None, 3.0))
-        state = world.turn()
-    return state
 
 
 def told(state: VehicleState, words: str) -> bool:
@@ -118,13 +106,11 @@ def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
     assert states[-1].mode is VehicleMode.GROUNDED
 
 
-@pytest.mark.parametrize("family", ["px4", "ardupilot"])
-def test_an_autopilot_that_starts_anew_on_the_ground(
-    monkeypatch: pytest.MonkeyPatch, family: str
-) -> None:
+@pytest.mark.parametrize("family", FAMILIES)
+def test_an_autopilot_that_starts_anew_on_the_ground(flight: Flight, family: Family) -> None:
     """It stands where it stood, whatever its new frame says, and flies from there."""
-    options = AutopilotOptions(family=family, estimator_origin=(20.0, -9.0, 3.0))  # type: ignore[arg-type]
-    with Stepped(monkeypatch, options) as world:
+    options = AutopilotOptions(family=family, estimator_origin=(20.0, -9.0, 3.0))
+    with flight(options) as world:
         world.watch(8.0)
         world.autopilot.restart()
         state = world.watch(15.0)[-1]
@@ -167,35 +153,29 @@ def test_a_local_frame_that_jumps(world: Stepped) -> None:
         world.vehicle.send(VelocitySetpoint(np.zeros(3)))
         state = world.turn()
     assert state.odometry.position == pytest.approx(world.autopilot.truth.position, abs=0.5)
-    state = fly(world, THERE, 12.0)
+    state = world.stream(PositionSetpoint(THERE, None, 3.0), 12.0)
     assert world.autopilot.truth.position == pytest.approx(THERE, abs=0.5)
     assert not told(state, "position")
 
 
-def test_telemetry_that_stands_still_is_a_loss(world: Stepped) -> None:
-    """Packets that come with old stamps say nothing: lost within two seconds, and its age shows."""
+def test_what_it_no_longer_knows_is_told(world: Stepped) -> None:
+    """A lost fix by its name; packets with old stamps are a loss within two seconds."""
+    there = PositionSetpoint(THERE, None, 3.0)
+    world.autopilot.lose_gps()
+    assert told(world.stream(there, 3.0), "GPS: no fix")
+    world.autopilot.lose_gps(off=True)
+    assert world.stream(there, 3.0).faults == ()
     world.autopilot.freeze()
-    for _ in range(39):
-        world.turn()
-    state = world.turn()
+    state = world.watch(2.0)[-1]
     assert state.mode is VehicleMode.LOST
     assert told(state, "telemetry: packets come, and say nothing new")
     world.autopilot.freeze(off=True)
     assert world.turn().mode is not VehicleMode.LOST
 
 
-def test_a_gps_that_is_lost_is_told_by_its_name(world: Stepped) -> None:
-    """Within seconds, and no more when it is back."""
-    world.autopilot.lose_gps()
-    state = fly(world, THERE, 3.0)
-    assert told(state, "GPS: no fix")
-    world.autopilot.lose_gps(off=True)
-    assert fly(world, THERE, 3.0).faults == ()
-
-
-def test_a_log_that_blocks_holds_nobody_up() -> None:
+def test_a_log_that_blocks_holds_nobody_up(flight: Flight) -> None:
     """While the link's own thread hangs in a log, the control loop reads, flies and lands."""
-    entered, let_go = threading.Event(), threading.Event()
+    entered, let_go, done = threading.Event(), threading.Event(), threading.Event()
 
     class Blocking(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:  # noqa: ARG002 - the base's
@@ -204,40 +184,25 @@ def test_a_log_that_blocks_holds_nobody_up() -> None:
 
     log = logging.getLogger("aerodaas.drivers.mavlink.vehicle")
     handler = Blocking()
-    done = threading.Event()
-    with flight(AutopilotOptions(family="ardupilot")) as pair:
-        pair.guide()
+    with flight(AutopilotOptions(family="ardupilot")) as ends:
+        ends.guide()
 
         def turn() -> None:
-            pair.vehicle.read()
-            with contextlib.suppress(VehicleError):
-                pair.vehicle.send(VelocitySetpoint(np.zeros(3)))
-            with contextlib.suppress(VehicleError):
-                pair.vehicle.land()
+            ends.vehicle.read()
+            for deed in (lambda: ends.vehicle.send(STILL), ends.vehicle.land):
+                with contextlib.suppress(VehicleError):
+                    deed()
             done.set()
 
         log.addHandler(handler)
+        link = threading.Thread(target=ends.advance, args=(2.0,), daemon=True)
         try:
-            pair.autopilot.take_over()
+            ends.autopilot.take_over()
+            link.start()
             assert entered.wait(10.0)
             threading.Thread(target=turn, daemon=True).start()
-            assert done.wait(20.0)
+            assert done.wait(10.0)
         finally:
             let_go.set()
             log.removeHandler(handler)
-
-
-def test_only_an_autopilot_that_was_met_before_has_started_anew() -> None:
-    """One that boots while we meet it has not; ArduPilot says so in its first HEARTBEATs."""
-    telemetry = Telemetry()
-
-    def beat(state: int, now: float) -> None:
-        telemetry.take(mavlink.MAVLink_heartbeat_message(2, 3, 81, 0, state, 3), now)
-
-    beat(mavlink.MAV_STATE_BOOT, 1.0)
-    beat(mavlink.MAV_STATE_BOOT, 2.0)
-    beat(mavlink.MAV_STATE_STANDBY, 3.0)
-    assert telemetry.reboots == 0
-    beat(mavlink.MAV_STATE_BOOT, 9.0)
-    beat(mavlink.MAV_STATE_BOOT, 10.0)
-    assert telemetry.reboots == 1
+            link.join()

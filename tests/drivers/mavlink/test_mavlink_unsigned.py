@@ -7,10 +7,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
 
 import pytest
-from mavlink_flights import LOOPBACK, free_port, robot_of, wait_for
+from autopilot import Family, robot_of
+from emulated import FAMILIES, LOOPBACK, Flight, free_port, wait_for
 
 from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
@@ -19,7 +19,6 @@ from aerodaas.drivers.mavlink import connecting
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.discovery import hear_vehicles
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor.watcher import VehicleWatcher
@@ -27,7 +26,6 @@ from aerodaas.types.errors import VehicleError
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 KEY = bytes(range(32))
-Family: TypeAlias = Literal["px4", "ardupilot"]
 TRUTH = "signs; no key is here"
 
 
@@ -38,32 +36,28 @@ def _no_key_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def signing(family: Family = "px4", **settings: Any) -> Iterator[EnvironmentConfig]:  # noqa: ANN401
-    """An autopilot that wants its key, and the environment of its drone."""
+def signing() -> Iterator[EnvironmentConfig]:
+    """An autopilot that wants its key, in real time, and the environment of its drone."""
     port = free_port()
-    options = AutopilotOptions(family=family, peer=(LOOPBACK, port), ready_after=0.0, key=KEY)
-    with EmulatedAutopilot(options):
-        yield EnvironmentConfig(robots=[robot_of(port, **settings)])
+    with EmulatedAutopilot(AutopilotOptions(peer=(LOOPBACK, port), ready_after=0.0, key=KEY)):
+        yield EnvironmentConfig(robots=[robot_of(port)])
 
 
-@pytest.mark.parametrize("family", ["px4", "ardupilot"])
-def test_it_is_not_connected_without_its_key(family: Family) -> None:
+@pytest.mark.parametrize("family", FAMILIES)
+def test_it_is_not_connected_without_its_key(flight: Flight, family: Family) -> None:
     """What it says can be read, and nothing that we say is: found out before it is to fly."""
-    with signing(family) as environment:
-        vehicle = MavlinkVehicle(environment.robots[0], environment)
-        with pytest.raises(VehicleError, match=f"{TRUTH}.*{MAVLINK_KEY}.*signing_key"):
-            vehicle.connect()
-        assert not vehicle.connected
+    ends = flight(AutopilotOptions(family=family, key=KEY))
+    refused = pytest.raises(VehicleError, match=f"{TRUTH}.*{MAVLINK_KEY}.*signing_key")
+    with refused, ends:
+        pass
+    assert not ends.vehicle.connected
 
 
-def test_with_its_key_it_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_its_key_it_is_connected(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
     """Then it answers."""
     monkeypatch.setenv(MAVLINK_KEY, KEY.hex())
-    with signing() as environment:
-        vehicle = MavlinkVehicle(environment.robots[0], environment)
-        vehicle.connect()
-        assert vehicle.preflight() == []
-        vehicle.close()
+    with flight(AutopilotOptions(key=KEY)) as ends:
+        assert ends.vehicle.connected
 
 
 def test_one_that_obeys_the_unsigned_is_connected() -> None:
@@ -96,11 +90,16 @@ def test_the_fleets_state_says_so() -> None:
 
 
 def test_preflight_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    flight: Flight,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Instead of a list on which all is good."""
-    with signing() as environment:
-        content = environment.model_dump(mode="json", exclude_defaults=True)
+    with flight(AutopilotOptions(key=KEY)).unconnected() as ends:
+        content = EnvironmentConfig(robots=[ends.robot]).model_dump(
+            mode="json", exclude_defaults=True
+        )
         (tmp_path / "environment.json").write_text(json.dumps(content))
         monkeypatch.chdir(tmp_path)
         monkeypatch.setattr(sys, "argv", ["aerodaas", "preflight", "drone"])
@@ -114,6 +113,6 @@ def test_preflight_says_so(
 def test_discovery_says_so() -> None:
     """`aerodaas init --discover` finds it, and says what it will want."""
     with signing() as environment:
-        (heard,) = hear_vehicles(2.5, [environment.robots[0].settings["url"]]).vehicles
+        (heard,) = hear_vehicles(1.5, [environment.robots[0].settings["url"]]).vehicles
     assert heard.signs
     assert MAVLINK_KEY in heard.text

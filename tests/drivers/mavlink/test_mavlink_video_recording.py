@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 
 import pytest
-from payload_flights import fly_to, found, wait
-from stepped import Stepped
+from emulated import Stepped, told
 
 from aerodaas.config.model import MissionConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -52,8 +51,8 @@ def camera_of(ends: Stepped) -> VideoCamera:
 
 def known(ends: Stepped) -> VideoCamera:
     """The camera, once it has said whether it records."""
-    found(ends)
-    wait(ends, lambda: camera_of(ends).filming is not None)
+    ends.find_payload()
+    ends.wait(lambda: camera_of(ends).filming is not None)
     return camera_of(ends)
 
 
@@ -81,11 +80,6 @@ def heard(ends: Stepped, number: int = CAMERA) -> list[tuple[float, ...]]:
     ]
 
 
-def told(mission: Mission) -> list[str]:
-    """What people were told of video."""
-    return [alert.text for alert in mission.alerts if alert.kind == "video"]
-
-
 def test_a_video_is_begun_and_ended_at_waypoints(ends: Stepped) -> None:
     """All streams, and no status asked for by it; its own status tells so soon after."""
     recorded: list[float | None] = []
@@ -95,12 +89,12 @@ def test_a_video_is_begun_and_ended_at_waypoints(ends: Stepped) -> None:
 
     with ends:
         known(ends)
-        mission = fly_to(ends, [BEGIN, FINISH], OPTIONS, note)
+        mission = ends.mission([BEGIN, FINISH], OPTIONS, ends.vehicle).fly(note)
         assert list(mission.status.visited) == ["a", "b"]
         assert heard(ends) == [(START, *[0.0] * 7), (STOP, *[0.0] * 7)]
         assert payload(ends).recording is None
         assert heard(ends, OTHER) == []
-        assert told(mission) == []
+        assert told(mission, "video") == []
         assert any(one is not None for one in recorded)
         assert recorded[-1] is None
 
@@ -120,7 +114,7 @@ def test_an_order_is_repeated_until_it_is_acknowledged(ends: Stepped) -> None:
         ends.turn()
         assert camera.filming is None
         ends.autopilot.components[CAMERA].stalls = False
-        wait(ends, lambda: camera.filming)
+        ends.wait(lambda: camera.filming)
         assert payload(ends).recording is not None
 
 
@@ -129,9 +123,9 @@ def test_a_silent_camera_is_told_and_its_status_counts_later(ends: Stepped) -> N
     with ends:
         camera = known(ends)
         ends.autopilot.components[CAMERA].stalls = True
-        mission = fly_to(ends, [BEGIN], OPTIONS)
+        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
         assert list(mission.status.visited) == ["a"]
-        assert told(mission)[0] == (
+        assert told(mission, "video")[0] == (
             "video not begun at a: the camera did not acknowledge it within 4 s"
         )
         assert (camera.filming, camera.film_fault) == (None, "")
@@ -151,9 +145,9 @@ def test_a_refusal_leaves_what_was_known(ends: Stepped) -> None:
     with ends:
         camera = known(ends)
         payload(ends).video_refuses = True
-        mission = fly_to(ends, [BEGIN], OPTIONS)
+        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
         assert list(mission.status.visited) == ["a"]
-        assert told(mission) == ["video not begun at a: denied"]
+        assert told(mission, "video") == ["video not begun at a: denied"]
         assert (camera.filming, camera.film_fault) == (False, "denied")
         assert [one[0] for one in heard(ends)] == [START]
 
@@ -162,10 +156,10 @@ def test_a_camera_without_video_is_told_at_once(ends: Stepped) -> None:
     """By the flags of its CAMERA_INFORMATION; one without any flags may have it."""
     with ends:
         payload(ends).flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
-        found(ends)
-        mission = fly_to(ends, [BEGIN], OPTIONS)
+        ends.find_payload()
+        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
         assert list(mission.status.visited) == ["a"]
-        assert told(mission) == ["video not begun at a: the camera records no video"]
+        assert told(mission, "video") == ["video not begun at a: the camera records no video"]
         assert heard(ends) == []
 
 
@@ -175,7 +169,7 @@ def test_an_old_camera_that_tells_no_flags_is_asked(ends: Stepped) -> None:
         payload(ends).flags = 0
         camera = known(ends)
         camera.film(on=True)
-        wait(ends, lambda: camera.filming)
+        ends.wait(lambda: camera.filming)
 
 
 def test_a_video_is_ended_before_the_link_is_closed(
@@ -185,7 +179,7 @@ def test_a_video_is_ended_before_the_link_is_closed(
     caplog.set_level(logging.WARNING)
     with ends:
         known(ends)
-        mission = fly_to(ends, [BEGIN], OPTIONS, lambda _: None)
+        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
         assert mission.finished
         assert payload(ends).recording is not None
     assert payload(ends).recording is None
@@ -203,7 +197,7 @@ def test_an_end_that_is_not_acknowledged_is_in_the_log(
         def stall(mission: Mission) -> None:
             ends.autopilot.components[CAMERA].stalls = bool(mission.status.visited)
 
-        fly_to(ends, [BEGIN], OPTIONS, stall)
+        ends.mission([BEGIN], OPTIONS, ends.vehicle).fly(stall)
         before = ends.now
     assert ends.now - before < 4.0
     assert "its camera has not acknowledged that its video is to end" in caplog.text
@@ -214,8 +208,8 @@ def test_a_video_that_ran_before_take_off_is_left_alone(ends: Stepped) -> None:
     with ends:
         payload(ends).recording = 12.0
         known(ends)
-        mission = fly_to(ends, [BEGIN], OPTIONS)
-        assert told(mission) == []
+        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
+        assert told(mission, "video") == []
         assert heard(ends) == []
     assert payload(ends).recording == 12.0
 
@@ -232,11 +226,11 @@ def test_a_status_that_belies_the_beginning_is_told_once(ends: Stepped) -> None:
         def note(mission: Mission) -> None:
             if camera.filming and not acknowledged:
                 acknowledged.append(ends.now)
-            if told(mission) and not belied:
+            if told(mission, "video") and not belied:
                 belied.append(ends.now)
 
-        mission = fly_to(ends, stops, OPTIONS, note)
-        assert told(mission) == [f"video begun at a, but {NOT}"]
+        mission = ends.mission(stops, OPTIONS, ends.vehicle).fly(note)
+        assert told(mission, "video") == [f"video begun at a, but {NOT}"]
         assert 2.0 <= belied[0] - acknowledged[0] < 5.0
         ends.watch(1.0)
         assert [one[0] for one in heard(ends)] == [START, STOP]
@@ -251,8 +245,8 @@ def test_a_status_that_belies_the_end_is_told_once(ends: Stepped) -> None:
         def stick(_: Mission) -> None:
             payload(ends).video_sticks = payload(ends).recording is not None
 
-        mission = fly_to(ends, stops, OPTIONS, stick)
-        assert told(mission) == [f"video ended at b, but {STILL}"]
+        mission = ends.mission(stops, OPTIONS, ends.vehicle).fly(stick)
+        assert told(mission, "video") == [f"video ended at b, but {STILL}"]
 
 
 def test_a_recording_that_breaks_off_is_told(ends: Stepped) -> None:
@@ -320,7 +314,7 @@ def test_a_camera_that_was_off_in_between_is_told(ends: Stepped) -> None:
         assert (camera.filming, camera.film_fault) == (False, NOT)
         vanish(ends)
         camera.film(on=True)
-        wait(ends, lambda: camera.filming)
+        ends.wait(lambda: camera.filming)
         assert payload(ends, OTHER).recording is not None
 
 
@@ -346,7 +340,7 @@ def test_a_refusal_changes_nothing(ends: Stepped) -> None:
         camera = known(ends)
         payload(ends).video_refuses = True
         camera.film(on=True)
-        wait(ends, lambda: camera.film_fault)
+        ends.wait(lambda: camera.film_fault)
         assert camera.filming is False
 
 

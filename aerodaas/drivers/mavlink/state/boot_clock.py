@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -56,8 +55,8 @@ class BootClock:
     the same: the autopilot may have started anew.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Know nothing; `clock` is ours, in seconds.
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """Know nothing; `clock` is ours, in monotonic seconds.
 
         It is read as a request leaves and an answer is looked at, so that waiting in between only
         makes a round trip longer: the turn of the link's thread may have begun before either.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -106,7 +107,7 @@ class Telemetry:
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
         self.rangefinder = Rangefinder() if measures_ground else None
-        self.texts, self.events, self.boot_clock = Texts(), EventReader(), BootClock()
+        self.texts, self.events, self.boot_clock = Texts(), EventReader(), BootClock(time.monotonic)
         self._takers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -295,7 +296,7 @@ class Telemetry:
         self.home = self._armed_at = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
         self.sensors, self.on_ground, self.breach = None, None, ""
-        self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock()
+        self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock(time.monotonic)
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
         if self.rangefinder is not None:
