@@ -40,6 +40,7 @@ __all__ = [
     "SETPOINT",
     "STILL",
     "THERE",
+    "Answer",
     "Bench",
     "Family",
     "ScriptedAutopilot",
@@ -217,6 +218,10 @@ class ScriptedAutopilot:
         self.position = np.array([10.0, 20.0, -3.0])
         """Metres north, east, down of its own zero; it first stands 488 m above the sea."""
         self.velocity = np.zeros(3)
+        self.globe = (470000000, 80000000)
+        """Degrees of latitude and longitude times ten million; zeros: it does not know."""
+        self.mute: set[str] = set()
+        """Names of messages that it does not say."""
         self.landed = mavlink.MAV_LANDED_STATE_ON_GROUND
         self.checks_pass = True
         self._codec = mavlink.MAVLink(None, *self.target)
@@ -289,11 +294,19 @@ class ScriptedAutopilot:
             mavlink.MAVLink_extended_sys_state_message(0, self.landed),
             mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0),
             mavlink.MAVLink_local_position_ned_message(boot, *self.position, *self.velocity),
-            mavlink.MAVLink_global_position_int_message(
-                boot, 470000000, 80000000, altitude, 0, 0, 0, 0, 0
-            ),
+            mavlink.MAVLink_global_position_int_message(boot, *self.globe, altitude, 0, 0, 0, 0, 0),
         ):
-            self.say(message)
+            if message.get_type() not in self.mute:
+                self.say(message)
+
+    def say_text(self, text: str, severity: int = 3) -> None:
+        """Say a STATUSTEXT."""
+        self.say(mavlink.MAVLink_statustext_message(severity, text.encode(), 0, 0))
+
+    def start_anew(self) -> None:
+        """Say that it boots."""
+        kind = 12 if self.family == "px4" else 3
+        self.say(mavlink.MAVLink_heartbeat_message(2, kind, 0, 0, mavlink.MAV_STATE_BOOT, 3))
 
     def of(self, *kinds: str) -> list[Message]:
         """Messages of these names that it received."""
@@ -349,7 +362,7 @@ class Bench:
 
     def close(self) -> None:
         """Let go of a vehicle that neither speaks nor answers any more."""
-        self.autopilot.speaks, self.autopilot.result = False, None
+        self.hush()
         self.vehicle.close()
 
     def turn(self, seconds: float = _STEP) -> VehicleMode:
@@ -359,6 +372,10 @@ class Bench:
             self.clock.advance(_STEP)
             mode = self.vehicle.read().mode
         return mode
+
+    def hush(self, *, off: bool = False) -> None:
+        """Have the autopilot say nothing at all, or speak again."""
+        self.autopilot.speaks, self.autopilot.result = off, ACCEPTED if off else None
 
     def fly(self, height: float = 5.0, mode: FlightMode = FlightMode.HOLD) -> None:
         """Be found in the air, `height` metres above where it was armed, after a take-off."""

@@ -95,13 +95,6 @@ def test_a_refusal_is_told_at_once(ends: Stepped, name: str) -> None:
         assert ends.turn().actuators == {}
 
 
-def test_an_unknown_command_is_refused_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As PX4 does with a servo."""
-    with Stepped(monkeypatch, AutopilotOptions(), CARRIED) as ends:
-        ends.vehicle.actuators.move("hatch", "open")
-        assert result(ends).reason == "not supported"
-
-
 def test_silence_is_repeated_and_told(ends: Stepped) -> None:
     """Each time for the same state, never for the other one."""
     with ends:
@@ -110,16 +103,6 @@ def test_silence_is_repeated_and_told(ends: Stepped) -> None:
         assert result(ends) == MoveResult(1, accepted=False, reason="no answer")
         assert set(carried(ends).asked) == {(mavlink.MAV_CMD_DO_GRIPPER, 2.0, 0.0)}
         assert len(carried(ends).asked) == 6
-
-
-def test_what_takes_its_time_is_awaited(ends: Stepped) -> None:
-    """An acknowledgement IN_PROGRESS is none yet."""
-    with ends:
-        carried(ends).conduct = "busy"
-        ends.vehicle.actuators.move("hook", "release")
-        ends.watch(3.0)
-        assert ends.vehicle.actuators.results() == []
-        assert result(ends).accepted
 
 
 @pytest.mark.parametrize(
@@ -136,17 +119,6 @@ def test_a_lie_is_found_out(ends: Stepped, name: str, position: str, said: str) 
         ends.vehicle.actuators.move(name, position)
         assert result(ends) == MoveResult(1, accepted=False, reason=said)
         assert ends.turn().actuators == {}
-
-
-def test_where_nothing_is_told_the_acknowledgement_counts(ends: Stepped) -> None:
-    """After some requests; a gripper's always does."""
-    with ends:
-        carried(ends).tells = False
-        ends.vehicle.actuators.move("hatch", "open")
-        assert result(ends).accepted
-        carried(ends).conduct = "lie"
-        ends.vehicle.actuators.move("hook", "release")
-        assert result(ends).accepted
 
 
 def test_commands_of_one_kind_do_not_replace_each_other(ends: Stepped) -> None:

@@ -102,17 +102,6 @@ def test_a_velocity_leads_somewhere(north: float, *, lost: bool) -> None:
     assert (flight.alignment.frame is None) is lost
 
 
-def test_a_leap_is_told_by_its_length() -> None:
-    """30 m north and 40 m east are 50."""
-    flight = Flying()
-    flight.jump(30.0, 40.0, 0.0)
-    assert flight.alignment.frame is None
-    assert flight.alignment.fault == "position: jumped by 50 m"
-    flight.move(0.1)
-    assert flight.alignment.frame is None
-    assert flight.alignment.fault == "position: jumped by 50 m"
-
-
 def test_a_frame_is_found_again_after_two_seconds_that_agree() -> None:
     """Where the globe says, which is where the frame was less the jump; heights by the sea's."""
     flight = Flying()
@@ -162,22 +151,6 @@ def test_global_positions_that_disagree_begin_anew() -> None:
     assert frame.origin[2] == pytest.approx(6.0, abs=0.1)
 
 
-def test_what_differs_by_little_is_averaged() -> None:
-    """Five heights a metre below and four a metre above agree on 0.11 m below."""
-    flight = Flying()
-    flight.jump(30.0, 0.0, 0.0)
-    assert flight.telemetry.altitude is not None
-    found = False
-    for turn in range(9):
-        flight.telemetry.altitude = 500.0 + (1.0 if turn % 2 else -1.0)
-        found = flight.look()
-        flight.move(0.25)
-    assert found
-    frame = flight.alignment.frame
-    assert frame is not None
-    assert frame.origin[2] == pytest.approx(1.889, abs=0.02)
-
-
 @pytest.mark.parametrize("doubt", ["unsure", "no place", "no altitude", "old position"])
 def test_any_doubt_begins_the_two_seconds_anew(doubt: str) -> None:
     """The estimator's own, a globe that says nothing, a local position of a while ago."""
@@ -201,16 +174,6 @@ def test_any_doubt_begins_the_two_seconds_anew(doubt: str) -> None:
         seen.append(flight.look())
         flight.move(0.25)
     assert seen == [False] * 8 + [True]
-
-
-def test_whose_height_was_never_known_is_not_found_again() -> None:
-    """There is no sea level to count from."""
-    flight = Flying(altitude=None)
-    flight.jump(30.0, 0.0, 0.0)
-    flight.telemetry.altitude = 500.0
-    for _ in range(20):
-        assert not flight.look()
-        flight.move(0.25)
 
 
 def test_a_jump_is_told_for_ten_seconds_after_it_was_mended() -> None:
@@ -261,17 +224,3 @@ def test_a_vehicle_that_flew_is_looked_for_by_the_globe() -> None:
     frame = flight.alignment.frame
     assert frame is not None
     assert frame.origin == pytest.approx([76.1, 111.2, 12.0], abs=0.2)
-
-
-def test_who_had_not_said_where_it_stands_is_not_thought_to_stand_there() -> None:
-    """Nor who has just jumped: its place is not known."""
-    telemetry = Flying().telemetry
-    fresh = Alignment(LocalFrame(np.zeros(3)), telemetry)
-    fresh.restart(stands=True)
-    fresh.move()
-    assert fresh.frame is None
-    flight = Flying()
-    flight.jump(30.0, 0.0, 0.0)
-    flight.alignment.restart(stands=True)
-    flight.move(0.1)
-    assert flight.alignment.frame is None

@@ -146,15 +146,6 @@ def test_what_is_no_answer_of_ours() -> None:
     assert world.mistake < 1e-6
 
 
-def test_a_slow_answer_tells_nothing() -> None:
-    """Its stamps do as well."""
-    world = Exchanges()
-    stamp = world.ask()
-    world.now += 1.01
-    world.hear(int(50e9), stamp)
-    assert world.clock.reading(world.now) is None
-
-
 def test_one_contradiction_is_doubted_and_two_are_a_start_anew() -> None:
     """A garbled or forged answer changes nothing; an autopilot that starts anew goes on so."""
     world = Exchanges()
@@ -198,7 +189,6 @@ def test_states_tell_its_clock_and_how_surely(flight: Flight) -> None:
         pair.wait(lambda: right(pair))
 
 
-@pytest.mark.slow
 def test_an_uplink_that_is_lost_alone_is_told(flight: Flight) -> None:
     """The vehicle is heard and answers nothing; as soon as it answers again all is well."""
 

@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.drivers.mavlink.microservices.camera_status import (
-    CameraModelTold,
-    CaptureStatus,
     camera_model_told,
     capture_status,
 )
@@ -122,17 +120,6 @@ def test_a_full_card_is_the_cameras_and_told_once(ends: Stepped) -> None:
         assert "faults" not in names
 
 
-def test_a_camera_that_is_required_has_to_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise nothing is known of one, and nothing has to be."""
-    with Stepped(monkeypatch, AutopilotOptions()) as ends:
-        item = camera_item(ends)
-        assert item is not None
-        assert item.verdict is Verdict.UNKNOWN
-        item = camera_item(ends, camera="require")
-        assert item is not None
-        assert (item.verdict, item.value) == (Verdict.REFUSED, "not known")
-
-
 def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) -> None:
     """Within seconds, at the time of the camera's word, and without its own place."""
     with ends:
@@ -160,23 +147,6 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
         assert (photo.number, photo.file) == (second, "DCIM/0002.JPG")
         (status,) = ends.vehicle.payload.cameras()
         assert status.taken == 1
-
-
-def test_a_message_that_comes_late_is_no_second_picture(ends: Stepped) -> None:
-    """Nor is it taken for that of the next request."""
-    with ends:
-        ready(ends)
-        payload(ends).mute = True
-        ends.take_photo()
-        assert isinstance(ends.photo_outcome(6.0), Photo)
-        second = ends.take_photo("wp2")
-        late = mavlink.MAVLink_camera_image_captured_message(
-            0, 0, 1, 0, 0, 0, 0, [1.0, 0, 0, 0], 0, 1, b"DCIM/0001.JPG"
-        )
-        ends.autopilot.components[CAMERA].say(late)
-        photo = ends.photo_outcome(6.0)
-        assert isinstance(photo, Photo)
-        assert (photo.number, photo.label, photo.file) == (second, "wp2", "")
 
 
 def _blind(camera: EmulatedPayload) -> None:
@@ -255,19 +225,6 @@ def test_no_camera_is_too_odd(names: list[int], focal: float, sensor: float, pix
     assert model.name.isprintable()
     assert model.view is None or 0.0 < model.view < 180.0
     assert (model.pixels is None) == (pixels == 0)
-
-
-def test_what_is_not_told_is_not_known() -> None:
-    """Zeros of a camera that says nothing of itself."""
-    empty = [0] * 32
-    information = mavlink.MAVLink_camera_information_message(
-        0, empty, empty, 0, math.nan, 0.0, 0.0, 0, 0, 0, 0, 0, b""
-    )
-    assert camera_model_told(information) == CameraModelTold("", None, None)
-    told = mavlink.MAVLink_camera_capture_status_message(0, 0, 0, 0.0, 0, 0.0, 3)
-    assert capture_status(told) == CaptureStatus(3, None, None, None)
-    assert str(CameraStatus("camera")) == "tells nothing of itself"
-    assert str(CameraStatus("camera", interval=0.0)) == "takes more"
 
 
 ABLE = mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE | mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import socket
 from collections.abc import Callable
 
 import pytest
 from emulated import Stepped, fly_pictures, told
 
-from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.mission import Mission
 from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
@@ -61,19 +59,6 @@ def test_they_are_found_by_their_heartbeats_and_commanded_by_their_ids(ends: Ste
         assert (commands(ends, GIMBAL, turn), commands(ends, CAMERA, capture)) == (1, 1)
         assert (commands(ends, 1, turn), commands(ends, 1, capture)) == (0, 0)
         assert ends.vehicle.read().extra.get("stranger_packets", 0) == 0
-
-
-def test_a_mission_takes_its_pictures_with_them(ends: Stepped) -> None:
-    """As with what the autopilot manages."""
-    with ends:
-        mission = fly_pictures(ends)
-        assert mission.state is MissionState.LANDED, mission.status.reason
-        assert told(mission, "photo") == []
-        first, second = mission.photographer.photos
-        assert first.gimbal is not None
-        assert second.gimbal is not None
-        assert first.gimbal.pitch == pytest.approx(-math.pi / 2, abs=0.06)
-        assert second.gimbal.yaw == pytest.approx(0.7, abs=0.06)
 
 
 def _vanish(ends: Stepped) -> None:
@@ -132,18 +117,6 @@ def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
         assert isinstance(ends.photo_outcome(), Photo)
 
 
-def test_a_camera_that_comes_late_is_found_in_flight(ends: Stepped) -> None:
-    """Its heartbeat is enough."""
-    for component in ends.autopilot.components.values():
-        component.vanished = True
-    with ends:
-        ends.watch(8.0)
-        assert ends.vehicle.photo_camera is None
-        for component in ends.autopilot.components.values():
-            component.vanished = False
-        ends.find_payload()
-
-
 def test_one_that_answered_nothing_is_asked_anew_when_it_is_back(ends: Stepped) -> None:
     """A camera that hangs as it starts is given up, and asked again after a restart."""
     camera = ends.autopilot.components[CAMERA]
@@ -178,14 +151,6 @@ def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) 
                 ends.autopilot.components[component].vanished = True
                 ends.watch(6.0)
         assert len(set(numbers)) == 3
-
-
-def test_a_camera_that_only_films_takes_no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By its own flags."""
-    with Stepped(monkeypatch, AutopilotOptions(components=(100,))) as ends:
-        ends.autopilot.components[100].payload.flags = mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
-        ends.watch(8.0)
-        assert ends.vehicle.photo_camera is None
 
 
 def test_a_managed_gimbals_device_speaks_for_itself(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -260,52 +225,3 @@ def test_the_address_of_the_video_is_found(monkeypatch: pytest.MonkeyPatch, comp
         payload.video = "rtsp://10.6.6.6/other"
         ends.watch(8.0)
         assert ends.vehicle.read().video == state.video
-
-
-def test_a_card_that_fills_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Asked again and again; its room is shown, and its end is a fault of the vehicle."""
-    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
-        payload = ends.autopilot.components[CAMERA].payload
-        payload.free = 12_000.0
-        ends.watch(6.0)
-        (camera,) = ends.vehicle.payload.cameras()
-        assert (camera.name, camera.free) == ("camera (component 100)", 12_000.0)
-        assert ends.vehicle.read().faults == ()
-        payload.free = 20.0
-        ends.watch(25.0)
-        assert ends.vehicle.read().faults == (
-            "camera (component 100): its card is full: 20 MiB are left",
-        )
-
-
-@pytest.mark.parametrize(
-    ("status", "free", "room", "trouble"),
-    [
-        (2, 5000.0, 5000.0, ""),
-        (2, math.nan, None, ""),
-        (2, -1.0, None, ""),
-        (2, 0.0, 0.0, "its card is full: 0 MiB are left"),
-        (0, 0.0, None, "it has no card"),
-        (1, 0.0, None, "its card is not formatted"),
-        (3, 0.0, None, ""),
-        (99, 0.0, None, ""),
-    ],
-)
-def test_what_a_camera_says_of_its_card(
-    status: int, free: float, room: float | None, trouble: str
-) -> None:
-    """A status that is not known says nothing."""
-    told = mavlink.MAVLink_storage_information_message(0, 1, 1, status, 1e4, 0.0, free, 0, 0)
-    assert card_state(told) == CardState(room, trouble)
-
-
-def test_an_address_that_leads_elsewhere_is_shown_and_not_read(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A file of this machine is none of the vehicle's."""
-    with Stepped(monkeypatch, AutopilotOptions(components=(CAMERA,))) as ends:
-        ends.autopilot.components[CAMERA].payload.video = "file:///etc/passwd"
-        ends.watch(6.0)
-        assert ends.vehicle.read().video == ""
-        ((_, stream),) = ends.vehicle.payload.streams()
-        assert "only rtsp, rtsps, tcp, udp are, not 'file'" in str(stream)

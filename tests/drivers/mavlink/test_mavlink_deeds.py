@@ -425,14 +425,3 @@ def test_who_starts_anew_on_the_ground_stands_where_it_stood(world: Bench) -> No
     world.autopilot.armed = True
     world.turn(0.3)
     assert "autopilot: it started anew" not in world.vehicle.read().faults
-
-
-def test_nobody_there_is_said_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the time that it was given, with the place; and then it is not connected."""
-    world = Bench(monkeypatch)
-    world.autopilot.speaks = False
-    with pytest.raises(VehicleError, match="drone: no HEARTBEAT on udpin"):
-        world.vehicle.connect(3.0)
-    assert world.now == pytest.approx(1003.0)
-    assert not world.vehicle.connected
-    assert world.vehicle.preflight() == ["not connected"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import subprocess
 import sys
 import threading
@@ -16,20 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 from autopilot import robot_of
-from emulated import LOOPBACK, Flight, Stepped, free_port, inject, wait_for
+from emulated import LOOPBACK, Flight, Stepped, free_port, wait_for
 from typing_extensions import Self
 
-from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices import journal
-from aerodaas.drivers.mavlink.microservices.journal import (
-    Changes,
-    Journal,
-    ParameterChange,
-)
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
-from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
@@ -121,16 +112,6 @@ def away(autopilot: EmulatedAutopilot) -> float:
     return float(np.linalg.norm(autopilot.truth.position[:2]))
 
 
-def test_its_place_in_its_own_mission_is_told(flight: Flight) -> None:
-    """As far as it tells it."""
-    with flight(ARDUPILOT, fallback="set", way_home=WAY) as pair:
-        pair.wait(lambda: "mission_item" in pair.vehicle.read().extra)
-        assert pair.vehicle.read().extra["mission_item"] == 0.0
-        assert "mission_reached" not in pair.vehicle.read().extra
-        inject(pair, mavlink.MAVLink_mission_item_reached_message(3))
-        pair.wait(lambda: pair.vehicle.read().extra.get("mission_reached") == 3.0)
-
-
 def test_the_owner_gets_everything_back(flight: Flight, state_folder: Path) -> None:
     """While we are connected it would come home; afterwards it is as it was."""
     with flight(ARDUPILOT, fallback="set") as pair:
@@ -201,18 +182,6 @@ def test_after_a_kill_the_next_flight_puts_it_back(
             assert values(pair) == {**OURS, "FS_GCS_ENABLE": 3.0}
         assert values(pair) == OWN
         assert not list(state_folder.rglob("*.json"))
-
-
-def test_who_only_watches_puts_nothing_back(flight: Flight) -> None:
-    """Nor does it, where a flight was killed: that is the next flight's to do."""
-    with flight(ARDUPILOT, fallback="set") as pair:
-        pair.die()
-        with pair.again(fallback="set", **MavlinkVehicle.observing):
-            pass
-        assert values(pair) == OURS
-        with pair.again(fallback="set"):
-            pass
-        assert values(pair) == OWN
 
 
 def test_what_its_owner_sets_meanwhile_stays(flight: Flight) -> None:
@@ -286,29 +255,6 @@ def test_each_that_keeps_it_away_is_named(flight: Flight, family: str) -> None:
             held[name] = before
 
 
-def test_what_is_judged_goes_with_role_version_and_way() -> None:
-    """PX4 before 1.14 asks another parameter; as its ground station it may hold first."""
-    names = {
-        (role, software): [
-            name
-            for one in PX4().fallback(MavlinkSettings(role=role), 120.0, software)
-            for name in one.names
-        ]
-        for role in ("companion", "ground_station")
-        for software in ("1.13.3", "1.14.0", "")
-    }
-    assert "COM_OBL_ACT" in names["companion", "1.13.3"]
-    assert "COM_OBL_ACT" not in names["companion", "1.14.0"] + names["companion", ""]
-    assert "NAV_DLL_ACT" in names["ground_station", "1.14.0"]
-    assert "NAV_DLL_ACT" not in names["companion", "1.14.0"]
-    for way, value in (("return", 1.0), ("retrace", 3.0), ([(1.0, 2.0, 3.0)], 6.0)):
-        settings = MavlinkSettings.model_validate({"way_home": way})
-        *_, acts = ArduPilot().fallback(settings, 120.0, "")
-        assert acts.value == value
-        fitting = [one for one in range(8) if acts.fits(float(one))]
-        assert fitting == ([1, 3, 6] if way == "return" else [value])
-
-
 def test_the_way_home_takes_the_owners_mission_for_a_flight(flight: Flight) -> None:
     """Their own comes back, item by item."""
     own = [
@@ -322,17 +268,6 @@ def test_the_way_home_takes_the_owners_mission_for_a_flight(flight: Flight) -> N
             assert mission(pair.autopilot) == [16, 188, 16, 16, 21]
         with pair.again(fallback="ignore") as vehicle:
             assert vehicle.download_mission() == own
-
-
-@pytest.mark.usefixtures("state_folder")
-def test_what_a_mission_leaves_open_is_kept() -> None:
-    """A heading that is not a number is one that the autopilot chooses; JSON has no word for it."""
-    own = MissionItem(16, (0.1, 0.0, math.inf, math.nan), -470_000_000, 2, 2.5, 3)
-    changes = Changes(parameters={"RTL_ALT": ParameterChange(15.1, 0.0)}, mission=[own])
-    Journal("one").write(changes)
-    assert repr(Journal("one").read()) == repr(changes)
-    Journal("one").clear()
-    assert Journal("one").read() is None
 
 
 class Faulty(PlanStore):
@@ -460,3 +395,15 @@ def test_a_journal_that_cannot_be_written_changes_nothing(
             ends.vehicle.connect()
         held = ends.firmware.parameters.values
         assert {name: held[name] for name in OWN} == OWN
+
+
+def test_who_only_watches_puts_nothing_back(flight: Flight) -> None:
+    """Nor does it, where a flight was killed: that is the next flight's to do."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        pair.die()
+        with pair.again(fallback="set", **MavlinkVehicle.observing):
+            pass
+        assert values(pair) == OURS
+        with pair.again(fallback="set"):
+            pass
+        assert values(pair) == OWN

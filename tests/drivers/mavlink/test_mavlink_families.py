@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-import struct
-from types import SimpleNamespace
 
 import pytest
 
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.autopilots.autopilot import ANYWHERE, Autopilot
+from aerodaas.drivers.mavlink.autopilots.autopilot import ANYWHERE
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
-from aerodaas.drivers.mavlink.microservices.events import event_number
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-INTEGERS = (1, 2, 3, 4, 5, 6)
-"""Kinds of parameters from UINT8 to INT32; 9 is REAL32."""
 
 
 def px4_mode(main: int, sub: int = 0) -> int:
@@ -126,25 +121,6 @@ def test_ardupilot_rises_to_a_height_above_home() -> None:
     assert climb.what == PX4().take_off(3.0, telemetry)[2].what == "take off"
 
 
-def test_orders_that_both_know() -> None:
-    """Arm, disarm, checks, the version, and an interval in microseconds: 4 Hz are 250 000."""
-    arming = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-    arm, disarm = Autopilot.arm(), Autopilot.disarm()
-    assert (arm.number, list(arm.values), arm.insists) == (arming, [1.0, 0, 0, 0, 0, 0, 0], True)
-    assert (disarm.number, disarm.values, disarm.insists) == (arming, (0.0,) * 7, False)
-    assert (arm.what, disarm.what) == ("arm", "disarm")
-    check = Autopilot.check()
-    assert (check.number, check.values) == (mavlink.MAV_CMD_RUN_PREARM_CHECKS, (0.0,) * 7)
-    version = Autopilot.version()
-    assert version.number == mavlink.MAV_CMD_REQUEST_MESSAGE
-    assert list(version.values) == [148.0, 0, 0, 0, 0, 0, 0]
-    interval = Autopilot.interval(30, 4.0)
-    assert interval.number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-    assert list(interval.values) == [30.0, 250_000.0, 0, 0, 0, 0, 0]
-    assert (check.what, version.what) == ("run the arming checks", "tell the version")
-    assert interval.what == "send message 30 at 4 Hz"
-
-
 @pytest.mark.parametrize(
     ("action", "px4", "ardupilot"),
     [("warn", 1.0, 0.0), ("hold", 2.0, 4.0), ("return", 3.0, 1.0), ("land", 5.0, 2.0)],
@@ -161,25 +137,6 @@ def test_what_a_fence_does(action: str, px4: float, ardupilot: float) -> None:
         "FENCE_TYPE": 5.0,
         "FENCE_ENABLE": 1.0,
     }
-
-
-@pytest.mark.parametrize("kind", INTEGERS)
-@pytest.mark.parametrize("value", [0, 1, 2, 5, -1, 1_065_353_216, 123_456])
-def test_px4s_integers_on_the_wire(kind: int, value: int) -> None:
-    """Four bytes, the lowest first, in the place of a single: 0x3f800000 looks like 1."""
-    encoded = PX4().encode(value + 0.2, kind)
-    if not math.isnan(encoded):
-        assert struct.pack("<f", encoded) == value.to_bytes(4, "little", signed=True)
-        assert PX4().decode(encoded, kind) == value
-    assert PX4().decode(1.0, kind) == 1_065_353_216.0
-
-
-def test_reals_and_ardupilots_parameters_are_singles_as_they_are() -> None:
-    """Whatever their kind."""
-    for kind in (9, 10):
-        assert PX4().encode(2.5, kind) == PX4().decode(2.5, kind) == 2.5
-    for kind in (*INTEGERS, 9):
-        assert ArduPilot().encode(7.0, kind) == ArduPilot().decode(7.0, kind) == 7.0
 
 
 def telling(present: int, health: int) -> Telemetry:
@@ -201,47 +158,3 @@ def test_what_ardupilot_objects_to() -> None:
         failing.texts.add(text, 2, 100.0)
     assert ArduPilot().objections(failing, 135.0) == ["PreArm: compass", "Arm: throttle"]
     assert ArduPilot().objections(failing, 135.1) == ["ArduPilot's arming checks fail"]
-
-
-def test_what_px4_objects_to() -> None:
-    """Its altitude first; then its checks, of which none count for hold but those of hold."""
-    assert PX4().objections(Telemetry(), 0.0) == [
-        "PX4 does not know its altitude above the sea yet"
-    ]
-    few = Telemetry()
-    for number, name in enumerate(
-        ("commander_arming_check_summary", "check_estimator_gps_num_sats_too_low")
-    ):
-        few.events.take(event_number(name), 4, number)
-    few.events.take(event_number("commander_health_summary"), 3, 2)
-    assert PX4().objections(few, 0.0)[0] == "GPS: too few satellites"
-    assert PX4().objections(telling(0, 0), 0.0) == [
-        "PX4 has not told yet whether its arming checks pass"
-    ]
-    assert PX4().objections(telling(CHECK, CHECK), 0.0) == []
-    failing = telling(CHECK, 0)
-    for custom in (px4_mode(4, 3), px4_mode(1)):
-        failing.custom_mode = custom
-        assert PX4().objections(failing, 0.0) == ["PX4's arming checks fail"]
-    names = (
-        "commander_arming_check_summary",
-        "check_mag_missing",
-        "check_modes_mission",
-        "commander_health_summary",
-    )
-    for number, name in enumerate(names):
-        failing.events.take(event_number(name), 3, number)
-    assert PX4().objections(failing, 0.0) == ["compass: missing"]
-    failing.custom_mode = px4_mode(4, 3)
-    assert PX4().objections(failing, 0.0) == ["compass: missing"]
-
-
-def test_families_are_known_by_their_heartbeats() -> None:
-    """And what each of them needs beside the rest."""
-    assert (PX4.family, ArduPilot.family) == (12, 3)
-    assert PX4.rates[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS] == 2.0
-    assert ArduPilot.rates[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT] == 2.0
-    assert {PX4.rates[32], PX4.rates[30], ArduPilot.rates[32]} == {20.0}
-    assert SimpleNamespace(px4=PX4.stops_short, ardupilot=ArduPilot.stops_short) == (
-        SimpleNamespace(px4=1.2, ardupilot=0.0)
-    )

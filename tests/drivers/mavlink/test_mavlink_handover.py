@@ -12,7 +12,6 @@ from autopilot import SETPOINT
 from emulated import FAMILIES, FlownMission, Stepped, inject
 
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.commands import (
     AddNavigation,
@@ -150,19 +149,6 @@ def test_taken_back_it_flies_on_from_what_was_not_reached(
         assert flight.told("handover")[-1] == "the hand-over has ended: asked to"
 
 
-def test_a_stay_goes_on_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Taken back in the middle of it, it stays for what is left."""
-    stay = [Waypoint("a", 0, 8, 3, hover_duration=20.0)]
-    with handed(monkeypatch, stops=stay) as flight:
-        flight.hand_over()
-        flight.until(S.LOITERING)
-        began = flight.ends.now
-        flight.until(lambda: flight.ends.now > began + 12.0)
-        flight.tell(TakeBack())
-        flight.until(lambda: flight.visited == ["a"])
-        assert flight.ends.now - began < 28.0
-
-
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize(
     ("command", "state", "mode"),
@@ -282,6 +268,7 @@ def test_a_loop_that_hangs_is_told_as_the_reason(monkeypatch: pytest.MonkeyPatch
     with handed(monkeypatch) as flight:
         flight.hand_over()
         flight.ends.advance(2.0)
+        assert "hold" in flight.ends.firmware.motions
         flight.until(lambda: not flight.mission.handover.flies, 3.0)
         assert "the control loop hung" in flight.told("handover")[-1]
 
@@ -335,13 +322,6 @@ def test_a_pilots_own_mission_is_a_pilots(monkeypatch: pytest.MonkeyPatch) -> No
         assert flight.mission.state is S.ABORTED, flight.story
 
 
-def test_one_that_is_met_in_its_mission_mode_is_a_pilots() -> None:
-    """We have not asked for it, whoever did: nothing is sent."""
-    phase = FlightPhase()
-    phase.observe(FlightMode.MISSION, 1.0, armed=True, critical=False)
-    assert phase.mode is VehicleMode.MANUAL
-
-
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_boundary_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
     """An autopilot that flies out of the fence is stopped before it."""
@@ -369,15 +349,6 @@ def test_another_drone_takes_them_back(monkeypatch: pytest.MonkeyPatch, family: 
         flight.run(5)
         away = np.linalg.norm(flight.ends.autopilot.truth.position - [0.0, 12.0, 3.0])
         assert away > 2.5
-
-
-def test_a_hung_loop_holds_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody guards the plan then."""
-    with handed(monkeypatch) as flight:
-        flight.hand_over()
-        flight.ends.advance(3.0)
-        assert "hold" in flight.ends.firmware.motions
-        assert flight.ends.firmware.custom_mode == 17
 
 
 LIES = {
@@ -509,27 +480,6 @@ def test_a_hand_over_that_fails_leaves_the_drone_as_it_was(
         assert flight.states[flight.states.index(S.ENROUTE) :] == [S.ENROUTE, S.RETURNING]
 
 
-def test_a_waypoint_that_is_reached_meanwhile_is_not_flown_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The rest is uploaded anew."""
-    stops = [Waypoint("a", 0, 3, 3), Waypoint("b", 0, 20, 3), Waypoint("c", 0, 30, 3)]
-    with handed(monkeypatch, stops=stops) as flight:
-        flight.until(S.ENROUTE)
-        plans = flight.ends.firmware.plans
-        answer = plans.handle
-
-        def slowly(message: Any) -> list[Any]:  # noqa: ANN401
-            return answer(message) if flight.visited else []
-
-        monkeypatch.setattr(plans, "handle", slowly)
-        assert flight.tell(HandOver()).accepted
-        flight.until(lambda: flight.mission.handover.flies)
-        assert flight.told("handover") == ["handed over to the autopilot: 2 waypoints"]
-        flight.until(S.RETURNING)
-        assert flight.visited == ["a", "b", "c"]
-
-
 UNFLYABLE: dict[str, tuple[Waypoint, str]] = {
     "picture": (Waypoint("w", 0, 9, 3, photo=True), "w: it takes pictures"),
     "trigger": (Waypoint("w", 0, 9, 3, trigger_distance=2.0), "w: it takes pictures"),
@@ -558,15 +508,6 @@ def test_what_an_autopilot_cannot_fly_is_refused(
         assert not flight.ends.heard("MISSION_COUNT")
 
 
-def test_px4_turns_at_a_waypoint(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its waypoints have a yaw, degrees clockwise from north."""
-    stops = [Waypoint("a", 0, 15, 3, yaw=0.0)]
-    with handed(monkeypatch, "px4", stops=stops) as flight:
-        flight.hand_over()
-        plan = flight.plan
-        assert plan[1].param4 == pytest.approx(90.0)
-
-
 def test_the_plan_on_the_vehicle_stays_its_way_home(monkeypatch: pytest.MonkeyPatch) -> None:
     """A plan that would replace it is refused."""
     with handed(monkeypatch) as flight:
@@ -588,3 +529,24 @@ def test_on_the_ground_nothing_is_handed_over(monkeypatch: pytest.MonkeyPatch) -
         flight.until(S.ENROUTE)
         flight.tell(ReturnHome())
         assert not flight.tell(HandOver()).accepted
+
+
+def test_a_waypoint_that_is_reached_meanwhile_is_not_flown_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The rest is uploaded anew."""
+    stops = [Waypoint("a", 0, 3, 3), Waypoint("b", 0, 20, 3), Waypoint("c", 0, 30, 3)]
+    with handed(monkeypatch, stops=stops) as flight:
+        flight.until(S.ENROUTE)
+        plans = flight.ends.firmware.plans
+        answer = plans.handle
+
+        def slowly(message: Any) -> list[Any]:  # noqa: ANN401
+            return answer(message) if flight.visited else []
+
+        monkeypatch.setattr(plans, "handle", slowly)
+        assert flight.tell(HandOver()).accepted
+        flight.until(lambda: flight.mission.handover.flies)
+        assert flight.told("handover") == ["handed over to the autopilot: 2 waypoints"]
+        flight.until(S.RETURNING)
+        assert flight.visited == ["a", "b", "c"]

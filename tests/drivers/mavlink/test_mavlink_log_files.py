@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from emulated import Flight, Stepped
 
-from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.testing.channel import Impairment
 from aerodaas.types.errors import VehicleError
@@ -75,20 +74,6 @@ def test_a_log_is_fetched_as_a_file(pair: Stepped, tmp_path: Path) -> None:
 KIND = "FILE_TRANSFER_PROTOCOL"
 
 
-def test_px4_has_a_folder_for_each_day(flight: Flight, tmp_path: Path) -> None:
-    """On its card."""
-    ulog = b"ULog\x01\x12\x35" + random.Random(2).randbytes(5_000)
-    with flight() as pair:
-        pair.autopilot.firmware.files.files = {
-            "/fs/microsd/log/2027-01-14/07_00_00.ulg": ulog[:90],
-            "/fs/microsd/log/2027-01-15/08_00_00.ulg": ulog,
-        }
-        file = pair.vehicle.fetch_log(LogEntry(0, len(ulog), None), tmp_path)
-        assert not pair.heard("LOG_REQUEST_DATA")
-    assert file.name == "log-0.ulg"
-    assert file.read_bytes() == ulog
-
-
 def test_lost_doubled_and_overtaken_packets(pair: Stepped, tmp_path: Path) -> None:
     """A twentieth of them, both ways."""
     bad = Impairment(loss=0.05, duplicates=0.05, jitter=0.02)
@@ -136,25 +121,6 @@ class Liar(FileServer):
     def checksum(self, name: str) -> int:
         """Wrong."""
         return super().checksum(name) ^ 1
-
-
-class Growing(FileServer):
-    """Goes on writing a log while it is fetched."""
-
-    def checksum(self, name: str) -> int:
-        """That of what there is by then."""
-        self.files[name] += b"more"
-        return super().checksum(name)
-
-
-def test_a_log_that_grows_meanwhile_is_fetched_as_it_was_listed(
-    pair: Stepped, tmp_path: Path
-) -> None:
-    """ArduPilot writes some lines whenever it is asked for one."""
-    put(pair, Growing())
-    file = pair.vehicle.fetch_log(LOG, tmp_path)
-    assert file.read_bytes() == DATAFLASH
-    assert [one.name for one in tmp_path.iterdir()] == [NAME]
 
 
 def test_a_checksum_that_does_not_fit(pair: Stepped, tmp_path: Path) -> None:
@@ -264,18 +230,3 @@ def test_a_pilot_takes_off_in_between(pair: Stepped, tmp_path: Path, *, files: b
     assert max(asked) < 72_000
     connection.commander.give(connection.autopilot.disarm(), now=pair.now)
     pair.wait(lambda: not pair.vehicle.read().armed)
-
-
-def test_it_says_whether_it_has_the_service() -> None:
-    """By a bit of AUTOPILOT_VERSION; nothing is asked of one that does not."""
-    for capabilities, serves in ((0xFBEF, True), (0xFBCF, False)):
-        telemetry = Telemetry()
-        assert not telemetry.serves_files
-        nothing = [0] * 8
-        telemetry.take(
-            mavlink.MAVLink_autopilot_version_message(
-                capabilities, 0, 0, 0, 0, nothing, nothing, nothing, 0, 0, 0
-            ),
-            1.0,
-        )
-        assert telemetry.serves_files is serves

@@ -16,7 +16,6 @@ from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
 from aerodaas.cli.app import main
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.recording.reader import Recording
-from aerodaas.testing.channel import Impairment
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle_log import LogEntry
 from tools.mavlink_vehicle import AutopilotOptions
@@ -69,14 +68,6 @@ def test_px4_has_its_own_format(flight: Flight, tmp_path: Path) -> None:
         file = pair.vehicle.fetch_log(log, tmp_path)
     assert file.suffix == ".ulg"
     assert file.read_bytes() == ULOG
-
-
-def test_lost_packets_are_asked_for_again(pair: Stepped, tmp_path: Path) -> None:
-    """A tenth of them, both ways."""
-    bad = Impairment(loss=0.1)
-    pair.autopilot.spoil(up=bad, down=bad)
-    log = LogEntry(2, len(DATAFLASH), BEGAN)
-    assert pair.vehicle.fetch_log(log, tmp_path).read_bytes() == DATAFLASH
 
 
 class Faulty(LogStore):
@@ -143,13 +134,6 @@ def test_a_size_that_cannot_be_is_refused(pair: Stepped, tmp_path: Path, size: i
     """Before the disk is full."""
     with pytest.raises(VehicleError, match="none to be fetched"):
         pair.vehicle.fetch_log(LogEntry(1, size, None), tmp_path)
-
-
-def test_a_folder_that_cannot_be_written_is_named(pair: Stepped, tmp_path: Path) -> None:
-    """With the system's own reason."""
-    (tmp_path / "file").touch()
-    with pytest.raises(VehicleError, match=r"cannot write .*file"):
-        pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path / "file")
 
 
 def test_not_in_flight(pair: Stepped, tmp_path: Path) -> None:

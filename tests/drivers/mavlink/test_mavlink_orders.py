@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from autopilot import COMMANDS, ScriptedAutopilot, acknowledgement
+from hypothesis import given
+from hypothesis import strategies as st
 
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.control import watchdog
@@ -27,13 +31,18 @@ ARM = PendingCommand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, 0, 0, 0, 0, 0, 
 CLIMB = PendingCommand(mavlink.MAV_CMD_NAV_TAKEOFF, (1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5), "take off")
 
 
-class Ear:
-    """What a commander says to system 7, component 1, and what became of its orders."""
+class Orders:
+    """What a commander gives to a scripted autopilot that answers nothing by itself."""
 
-    def __init__(self) -> None:
-        self.sent: list[Any] = []
+    def __init__(self, in_touch: Callable[[float], bool] = lambda _: True) -> None:
+        self.autopilot = ScriptedAutopilot(result=None)
         self.told: list[CommandResult] = []
-        self.commander = Commander(self.sent.append, (7, 1), OURS)
+        self.commander = Commander(self.autopilot.send, (1, 1), OURS, in_touch)
+
+    @property
+    def sent(self) -> list[Any]:
+        """Commands that it received."""
+        return self.autopilot.of(*COMMANDS)
 
     def give(self, order: PendingCommand, now: float = 0.0) -> None:
         """Give an order."""
@@ -41,31 +50,17 @@ class Ear:
 
     def answer(self, order: PendingCommand, result: int, now: float, system: int = OURS) -> None:
         """Acknowledge it, to `system`."""
-        ack = mavlink.MAVLink_command_ack_message(order.number, result, 0, 0, system, 191)
-        self.commander.take(ack, now)
-
-
-def test_a_command_on_the_wire() -> None:
-    """To whom, which, how often before, and its seven parameters in order."""
-    ear = Ear()
-    ear.give(CLIMB)
-    ear.commander.turn(1.0)
-    for confirmation, sent in enumerate(ear.sent):
-        assert sent.get_type() == "COMMAND_LONG"
-        assert (sent.target_system, sent.target_component) == (7, 1)
-        assert (sent.command, sent.confirmation) == (CLIMB.number, confirmation)
-        assert [getattr(sent, f"param{index}") for index in range(1, 8)] == list(CLIMB.values)
-    assert len(ear.sent) == 2
+        self.commander.take(acknowledgement(order.number, result, system), now)
 
 
 def test_a_command_with_a_frame_carries_whole_degrees_times_ten_million() -> None:
     """As COMMAND_INT, whose fifth and sixth parameters are integers."""
-    ear = Ear()
+    orders = Orders()
     values = (1.5, 2.5, 3.5, 4.5, 473977420.0, -85455940.0, 500.5)
-    ear.give(PendingCommand(CLIMB.number, values, "take off", mavlink.MAV_FRAME_GLOBAL))
-    (sent,) = ear.sent
+    orders.give(PendingCommand(CLIMB.number, values, "take off", mavlink.MAV_FRAME_GLOBAL))
+    (sent,) = orders.sent
     assert sent.get_type() == "COMMAND_INT"
-    assert (sent.target_system, sent.target_component) == (7, 1)
+    assert (sent.target_system, sent.target_component) == (1, 1)
     assert (sent.frame, sent.command) == (mavlink.MAV_FRAME_GLOBAL, CLIMB.number)
     assert (sent.current, sent.autocontinue) == (0, 0)
     assert (sent.param1, sent.param2, sent.param3, sent.param4) == values[:4]
@@ -76,54 +71,11 @@ def test_a_command_with_a_frame_carries_whole_degrees_times_ten_million() -> Non
 
 def test_an_order_is_repeated_after_a_second() -> None:
     """Not before; each repetition waits a second of its own."""
-    ear = Ear()
-    ear.give(ARM, 10.0)
+    orders = Orders()
+    orders.give(ARM, 10.0)
     for now, sent in ((10.99, 1), (11.0, 2), (11.99, 2), (12.5, 3), (13.4, 3), (13.5, 4)):
-        ear.commander.turn(now)
-        assert len(ear.sent) == sent
-
-
-def test_the_word_that_it_is_worked_on_buys_five_seconds() -> None:
-    """From that word on; the order is sent again only after them."""
-    ear = Ear()
-    ear.give(ARM, 0.0)
-    ear.answer(ARM, mavlink.MAV_RESULT_IN_PROGRESS, 0.5)
-    ear.commander.turn(5.49)
-    assert len(ear.sent) == 1
-    ear.commander.turn(5.5)
-    assert len(ear.sent) == 2
-    assert ear.told == []
-
-
-def test_of_two_rejections_for_now_the_first_counts() -> None:
-    """It is sent again a second after the first; a rejection of that begins another second."""
-    ear = Ear()
-    ear.give(ARM, 0.0)
-    ear.answer(ARM, LATER, 0.2)
-    ear.answer(ARM, LATER, 0.9)
-    ear.commander.turn(1.19)
-    assert len(ear.sent) == 1
-    ear.commander.turn(1.2)
-    assert len(ear.sent) == 2
-    ear.answer(ARM, LATER, 1.5)
-    ear.commander.turn(2.49)
-    assert len(ear.sent) == 2
-    ear.commander.turn(2.5)
-    assert len(ear.sent) == 3
-
-
-def test_what_is_said_of_an_order_that_is_given_up_is_the_latest() -> None:
-    """Rejected once and never answered again, it has no answer; rejected last, it is rejected."""
-    for last, text in ((1.1, "no answer"), (9.0, "rejected for now")):
-        ear = Ear()
-        ear.give(ARM, 0.0)
-        for tenth in range(1, 100):
-            now = tenth / 10
-            if now < last and len(ear.sent) > 0:
-                ear.answer(ARM, LATER, now)
-            ear.commander.turn(now)
-        assert [outcome.text for outcome in ear.told] == [text]
-        assert ear.told[0].tries == len(ear.sent) == 6
+        orders.commander.turn(now)
+        assert len(orders.sent) == sent
 
 
 @pytest.mark.parametrize(
@@ -138,101 +90,89 @@ def test_what_is_said_of_an_order_that_is_given_up_is_the_latest() -> None:
 )
 def test_what_an_answer_means(result: int, *, accepted: bool, text: str) -> None:
     """In words where there are any, told with how often the order was sent."""
-    ear = Ear()
-    ear.give(ARM, 0.0)
-    ear.commander.turn(1.0)
-    ear.answer(ARM, result, 1.1)
-    assert ear.told == [CommandResult(accepted=accepted, text=text, tries=2)]
-    assert ear.commander.under_way(ARM.number) is None
+    orders = Orders()
+    orders.give(ARM, 0.0)
+    orders.commander.turn(1.0)
+    orders.answer(ARM, result, 1.1)
+    assert orders.told == [CommandResult(accepted=accepted, text=text, tries=2)]
+    assert orders.commander.under_way(ARM.number) is None
 
 
 def test_an_order_that_does_not_insist_is_rejected_at_once() -> None:
     """Whatever else its rejection for now would mean."""
-    ear = Ear()
+    orders = Orders()
     once = PendingCommand(ARM.number, ARM.values, "disarm", insists=False)
-    ear.give(once, 0.0)
-    ear.answer(once, LATER, 0.1)
-    assert ear.told == [CommandResult(accepted=False, text="rejected for now", tries=1)]
+    orders.give(once, 0.0)
+    orders.answer(once, LATER, 0.1)
+    assert orders.told == [CommandResult(accepted=False, text="rejected for now", tries=1)]
 
 
 def test_whose_answer_it_is() -> None:
     """Ours, or everybody's (0); another's is not even stray, and one to nothing is counted."""
-    ear = Ear()
-    ear.give(ARM, 0.0)
-    ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=7)
-    assert (ear.told, ear.commander.stray) == ([], 0)
-    ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=0)
-    assert ear.told == [CommandResult(accepted=True)]
+    orders = Orders()
+    orders.give(ARM, 0.0)
+    orders.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=7)
+    assert (orders.told, orders.commander.stray) == ([], 0)
+    orders.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=0)
+    assert orders.told == [CommandResult(accepted=True)]
     for times in (1, 2):
-        ear.answer(CLIMB, mavlink.MAV_RESULT_ACCEPTED, 0.2)
-        assert ear.commander.stray == times
-    ear.give(ARM, 0.3)
-    ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.4)
-    assert ear.told[1:] == [CommandResult(accepted=True)]
+        orders.answer(CLIMB, mavlink.MAV_RESULT_ACCEPTED, 0.2)
+        assert orders.commander.stray == times
+    orders.give(ARM, 0.3)
+    orders.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.4)
+    assert orders.told[1:] == [CommandResult(accepted=True)]
 
 
 def test_orders_of_different_numbers_go_side_by_side() -> None:
     """One that waits holds up none behind it; each ends by itself."""
-    ear, done = Ear(), [False]
+    orders, done = Orders(), [False]
     told: list[CommandResult] = []
-    ear.commander.give(ARM, ear.told.append, still=lambda: not done[0], now=0.5)
-    ear.commander.give(CLIMB, told.append, now=0.0)
-    assert ear.commander.under_way(ARM.number) is ARM
-    assert ear.commander.under_way(CLIMB.number) is CLIMB
-    ear.commander.turn(1.0)
-    assert [one.command for one in ear.sent] == [ARM.number, CLIMB.number, CLIMB.number]
+    orders.commander.give(ARM, orders.told.append, still=lambda: not done[0], now=0.5)
+    orders.commander.give(CLIMB, told.append, now=0.0)
+    assert orders.commander.under_way(ARM.number) is ARM
+    assert orders.commander.under_way(CLIMB.number) is CLIMB
+    orders.commander.turn(1.0)
+    assert [one.command for one in orders.sent] == [ARM.number, CLIMB.number, CLIMB.number]
     done[0] = True
-    ear.commander.turn(1.2)
-    assert ear.told == [CommandResult(accepted=True, tries=1)]
+    orders.commander.turn(1.2)
+    assert orders.told == [CommandResult(accepted=True, tries=1)]
     assert told == []
-    assert ear.commander.under_way(ARM.number) is None
-    assert ear.commander.under_way(CLIMB.number) is CLIMB
-    ear.commander.turn(2.0)
-    assert len(ear.sent) == 4
-    assert ear.sent[3].command == CLIMB.number
+    assert orders.commander.under_way(ARM.number) is None
+    assert orders.commander.under_way(CLIMB.number) is CLIMB
+    orders.commander.turn(2.0)
+    assert len(orders.sent) == 4
+    assert orders.sent[3].command == CLIMB.number
 
 
 def test_a_replaced_order_is_told_so_and_only_of_its_own_number() -> None:
     """Neither done nor refused, in a few words; only what steers is withdrawn."""
-    ear, check = Ear(), ArduPilot.check()
-    ear.give(check, 0.0)
-    ear.commander.withdraw_steering()
-    ear.give(CLIMB, 0.1)
-    assert ear.told == []
-    ear.commander.give(CLIMB, now=0.2)
+    orders, check = Orders(), ArduPilot.check()
+    orders.give(check, 0.0)
+    orders.commander.withdraw_steering()
+    orders.give(CLIMB, 0.1)
+    assert orders.told == []
+    orders.commander.give(CLIMB, now=0.2)
     replaced = CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
-    assert ear.told == [replaced]
-    ear.commander.withdraw_steering()
-    assert ear.commander.under_way(CLIMB.number) is None
-    assert ear.commander.under_way(check.number) is check
+    assert orders.told == [replaced]
+    orders.commander.withdraw_steering()
+    assert orders.commander.under_way(CLIMB.number) is None
+    assert orders.commander.under_way(check.number) is check
 
 
 def test_what_steers_waits_until_the_vehicle_is_heard() -> None:
     """Nothing is given up meanwhile; other orders do not wait."""
     heard = [False]
-    sent: list[Any] = []
-    commander = Commander(sent.append, (7, 1), OURS, lambda _: heard[0])
-    outcomes: list[CommandResult] = []
+    orders = Orders(lambda _: heard[0])
     for order in (ARM, CLIMB, ArduPilot.check()):
-        commander.give(order, outcomes.append, now=0.0)
+        orders.give(order)
     for second in range(1, 20):
-        commander.turn(float(second))
-    assert {one.command for one in sent} == {mavlink.MAV_CMD_RUN_PREARM_CHECKS}
-    assert len(outcomes) == 1, "of the check, which is given up"
+        orders.commander.turn(float(second))
+    assert {one.command for one in orders.sent} == {mavlink.MAV_CMD_RUN_PREARM_CHECKS}
+    assert len(orders.told) == 1, "of the check, which is given up"
     heard[0] = True
-    commander.turn(20.0)
-    assert [one.command for one in sent[-2:]] == [ARM.number, CLIMB.number]
-    assert len(outcomes) == 1
-
-
-SHOWN = [
-    (FlightMode.GUIDED, VehicleMode.GUIDED),
-    (FlightMode.TAKE_OFF, VehicleMode.TAKING_OFF),
-    (FlightMode.HOLD, VehicleMode.HOLDING),
-    (FlightMode.RETURN, VehicleMode.RETURNING),
-    (FlightMode.LAND, VehicleMode.LANDING),
-    (FlightMode.OTHER, VehicleMode.MANUAL),
-]
+    orders.commander.turn(20.0)
+    assert [one.command for one in orders.sent[-2:]] == [ARM.number, CLIMB.number]
+    assert len(orders.told) == 1
 
 
 def seen_in(
@@ -246,15 +186,6 @@ def seen_in(
     for index, mode in enumerate(shown[1:], 1):
         phase.observe(mode, 10.0 + 5 * index, armed=armed, critical=critical)
     return phase
-
-
-@pytest.mark.parametrize(("shown", "mode"), SHOWN)
-def test_without_a_wish_the_vehicle_is_believed(shown: FlightMode, mode: VehicleMode) -> None:
-    """Found flying in any mode it is nobody's fault; disarmed it is on the ground."""
-    assert seen_in(None, shown).mode is mode
-    assert seen_in(None, shown, armed=False).mode is VehicleMode.GROUNDED
-    assert FlightPhase().mode is VehicleMode.GROUNDED
-    assert FlightPhase().shown is FlightMode.OTHER
 
 
 @pytest.mark.parametrize(
@@ -298,44 +229,6 @@ def test_a_mode_of_before_may_show_for_two_and_a_half_seconds(
     phase.observe(FlightMode.GUIDED, 11.0, armed=True, critical=False)
     phase.observe(FlightMode.HOLD, now, armed=True, critical=False)
     assert phase.taken is taken
-
-
-def test_asking_again_for_the_same_buys_time_and_forgets_nothing() -> None:
-    """It was seen there, the mode of before is still the one of before, and 2.5 s begin anew."""
-    phase = seen_in(FlightMode.GUIDED, FlightMode.HOLD, FlightMode.GUIDED)
-    phase.ask(FlightMode.GUIDED, 20.0)
-    assert phase.seen is True
-    phase.observe(FlightMode.HOLD, 22.5, armed=True, critical=False)
-    assert phase.taken is None
-    phase.observe(FlightMode.HOLD, 22.6, armed=True, critical=False)
-    assert phase.taken is VehicleMode.MANUAL
-
-
-def test_a_wish_is_not_seen_before_it_shows() -> None:
-    """However long the mode before goes on to show, it is no pilot's."""
-    phase = FlightPhase()
-    assert phase.seen is False
-    phase = seen_in(FlightMode.GUIDED, FlightMode.HOLD, FlightMode.GUIDED)
-    phase.ask(FlightMode.RETURN, 20.0)
-    seen = [phase.seen]
-    for now, shown in ((40.0, FlightMode.GUIDED), (41.0, FlightMode.RETURN)):
-        phase.observe(shown, now, armed=True, critical=False)
-        seen.append(phase.seen)
-    assert seen == [False, False, True]
-    assert phase.taken is None
-
-
-def test_all_that_belongs_to_the_wish_before_may_show_for_a_moment() -> None:
-    """The mode of before, and what is said beforehand."""
-    for shown in (FlightMode.RETURN, FlightMode.TAKE_OFF):
-        phase = seen_in(FlightMode.RETURN, FlightMode.GUIDED, FlightMode.RETURN)
-        phase.ask(FlightMode.HOLD, 20.0, meanwhile=frozenset({FlightMode.TAKE_OFF}))
-        phase.observe(shown, 21.0, armed=True, critical=False)
-        assert phase.taken is None
-    phase = seen_in(FlightMode.RETURN, FlightMode.GUIDED, FlightMode.RETURN)
-    phase.ask(FlightMode.HOLD, 20.0)
-    phase.observe(FlightMode.TAKE_OFF, 21.0, armed=True, critical=False)
-    assert phase.taken is VehicleMode.MANUAL
 
 
 def test_nothing_is_asked_of_a_vehicle_that_stands() -> None:
@@ -403,3 +296,49 @@ def test_once_it_belongs_to_a_thread_only_that_one_feeds_it(clock: SimpleNamespa
     dog.feed()
     assert dog.healthy(115.0)
     assert not dog.healthy(math.inf)
+
+
+MODES = list(FlightMode)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([None, *[one for one in MODES if one is not FlightMode.OTHER]]),
+            st.sampled_from(MODES),
+            st.booleans(),
+            st.floats(0.0, 5.0),
+        ),
+        max_size=40,
+    )
+)
+def test_who_has_taken_over_keeps_it(steps: list[tuple[Any, Any, bool, float]]) -> None:
+    """Once taken, a vehicle is ours again only after it has been disarmed, or let rest there."""
+    phase, now, taken = FlightPhase(), 0.0, False
+    for wish, shown, armed, wait in steps:
+        now += wait
+        if wish is not None and not taken:
+            phase.ask(wish, now)
+        phase.observe(shown, now, armed=armed, critical=False)
+        if phase.taken is not None and not armed:
+            phase.rest()
+        taken = armed and (taken or phase.taken is not None)
+        assert (phase.taken is not None) == taken
+        if taken:
+            assert phase.mode is VehicleMode.MANUAL
+        if not armed:
+            assert phase.mode is VehicleMode.GROUNDED
+
+
+def test_a_withdrawn_order_is_not_repeated() -> None:
+    """Nor is anything told of it; one that nobody answers is given up after six tries."""
+    orders = Orders()
+    orders.give(CLIMB)
+    orders.commander.withdraw(CLIMB.number)
+    orders.commander.turn(5.0)
+    orders.answer(CLIMB, mavlink.MAV_RESULT_ACCEPTED, 5.0)
+    assert (len(orders.sent), orders.told) == (1, [])
+    orders.give(ARM, 6.0)
+    for second in range(7, 20):
+        orders.commander.turn(second * 1.01)
+    assert orders.told == [CommandResult(accepted=False, text="no answer", tries=6)]

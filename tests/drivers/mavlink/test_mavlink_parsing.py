@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.microservices.events import EventReader, event_number
 from aerodaas.drivers.mavlink.microservices.texts import Texts
-from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import EventMessage, mavlink
 from aerodaas.drivers.mavlink.wire.framing import Framer
@@ -91,21 +87,6 @@ def test_what_nobody_wants_is_not_decoded() -> None:
     assert len(decoded) == 1
 
 
-fields = st.floats(width=32) | st.sampled_from([math.nan, math.inf, -math.inf])
-
-
-@given(st.lists(fields, min_size=6, max_size=6), st.integers(0, 2**32 - 1))
-def test_numbers_that_are_none_are_not_believed(values: list[float], boot: int) -> None:
-    """A position with a NaN in it is no position, and angles likewise."""
-    telemetry = Telemetry()
-    telemetry.take(mavlink.MAVLink_local_position_ned_message(boot, *values), 1.0)
-    telemetry.take(mavlink.MAVLink_attitude_message(boot, *values), 1.0)
-    assert telemetry.position is None or np.isfinite(telemetry.position).all()
-    assert math.isfinite(telemetry.attitude.yaw)
-    if not all(map(math.isfinite, values)):
-        assert not telemetry.knows_place(1.0)
-
-
 def _vehicle() -> MavlinkVehicle:
     robot = RobotConfig(id="m", driver="mavlink")
     return MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
@@ -144,28 +125,6 @@ def test_any_message_of_anybody_is_survived(
     assert vehicle._phase.wish is None
 
 
-def test_events_are_told_by_their_names() -> None:
-    """Numbers are PX4's own, and a report of the arming checks is taken as a whole."""
-    # Computed by PX4's own generator.
-    assert event_number("commander_arming_check_summary") >> 24 == 1
-    reader = EventReader()
-    sequence = iter(range(100))
-
-    def take(name: str, level: int) -> None:
-        reader.take(event_number(name), level, next(sequence))
-
-    take("commander_arming_check_summary", 8)
-    take("check_mag_missing", 3)
-    take("check_mag_missing", 3)
-    take("no_such_event", 2)
-    take("commander_health_summary", 8)
-    assert reader.objections[0] == "compass: missing"
-    assert len(reader.objections) == 2
-    take("commander_arming_check_summary", 8)
-    take("commander_health_summary", 8)
-    assert not reader.objections
-
-
 def test_an_event_travels() -> None:
     """The message that pymavlink lacks packs and unpacks."""
     mav = mavlink.MAVLink(None, 1, 1)
@@ -183,11 +142,3 @@ def test_texts_in_pieces(pieces: list[tuple[str, int, int]]) -> None:
         texts.take(text, 3, 1.0, number, piece)
     assert len(texts._pieces) <= 16
     assert all(text.isprintable() for text in texts.recent(1.0, 5.0))
-
-
-def test_a_long_text_is_put_together() -> None:
-    """In its own order, whatever the order of arrival."""
-    texts = Texts()
-    texts.take("A" * 50, 2, 0.0, 5, 0)
-    texts.take("and the end", 2, 0.0, 5, 1)
-    assert texts.recent(0.0, 1.0) == ["A" * 50 + "and the end"]

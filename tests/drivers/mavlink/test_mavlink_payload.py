@@ -83,19 +83,6 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
         assert len(carried(ends).taken) == 2
 
 
-def test_an_altitude_of_zero_with_a_place_is_not_known(ends: Stepped) -> None:
-    """Cameras without one send zero, which is not the level of the sea."""
-    with ends:
-        ends.find_payload()
-        carried(ends).knows_height = False
-        ends.take_photo()
-        photo = ends.photo_outcome()
-        assert isinstance(photo, Photo)
-        assert photo.place is not None
-        assert photo.place.latitude == pytest.approx(47.397742, abs=1e-6)
-        assert photo.place.altitude is None
-
-
 def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
     """Such as one by the pilot's switch, or by the autopilot's own distance trigger."""
     with ends:
@@ -157,16 +144,6 @@ def test_an_attitude_that_is_none_is_no_word(ends: Stepped) -> None:
         assert ends.vehicle.gimbal is not None
 
 
-def test_a_gimbal_that_vanishes_is_gone(ends: Stepped) -> None:
-    """After five seconds without a word; the vehicle itself is heard all the while."""
-    with ends:
-        ends.find_payload()
-        carried(ends).has_gimbal = False
-        ends.watch(6.0)
-        assert ends.vehicle.gimbal is None
-        assert ends.vehicle.read().extra["silence"] < 1.0
-
-
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_vehicle_without_them_is_left_alone(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
     """It is asked once for each, refuses, and is not asked again."""
@@ -213,14 +190,6 @@ def test_a_yaw_from_north_is_turned_to_the_nose() -> None:
     assert gimbal.attitude.yaw == pytest.approx(-math.pi / 2)
     gimbal.take(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, math.pi / 2)
     assert gimbal.attitude.yaw == pytest.approx(0.0)
-
-
-def test_another_gimbals_attitude_is_not_ours() -> None:
-    """Several may speak on one link."""
-    gimbal = gimbal_of(*FREE)
-    gimbal.take(status(0, [1.0, 0.0, 0.0, 0.0], device=2), 0.0, 7, 0.0)
-    assert gimbal.attitude is None
-    assert gimbal.silence(100.0) == 0.0
 
 
 @given(
@@ -293,13 +262,3 @@ def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:
         assert 2 <= len(commands) <= 6
         assert theirs.pitch == pytest.approx(-0.795, abs=0.01)
         assert theirs.right == pytest.approx(-0.59, abs=0.01)
-
-
-def test_a_gimbal_without_a_yaw_axis_says_so(ends: Stepped) -> None:
-    """By its manager's capabilities; a target comes back with the yaw that it keeps."""
-    with ends:
-        carried(ends).turns = False
-        ends.find_payload()
-        gimbal = ends.vehicle.gimbal
-        assert gimbal is not None
-        assert gimbal.aim(GimbalTarget(-0.5, 0.7)) == GimbalTarget(-0.5, 0.0)

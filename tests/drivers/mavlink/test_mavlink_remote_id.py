@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 from autopilot import HERE, Bench
 from emulated import FAMILIES, Stepped
-from hypothesis import given
-from hypothesis import strategies as st
 
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
@@ -100,39 +98,6 @@ def test_the_transmitter_is_told_who_operates_what_from_where(
         gaps = [after - before for before, after in pairwise(placed)]
         assert len(placed) == pytest.approx(20, abs=1)
         assert max(gaps) < 1.1
-
-
-def test_a_time_is_counted_from_2019(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the standard has it; a clock that was never set tells none."""
-    for clock, stamp in ((1546300800.0 + 77.9, 77), (5.0, 0)):
-        monkeypatch.setattr(
-            "aerodaas.drivers.mavlink.microservices.remote_id.time.time", lambda at=clock: at
-        )
-        system, *_ = RemoteId(RemoteIdConfig(), observes=False).turn(0.0, lambda: None, 1)
-        assert system.timestamp == stamp
-
-
-def test_a_fixed_place_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wherever the drone is."""
-    place = {"latitude": -35.5, "longitude": 149.25, "altitude": 600.0}
-    with ends_of(monkeypatch, remote_id={**WHO, "operator": place}) as ends:
-        ends.watch(3.0)
-        system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
-        assert system.operator_location_type == mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_FIXED
-        assert (system.operator_latitude, system.operator_longitude) == (-355000000, 1492500000)
-        assert system.operator_altitude_geo == 600.0
-
-
-def test_what_is_not_known_is_told_as_unknown() -> None:
-    """No place, no class, no category: by the protocol's own words for it, and nothing else."""
-    told = RemoteId(RemoteIdConfig(), observes=False)
-    for second in range(5):
-        (system,) = told.turn(float(second), lambda: None, 3)
-        assert (system.operator_latitude, system.operator_longitude) == (0, 0)
-        assert system.operator_altitude_geo == -1000.0
-        assert (system.classification_type, system.category_eu, system.class_eu) == (0, 0, 0)
-        assert system.target_system == 3
-        assert told.turn(second + 0.999, lambda: None, 3) == []
 
 
 def test_the_place_of_the_take_off_stays_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -225,21 +190,6 @@ def test_a_take_off_is_refused_with_the_transmitters_own_words(
         assert "take-off refused: remote_id: bad LOC accuracy" in mission.status.reason
         assert ends.autopilot.firmware.motions == []
         assert not ends.autopilot.armed
-
-
-def test_a_transmitter_that_becomes_ready_in_time_is_waited_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Its GPS takes a while."""
-    with ends_of(monkeypatch) as ends:
-        transmitter = ends.autopilot.transmitter
-        transmitter.error = "no GPS fix"
-        flight = ends.mission([STOP])
-        flight.run(2.0)
-        assert flight.mission.state is S.PREFLIGHT
-        transmitter.error = ""
-        assert flight.fly().state is S.LANDED
-        assert flight.told() == []
 
 
 @pytest.mark.parametrize("trouble", ["silent", "unhealthy"])
@@ -335,17 +285,6 @@ def test_of_two_transmitters_both_must_be_ready() -> None:
     assert told.objection(1.0) == ""
 
 
-@given(st.integers(0, 255), st.binary(max_size=50))
-def test_no_status_but_zero_is_good(status: int, error: bytes) -> None:
-    """And every text can be printed on one line."""
-    told = listener()
-    told.take(arm_status(status, error), 0.0)
-    said = told.objection(0.0)
-    assert said is not None
-    assert (said == "") is (status == GOOD)
-    assert said.isprintable()
-
-
 @pytest.mark.parametrize(
     ("system", "component", "peer", "heard"),
     [
@@ -386,7 +325,7 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
     bench.connect()
     if flies:
         bench.fly()
-    bench.autopilot.speaks, bench.autopilot.result = False, None
+    bench.hush()
     for _ in range(60):
         for ids in ((1, 236), (1, 1)):
             bench.autopilot.say(READY, HERE, ids)

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.config.model import GeofenceConfig
 from aerodaas.drivers.mavlink.control.guidance import Target
 from aerodaas.drivers.mavlink.control.setpoint import position_message, velocity_message
-from aerodaas.drivers.mavlink.microservices.fence import fence_items
-from aerodaas.drivers.mavlink.state.frames import Attitude, LocalFrame, attitude_from_frd
+from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.geometry import GeodeticOrigin, Vector
 from aerodaas.types.vehicle import VelocitySetpoint
@@ -64,16 +62,6 @@ def test_our_yaw_and_their_heading(yaw: float, heading: float) -> None:
     assert told == pytest.approx(heading)
     back = attitude_from_frd(0.0, 0.0, math.radians(heading), 0.0)
     assert math.degrees(back.yaw) == pytest.approx(yaw)
-
-
-def test_each_angle_of_an_attitude() -> None:
-    """Right side down stays positive; nose up and a turn with the clock are negative with us."""
-    seen = attitude_from_frd(0.1, 0.2, math.pi / 2, 0.3)
-    assert seen.roll == 0.1
-    assert seen.pitch == -0.2
-    assert seen.yaw == pytest.approx(0.0)
-    assert seen.yaw_rate == -0.3
-    assert Attitude() == Attitude(0.0, 0.0, 0.0, 0.0)
 
 
 def test_a_frame_is_laid_over_home_by_latitude_and_longitude_alone() -> None:
@@ -142,34 +130,3 @@ def test_the_milliseconds_of_a_long_life_fit_the_wire() -> None:
     for now, stamp in ((4294967.296, 0), (4294967.297, 1), (4294967.295, 4294967295)):
         assert velocity_message(setpoint, (1, 1), now).time_boot_ms == stamp
         assert position_message(target, FRAME, (1, 1), now).time_boot_ms == stamp
-
-
-def test_a_fences_corners_are_degrees_times_ten_million() -> None:
-    """East is longitude (y), north is latitude (x): 76.1 m and 111.2 m to 0.001 degrees."""
-    fence = GeofenceConfig(
-        polygon=[(0, 0), (76.1, 0), (76.1, 111.2)], no_fly=[[(0, 0), (-7.61, 0), (0, -11.12)]]
-    )
-    items = fence_items(fence, GeodeticOrigin(47.0, 8.0))
-    inside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
-    outside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
-    assert [item.command for item in items] == [inside] * 3 + [outside] * 3
-    assert [item.x for item in items] == pytest.approx(
-        [470000000, 470000000, 470010000, 470000000, 470000000, 469999000], abs=15
-    )
-    assert [item.y for item in items] == pytest.approx(
-        [80000000, 80010000, 80010000, 80000000, 79999000, 80000000], abs=15
-    )
-    assert {item.values for item in items} == {(3.0, 0.0, 0.0, 0.0)}
-    assert {item.frame for item in items} == {mavlink.MAV_FRAME_GLOBAL}
-    assert {item.z for item in items} == {0.0}
-    assert all(isinstance(item.x, int) and isinstance(item.y, int) for item in items)
-
-
-def test_a_fence_without_an_outline_is_its_no_fly_zones() -> None:
-    """And one without either has no items."""
-    zone = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
-    items = fence_items(GeofenceConfig(no_fly=[zone, zone]), HOME)
-    assert len(items) == 6
-    outside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
-    assert {item.command for item in items} == {outside}
-    assert fence_items(GeofenceConfig(), HOME) == []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
@@ -62,20 +60,6 @@ def test_it_flies_from_half_a_metre_on(up: float, *, flew: bool) -> None:
     flight.fly(0.125, up)
     assert flight.touchdown.flew is flew
     assert (flight.stop() is not None) is flew
-
-
-def test_its_own_word_that_it_flies_is_enough() -> None:
-    """If its motors turn; that it does not know says nothing, nor does a word before."""
-    flight, flew = Flight(), []
-    for on_ground in (None, False):
-        flight.say(on_ground=on_ground)
-        flew.append(flight.touchdown.flew)
-    assert flew == [False, True]
-    standing = Touchdown()
-    standing.observe(FlightMode.HOLD, 100.0, armed=False)
-    standing.report(100.0, on_ground=False)
-    standing.move(50.0, 0.0, 0.0, 100.0)
-    assert not standing.flew
 
 
 @pytest.mark.parametrize(("on_ground", "flew"), [(None, True), (False, True), (True, False)])
@@ -214,23 +198,6 @@ def test_after_a_silence_it_is_judged_once_it_was_heard_for_a_while(
     assert flight.stop() is ended
 
 
-def test_two_metres_a_second_are_no_fall_yet() -> None:
-    """Stood for a while after that, it has landed."""
-    flight = airborne()
-    flight.fly(0.25, 3.0, rise=-2.0)
-    flight.fly(0.75)
-    assert flight.stop() is FlightEnd.LANDED
-
-
-@pytest.mark.parametrize(("gap", "ended"), [(1.0, FlightEnd.LANDED), (1.125, FlightEnd.UNHEARD)])
-def test_a_second_between_two_positions_is_no_silence(gap: float, ended: FlightEnd) -> None:
-    """A bit more is: it was not heard while it may have come down."""
-    flight = airborne()
-    flight.now += gap - 0.125
-    flight.fly(0.75)
-    assert flight.stop() is ended
-
-
 def test_who_fell_before_the_silence_fell() -> None:
     """Seen falling, and then not heard for a second."""
     flight = airborne()
@@ -253,23 +220,6 @@ def test_who_is_heard_falling_soon_after_fell(later: float, ended: FlightEnd) ->
     flight.fly(0.125, 2.0, rise=-3.0)
     assert flight.touchdown.ended is ended
     assert flight.touchdown.falling is (ended is FlightEnd.FELL)
-
-
-def test_sinking_fast_is_no_fall_while_motors_turn() -> None:
-    """A vehicle that is heard to descend at 3 m/s, armed, has not ended its flight."""
-    flight = airborne()
-    flight.fly(1.0, 4.0, rise=-3.0)
-    assert flight.touchdown.ended is None
-    assert flight.touchdown.falling is False
-    assert not flight.touchdown.fault
-
-
-def test_where_it_began_to_fall_is_told_to_the_end() -> None:
-    """The fall itself, heard on, changes nothing of it."""
-    flight = airborne()
-    assert flight.stop() is FlightEnd.FELL
-    flight.fly(0.5, 1.0, rise=-5.0)
-    assert flight.touchdown.fault == "motors: stopped in flight, 5 m above where they started"
 
 
 def test_a_fall_is_told_by_its_height() -> None:
@@ -335,31 +285,3 @@ def test_an_autopilot_that_starts_anew_on_the_ground_has_ended_nothing() -> None
         assert flight.touchdown.ended is None
         assert not flight.touchdown.falling
         assert not flight.touchdown.fault
-
-
-def test_the_flight_after_a_restart_is_believed_again() -> None:
-    """Motors that start anew end what was said of the frame: a fall is over once it lies."""
-    flight = airborne()
-    flight.touchdown.restart(flight.now)
-    flight.fly(3.0, -2.0)
-    flight.touchdown.observe(flight.mode, flight.now, armed=True)
-    flight.fly(1.0, 4.0)
-    flight.touchdown.observe(flight.mode, flight.now, armed=True)
-    flight.fly(0.25, 4.0, rise=-4.0)
-    assert flight.stop() is FlightEnd.FELL
-    assert "6 m above" in flight.touchdown.fault
-    flight.fly(2.0)
-    flight.touchdown.turn(flight.now)
-    assert not flight.touchdown.falling
-
-
-def test_before_anything_was_heard_nothing_is_said() -> None:
-    """No end, no fault, no fall."""
-    touchdown = Touchdown()
-    touchdown.turn(0.0)
-    touchdown.observe(FlightMode.HOLD, 0.0, armed=False)
-    assert (touchdown.ended, touchdown.fault) == (None, "")
-    assert not touchdown.falling
-    assert not touchdown.flew
-    touchdown.turn(math.inf)
-    assert not touchdown.falling

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aerodaas.drivers.mavlink.microservices.events import event_number
-from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
@@ -67,22 +67,6 @@ def unknown(telemetry: Telemetry) -> set[str]:
     return {name for name in {*PLACES, "position"} if getattr(telemetry, name) is None}
 
 
-def test_before_any_word_nothing_is_known() -> None:
-    """No place, no charge, no time, and silence for ever."""
-    telemetry = Telemetry()
-    assert not telemetry.knows_place(0.0)
-    assert telemetry.silence(0.0) == math.inf
-    assert not telemetry.armed
-    assert not telemetry.critical
-    assert unknown(telemetry) == {*PLACES, "position"}
-    assert telemetry.velocity.tolist() == [0.0, 0.0, 0.0]
-    assert math.isnan(telemetry.battery.fraction)
-    assert math.isnan(telemetry.boot_time)
-    assert math.isnan(telemetry.clock)
-    assert (telemetry.reboots, telemetry.software, telemetry.custom_mode) == (0, "", 0)
-    assert telemetry.back_at == telemetry.beat_at == -math.inf
-
-
 @pytest.mark.parametrize(
     ("state", "base", "armed", "critical"),
     [
@@ -116,17 +100,6 @@ def test_a_local_position_stays_in_the_autopilots_frame() -> None:
         assert telemetry.position == pytest.approx([1.0, 2.0, -3.0])
         assert telemetry.velocity == pytest.approx([0.1, 0.2, -0.3])
         assert telemetry.position_at == 10.0
-
-
-def test_an_attitude_is_turned_into_our_sense() -> None:
-    """Heading east is yaw 0; nose up, and turning with the clock, are negative with us."""
-    telemetry = told(attitude(1000, 0.1, 0.2, math.pi / 2, 9.0, 9.0, 0.4))
-    seen = telemetry.attitude
-    assert (seen.roll, seen.pitch, seen.yaw_rate) == pytest.approx((0.1, -0.2, -0.4))
-    assert seen.yaw == pytest.approx(0.0, abs=1e-6)
-    telemetry.take(attitude(1001, 0.0, 0.0, 0.0, 0.0, 0.0, math.inf), 11.0)
-    assert telemetry.attitude is seen
-    assert telemetry.attitude_at == 10.0
 
 
 @pytest.mark.parametrize(
@@ -177,25 +150,6 @@ def test_a_gps_fix_in_our_units() -> None:
     assert most.satellites == 254
 
 
-@pytest.mark.parametrize(("kind", "fixed"), [(0, False), (1, False), (2, True), (6, True)])
-def test_which_fixes_are_positions(kind: int, *, fixed: bool) -> None:
-    """From two dimensions on; a fix that is lost takes the position with it."""
-    telemetry = told(gps(), gps(kind))
-    assert (telemetry.gps is not None) is fixed
-
-
-def test_a_battery_in_volts_and_amperes() -> None:
-    """Of percent, millivolts and hundredths of an ampere; what is not measured is none."""
-    battery = told(status()).battery
-    assert (battery.fraction, battery.voltage, battery.current) == (0.87, 15.3, 12.34)
-    unknown = told(status(-1, 65535, -1)).battery
-    assert math.isnan(unknown.fraction)
-    assert (unknown.voltage, unknown.current) == (0.0, 0.0)
-    empty = told(status(0, 0, 0)).battery
-    assert (empty.fraction, empty.voltage, empty.current) == (0.0, 0.0, 0.0)
-    assert told(status()).sensors == Sensors(present=7, enabled=6, health=5)
-
-
 @pytest.mark.parametrize(
     ("state", "on_ground"),
     [
@@ -209,20 +163,6 @@ def test_a_battery_in_volts_and_amperes() -> None:
 def test_its_own_word_about_the_ground(state: int, *, on_ground: bool | None) -> None:
     """It may not know; what still lands is not on the ground."""
     assert told(mavlink.MAVLink_extended_sys_state_message(0, state)).on_ground is on_ground
-
-
-def test_home_is_a_place_in_its_frame() -> None:
-    """One with a figure that is no number is none."""
-
-    def home(*place: float) -> Any:  # noqa: ANN401
-        return mavlink.MAVLink_home_position_message(
-            1, 2, 3, *place, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0
-        )
-
-    known = told(home(1.0, 2.0, -3.0)).home
-    assert known is not None
-    assert known == pytest.approx([1.0, 2.0, -3.0])
-    assert told(home(1.0, 2.0, -3.0), home(1.0, math.nan, -3.0)).home is None
 
 
 @pytest.mark.parametrize(
@@ -283,15 +223,6 @@ def test_how_long_it_has_said_nothing_new() -> None:
     assert telemetry.silence(12.25) == 0.25
 
 
-@pytest.mark.parametrize(("gap", "back_at"), [(0.89, 10.0), (0.91, 10.91)])
-def test_when_it_was_heard_again(gap: float, back_at: float) -> None:
-    """After more than nine tenths of a second of nothing; words of any kind count."""
-    telemetry = told(beat(4))
-    assert telemetry.back_at == 10.0
-    telemetry.take(status(), 10.0 + gap)
-    assert telemetry.back_at == pytest.approx(back_at)
-
-
 def test_of_one_kind_only_what_is_newer_is_taken() -> None:
     """A packet that was overtaken, or comes twice, changes nothing; kinds count apart."""
     telemetry = told(local(2000, 2.0, 0, 0, 0, 0, 0))
@@ -308,13 +239,6 @@ def test_of_one_kind_only_what_is_newer_is_taken() -> None:
     assert telemetry.position is not None
     assert telemetry.position[0] == 3.0
     assert telemetry.ticked_at == 10.6
-
-
-def test_every_new_life_is_counted() -> None:
-    """Three of them, each with a clock that begins anew."""
-    telemetry = told(*(local(stamp) for stamp in (30000, 20000, 10000, 4000)))
-    assert telemetry.reboots == 3
-    assert telemetry.armed is False
 
 
 @pytest.mark.parametrize(("stamp", "reboots"), [(5000, 0), (4999, 1)])

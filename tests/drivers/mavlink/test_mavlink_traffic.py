@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from emulated import FAMILIES, Stepped, inject
+from emulated import FAMILIES, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -88,13 +88,6 @@ def test_an_aircraft_is_where_it_was_heard_and_flies_on() -> None:
     assert later.age == 4.0
 
 
-def test_what_was_heard_a_while_ago_is_older() -> None:
-    """By as much as the receiver says."""
-    (one,) = heard(tslc=3)
-    assert one.age == 3.0
-    assert one.position.tolist() == pytest.approx([150.0, 1000.0, 94.0], abs=0.1)
-
-
 def test_after_ten_seconds_it_is_forgotten() -> None:
     """At ten it is not; what is older from the start is not believed."""
     assert len(heard(10.0)) == 1
@@ -131,25 +124,6 @@ def test_after_ten_seconds_it_is_forgotten() -> None:
 def test_what_cannot_be_is_not_believed_and_counted(lie: dict[str, int]) -> None:
     """Values that mean "unknown", places off the earth, speeds of no aircraft."""
     assert heard(**lie) == ()
-
-
-@pytest.mark.parametrize(
-    "edge",
-    [
-        {"altitude": 30_000_000},
-        {"altitude": -1_000_000},
-        {"heading": 36_000},
-        {"heading": 0},
-        {"hor_velocity": 39_990},
-        {"ICAO_address": 1},
-        {"ICAO_address": (1 << 24) - 1},
-        {"lat": 900_000_000},
-        {"lon": -1_800_000_000},
-    ],
-)
-def test_what_just_can_be_is_believed(edge: dict[str, int]) -> None:
-    """The last values that are."""
-    assert len(heard(**edge)) == 1
 
 
 def test_a_height_that_is_not_known_is_none() -> None:
@@ -215,16 +189,6 @@ def test_a_leap_is_not_believed() -> None:
     assert known.around(HERE, 1.0)[0].position[1] == pytest.approx(1890.0, abs=0.1)
     take(known, 11.1, **at(0.0, 50_000.0))
     assert known.ignored == 1
-
-
-def test_an_older_report_takes_no_newer_ones_place() -> None:
-    """Two receivers may tell of one aircraft."""
-    known = table()
-    take(known, 10.0)
-    take(known, 10.0, tslc=1)
-    assert known.ignored == 1
-    (one,) = known.around(HERE, 10.0)
-    assert (one.age, one.position[1]) == (0.0, pytest.approx(1000.0, abs=0.1))
 
 
 def test_of_many_the_nearest_are_kept_nearest_first() -> None:
@@ -329,16 +293,6 @@ def test_traffic_is_asked_for_once_and_again_after_a_restart(
         ends.autopilot.firmware.traffic.aircraft.append(EmulatedAircraft(position=(50, 0, 50)))
         ends.watch(4.0)
         assert len(ends.turn().traffic) == 1
-
-
-def test_a_receiver_beside_the_autopilot_is_heard_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By its own component's id, and by no other."""
-    with ends_of(monkeypatch, "px4") as ends:
-        ends.watch(1.0)
-        for component, seen in ((157, 0), (156, 1)):
-            inject(ends, report(), (1, component))
-            ends.watch(0.2)
-            assert len(ends.turn().traffic) == seen
 
 
 def fly(ends: Stepped, stop: Waypoint) -> tuple[Mission, list[VehicleState]]:

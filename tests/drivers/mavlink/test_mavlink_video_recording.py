@@ -99,25 +99,6 @@ def test_a_video_is_begun_and_ended_at_waypoints(ends: Stepped) -> None:
         assert recorded[-1] is None
 
 
-def test_an_order_is_repeated_until_it_is_acknowledged(ends: Stepped) -> None:
-    """What it does is not known before, whatever its status says."""
-    with ends:
-        camera = known(ends)
-        ends.autopilot.components[CAMERA].stalls = True
-        camera.film(on=True)
-        ends.watch(3.0)
-        assert len(heard(ends)) >= 3
-        assert camera.filming is None
-        # Asked for before it heard the order.
-        late = payload(ends).message(mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
-        ends.autopilot.components[CAMERA].say(late)
-        ends.turn()
-        assert camera.filming is None
-        ends.autopilot.components[CAMERA].stalls = False
-        ends.wait(lambda: camera.filming)
-        assert payload(ends).recording is not None
-
-
 def test_a_silent_camera_is_told_and_its_status_counts_later(ends: Stepped) -> None:
     """No answer is no refusal: it may have begun."""
     with ends:
@@ -161,15 +142,6 @@ def test_a_camera_without_video_is_told_at_once(ends: Stepped) -> None:
         assert list(mission.status.visited) == ["a"]
         assert told(mission, "video") == ["video not begun at a: the camera records no video"]
         assert heard(ends) == []
-
-
-def test_an_old_camera_that_tells_no_flags_is_asked(ends: Stepped) -> None:
-    """It answers itself."""
-    with ends:
-        payload(ends).flags = 0
-        camera = known(ends)
-        camera.film(on=True)
-        ends.wait(lambda: camera.filming)
 
 
 def test_a_video_is_ended_before_the_link_is_closed(
@@ -236,19 +208,6 @@ def test_a_status_that_belies_the_beginning_is_told_once(ends: Stepped) -> None:
         assert [one[0] for one in heard(ends)] == [START, STOP]
 
 
-def test_a_status_that_belies_the_end_is_told_once(ends: Stepped) -> None:
-    """It goes on recording."""
-    stops = [BEGIN, FINISH, Waypoint("c", 0, 3, 2, hover_duration=6.0)]
-    with ends:
-        known(ends)
-
-        def stick(_: Mission) -> None:
-            payload(ends).video_sticks = payload(ends).recording is not None
-
-        mission = ends.mission(stops, OPTIONS, ends.vehicle).fly(stick)
-        assert told(mission, "video") == [f"video ended at b, but {STILL}"]
-
-
 def test_a_recording_that_breaks_off_is_told(ends: Stepped) -> None:
     """Such as by a full card; one that others begin after ours has ended is theirs."""
     with ends:
@@ -266,19 +225,6 @@ def test_a_recording_that_breaks_off_is_told(ends: Stepped) -> None:
         payload(ends).recording = 1.0
         ends.watch(12.0)
         assert (camera.filming, camera.film_fault) == (True, "")
-
-
-def test_what_it_did_already_is_compared_with_its_next_word(ends: Stepped) -> None:
-    """Somebody has ended it since its last one."""
-    with ends:
-        payload(ends).recording = 12.0
-        camera = known(ends)
-        payload(ends).recording = None
-        camera.film(on=True)
-        assert camera.filming is True
-        ends.watch(4.0)
-        assert heard(ends) == []
-        assert (camera.filming, camera.film_fault) == (False, NOT)
 
 
 def test_a_camera_that_is_gone_begins_nothing_when_it_is_back(ends: Stepped) -> None:
@@ -332,60 +278,3 @@ def test_an_order_ends_the_one_before(ends: Stepped) -> None:
         orders = [one[0] for one in heard(ends)]
         assert orders[:3] == [START, START, STOP]
         assert set(orders[2:]) == {STOP}
-
-
-def test_a_refusal_changes_nothing(ends: Stepped) -> None:
-    """What was known before is known after it."""
-    with ends:
-        camera = known(ends)
-        payload(ends).video_refuses = True
-        camera.film(on=True)
-        ends.wait(lambda: camera.film_fault)
-        assert camera.filming is False
-
-
-def test_an_end_whose_acknowledgement_is_lost_is_no_fault(ends: Stepped) -> None:
-    """The status that tells of it is not compared with the beginning."""
-    with ends:
-        camera = recording(ends)
-        ends.autopilot.components[CAMERA].stalls = True
-        camera.film(on=False)
-        ends.watch(8.0)
-        payload(ends).recording = None
-        ends.autopilot.components[CAMERA].stalls = False
-        late = payload(ends).message(mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS)
-        ends.autopilot.components[CAMERA].say(late)
-        ends.turn()
-        assert (camera.filming, camera.film_fault) == (False, "")
-
-
-@pytest.mark.parametrize("sticks", [False, True])
-def test_its_status_is_asked_for_often_until_it_is_clear(ends: Stepped, *, sticks: bool) -> None:
-    """It agrees, or does not: then every ten seconds again."""
-
-    def asked() -> int:
-        return sum(
-            one.get_type() == "COMMAND_LONG"
-            and one.param1 == mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS
-            for one in ends.autopilot.components[CAMERA].heard
-        )
-
-    with ends:
-        camera = known(ends)
-        payload(ends).video_sticks = sticks
-        camera.film(on=True)
-        ends.watch(6.0)
-        before = asked()
-        ends.watch(18.0)
-        assert asked() - before <= 2
-
-
-def test_of_a_camera_that_is_back_nothing_is_known_at_first(ends: Stepped) -> None:
-    """Its word from before it went is old."""
-    with ends:
-        camera = recording(ends)
-        vanish(ends)
-        payload(ends).counts = False
-        ends.autopilot.components[CAMERA].vanished = False
-        ends.watch(3.0)
-        assert camera.filming is None
