@@ -218,7 +218,7 @@ class ScriptedAutopilot:
         self.position = np.array([10.0, 20.0, -3.0])
         """Metres north, east, down of its own zero; it first stands 488 m above the sea."""
         self.velocity = np.zeros(3)
-        self.globe = (470000000, 80000000)
+        self.globe: tuple[int, int] = (470000000, 80000000)
         """Degrees of latitude and longitude times ten million; zeros: it does not know."""
         self.mute: set[str] = set()
         """Names of messages that it does not say."""

@@ -256,7 +256,9 @@ def test_missions_go_up_and_come_down(flight: Flight) -> None:
     """Over a bad link to an emulated autopilot, item by item."""
     bad = Impairment(loss=0.1, duplicates=0.2)
     with flight(AutopilotOptions(uplink=bad, downlink=bad, seed=3)) as ends:
-        items = [MissionItem(16, (0.0,) * 4, 473977420 + i, 85455940, 10.0) for i in range(12)]
+        items = [
+            MissionItem(16, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0) for i in range(12)
+        ]
         ends.vehicle.upload_mission(items)
         assert ends.vehicle.download_mission() == items
 

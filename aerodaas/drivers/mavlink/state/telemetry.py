@@ -107,7 +107,7 @@ class Telemetry:
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
         self.rangefinder = Rangefinder() if measures_ground else None
-        self.texts, self.events, self.boot_clock = Texts(), EventReader(), BootClock(time.monotonic)
+        self.texts, self.events, self.boot_clock = Texts(), EventReader(), _boot_clock()
         self._takers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -296,7 +296,7 @@ class Telemetry:
         self.home = self._armed_at = self.place = self.altitude = self.gps = None
         self.mission_item = self.mission_reached = math.nan
         self.sensors, self.on_ground, self.breach = None, None, ""
-        self.health, self.events, self.boot_clock = Health(), EventReader(), BootClock(time.monotonic)
+        self.health, self.events, self.boot_clock = Health(), EventReader(), _boot_clock()
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
         if self.rangefinder is not None:
@@ -329,3 +329,7 @@ class Telemetry:
 def _on_earth(message: Any) -> bool:  # noqa: ANN401
     """Whether latitude and longitude (degrees times 10^7) are such."""
     return bool(abs(message.lat) <= 90 * 10**7 and abs(message.lon) <= 180 * 10**7)
+
+
+def _boot_clock() -> BootClock:
+    return BootClock(time.monotonic)
