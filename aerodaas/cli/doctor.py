@@ -12,8 +12,10 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Annotated
 
 import psutil
+import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -22,7 +24,7 @@ from aerodaas.actors import priority
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.finding import Finding
 
-__all__ = ["examine", "show_findings"]
+__all__ = ["doctor", "examine", "show_findings"]
 
 _PACKAGES = {
     "ray": "ray",
@@ -48,6 +50,16 @@ _PORTS = {
     8890: "Tello state",
     11111: "Tello video",
 }
+
+
+def doctor(
+    address: Annotated[str | None, typer.Option(help="Ray cluster to check, too.")] = None,
+) -> None:
+    """Say what this machine can do.
+
+    aerodaas doctor
+    """
+    raise typer.Exit(0 if examine(address) else 1)
 
 
 def examine(address: str | None = None) -> bool:

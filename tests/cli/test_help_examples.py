@@ -11,12 +11,14 @@ from rich.markdown import Markdown
 from typer.core import TyperCommand, TyperGroup
 from typer.testing import CliRunner
 
-from aerodaas.cli.app import app
+from aerodaas.cli.app import COMMANDS, app
+from aerodaas.cli.deferred import DeferredCommand
 
 
 def commands(group: TyperGroup, name: str) -> Iterator[tuple[str, TyperCommand | TyperGroup]]:
     """All commands of a group and of those within it, by their words."""
     for word, one in group.commands.items():
+        one = one.loaded if isinstance(one, DeferredCommand) else one  # noqa: PLW2901
         assert isinstance(one, TyperCommand | TyperGroup)
         yield f"{name} {word}", one
         if isinstance(one, TyperGroup):
@@ -39,6 +41,13 @@ def test_each_example_has_its_line(name: str) -> None:
     block = text.partition("```text\n")[2].partition("\n```")[0]
     for example in block.splitlines():
         assert example.strip() in shown
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_the_list_tells_the_first_sentence_of_each_help(command: DeferredCommand) -> None:
+    """The list of all commands, which loads none of them, says the same as the command itself."""
+    first, _, _ = (command.loaded.help or "").partition("\n\n")
+    assert command.help == first.replace("\n", " ").partition(" ```text")[0]
 
 
 def test_there_are_examples() -> None:
