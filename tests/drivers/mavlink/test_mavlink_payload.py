@@ -212,6 +212,7 @@ def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
         assert [photo.label for photo in (first, second)] == ["a", "b"]
 
 
+@pytest.mark.parametrize("ends", ["px4"], indirect=True)
 @pytest.mark.parametrize("fault", ["stuck", "nonsense", "blind", "gone", "camera_refuses"])
 def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, fault: str) -> None:
     """It is told, and the drone flies on, comes home and lands."""
