@@ -1,7 +1,7 @@
-"""Base class of all actors: life cycle, subscriber, publishers, alerts and report.
+"""Node actor: runs nodes in threads of one process, connected to other actors by streams.
 
-The application's process creates all actors at once, then calls on each `prepare` (open models
-and cameras, join the streams), `start` (run in a thread of the actor's own), any number of
+The application's process creates all actors at once, then calls on each `prepare` (make and open
+the nodes, join the streams), `start` (run each node in a thread of its own), any number of
 `report`, and `stop`. An actor restarted by Ray begins again with `prepare`, and one that joins in
 flight begins there; both get the mission's time before, by `set_origin`.
 """
@@ -9,37 +9,55 @@ flight begins there; both get the mission's time before, by `set_origin`.
 from __future__ import annotations
 
 import logging
+import math
 import os
 import threading
-from abc import abstractmethod
-from collections import deque
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import ray
 
 from aerodaas.actors.cluster.dead_man import exit_soon, leave
+from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import be_nice
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
-from aerodaas.runtime.reports import ActorReport, Phase, SentCount, StreamCount
+from aerodaas.runtime.alerts import AlertLog
+from aerodaas.runtime.camera import CameraNode
+from aerodaas.runtime.node import Node
+from aerodaas.runtime.reports import (
+    ActorReport,
+    Phase,
+    SentCount,
+    StreamCount,
+    merged_values,
+)
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.stream_names import alert_stream
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Alert, Header
+from aerodaas.types.clock import host_time_ns
 from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
+from aerodaas.types.status import Message
 from aerodaas.types.vitals import read_vitals
 
-__all__ = [
-    "ActorInfo",
-    "StreamActor",
-]
+__all__ = ["ActorInfo", "NodeActor", "NodeMaker", "SensorActor"]
 
-_ALERTS_KEPT = 50
-_REPEATED = 5 * NANOSECONDS
-"""Mission time within which an alert with the same text is suppressed, nanoseconds."""
+_PROBLEMS_KEPT = 50
 _LISTENING = 5.0
-"""Wall seconds that an actor's own thread may take to subscribe to further streams."""
+"""Wall seconds that a node's thread may take to subscribe to further streams."""
+_LOOK_INTERVAL = 1.0
+"""Wall seconds between two looks at nodes that may hang."""
+_PARTING = 3.0
+"""Wall seconds that a node has to finish its step after the end of the run."""
+
+
+class NodeMaker(Protocol):
+    """Specification of a node, sent to the actor that runs it."""
+
+    def make(self, session: Session) -> Node:
+        """Make the node in the actor's process."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +76,7 @@ class ActorInfo:
 class _AlertHandler(logging.Handler):
     """Publishes the warnings of the project's own modules as alerts."""
 
-    def __init__(self, actor: StreamActor) -> None:
+    def __init__(self, actor: NodeActor) -> None:
         super().__init__(logging.WARNING)
         self._actor = actor
 
@@ -66,43 +84,69 @@ class _AlertHandler(logging.Handler):
         self._actor.alert("warning", record.getMessage())
 
 
-class StreamActor:
-    """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
+class NodeActor:
+    """Actor that runs the nodes of the specifications passed to `prepare`."""
 
     niceness = 10
-    """Niceness of its process; only the drone's actor has the normal one."""
-    most_under_way = UNDER_WAY
-    """Most unanswered messages of a stream to a reader on another node; later ones are dropped."""
+    """Niceness of its process."""
 
-    def __init__(self, session: Session, name: str, reads: dict[str, int]) -> None:
-        """Create the actor `name` of `session`; `reads` are queue depths by stream read."""
+    def __init__(self, session: Session, name: str) -> None:
+        """Create the actor `name` of `session`."""
         self.session = session
         self.name = name
         self.clock = session.clock()
-        self._reads = reads
+        self.runners: list[NodeRunner] = []
+        self.publishers: dict[str, Publisher] = {}
+        self.alerts = AlertLog(name)
         self._phase: Phase = "new"
         self._error: AeroDaaSError | None = None
         self._started = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._told: dict[tuple[str, str, str], int] = {}
-        """Mission time of each of the newest alerts, by source, kind and text."""
-        self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
+        self._threads: list[threading.Thread] = []
         # Reentrant: sending an alert may raise another one, if it turns out unsendable.
         self._alerting = threading.RLock()
         self._problems: list[str] = []
-        self.subscriber: Subscriber | None = None
-        self.publishers: dict[str, Publisher] = {}
 
-    def prepare(self) -> ActorInfo:
-        """Open streams, models and cameras; raises AeroDaaSError if one cannot be opened."""
+    def prepare(self, variables: ProcessVariables | None = None, *specs: NodeMaker) -> ActorInfo:
+        """Make and open the nodes of `specs`; raises what the opening of one raises.
+
+        `variables` have been set in this process by their arrival.
+        """
+        del variables
         be_nice(self.niceness)
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
-        self.alerts = self.publisher(alert_stream(self.name), f"{self.name}'s alert")
-        self.subscriber = self.reader(self._reads)
-        self._open()
+        self.publisher(self.alerts.outlet.stream, f"{self.name}'s alert")
+        # Not in the constructor: Ray would keep the models in its object store for restarts.
+        self._open(specs)
         self._phase = "ready"
+        return self.info()
+
+    def _open(self, specs: tuple[NodeMaker, ...]) -> None:
+        """Make and open nodes; none of them is kept if the opening of one raises."""
+        fresh = [self._runner(spec.make(self.session)) for spec in specs]
+        before = set(self.publishers)
+        try:
+            for runner in fresh:
+                runner.open([one.node for one in (*self.runners, *fresh)])
+        except BaseException:
+            for runner in fresh:
+                runner.close()
+            for stream in set(self.publishers) - before:
+                self.publishers.pop(stream).close()
+            raise
+        self.runners += fresh
+
+    def _runner(self, node: Node) -> NodeRunner:
+        return NodeRunner(self, node)
+
+    def join(self, *specs: NodeMaker) -> ActorInfo:
+        """Run further nodes in flight; none of them if the opening of one raises."""
+        before = len(self.runners)
+        self._open(specs)
+        for runner in self.runners[before:]:
+            self._threads.append(runner.start_thread())
         return self.info()
 
     def info(self) -> ActorInfo:
@@ -110,23 +154,35 @@ class StreamActor:
         return ActorInfo(
             ray.get_runtime_context().get_node_id(),
             os.getpid(),
-            self.subscriber is not None and self.subscriber.shared,
+            any(runner.subscriber.shared for runner in self.runners if runner.opened),
             tuple(self.publishers),
             tuple(self.reads()),
             host_time_ns(),
         )
 
-    def listen(self, depths: dict[str, int]) -> ActorInfo:
-        """Subscribe to further streams, given with queue depths; returns once subscribed.
+    def listen(self, node: str, depths: dict[str, int]) -> ActorInfo:
+        """Subscribe a node to further streams; returns once subscribed.
 
-        Raises MissionError if the actor's thread is busy for too long.
+        Args:
+            node: Name of the node.
+            depths: Queue depths by stream.
+
+        Raises:
+            MissionError: If the node's thread is busy for too long.
         """
-        if self.subscriber is not None:
-            subscribed = self.subscriber.add(depths)
-            self._reads.update(depths)
-            if not subscribed.wait(_LISTENING) and not self.stopping:
-                raise MissionError(f"{self.name} is busy and listens to nothing new")
+        for runner in self.runners:
+            if runner.node.name == node:
+                runner.node.reads.update(depths)
+                subscribed = runner.subscriber.add(depths)
+                if not subscribed.wait(_LISTENING) and not self.stopping:
+                    raise MissionError(f"{self.name} is busy and listens to nothing new")
         return self.info()
+
+    def end_mission_when_finished(self, camera: str, ends: bool) -> None:  # noqa: FBT001 - Ray's
+        """Change whether the mission ends when `camera` has no more images."""
+        for runner in self.runners:
+            if isinstance(runner.node, CameraNode) and runner.node.name == camera:
+                runner.node.ends = ends
 
     def learn(self, application: Application) -> None:
         """Receive the definitions that the application has added since the session was made."""
@@ -135,9 +191,7 @@ class StreamActor:
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Set the actors on other nodes that read this actor's streams."""
         for stream, actors in readers.items():
-            self.publishers[stream].remote = [
-                RemoteReader(actor, self.most_under_way) for actor in actors
-            ]
+            self.publishers[stream].remote = [RemoteReader(actor, UNDER_WAY) for actor in actors]
 
     def set_origin(self, origin_ns: int) -> None:
         """Count mission time from host time `origin_ns`; until then it stands at zero."""
@@ -145,7 +199,7 @@ class StreamActor:
         self.clock = self.session.clock()
 
     def start(self, origin_ns: int) -> None:
-        """Start the actor's thread; mission time is zero at host time `origin_ns`."""
+        """Start the nodes; mission time is zero at host time `origin_ns`."""
         self.set_origin(origin_ns)
         self._phase = "running"
         self._thread = threading.Thread(target=self._guard, name=self.name, daemon=True)
@@ -161,9 +215,10 @@ class StreamActor:
         self._stopping.wait()
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Deliver a message from another node."""
-        if self.subscriber is not None:
-            self.subscriber.deliver(stream, data)
+        """Deliver a message from another node to every node of this actor that reads it."""
+        for runner in self.runners:
+            if runner.opened and stream in runner.subscriber.received:
+                runner.subscriber.deliver(stream, data)
 
     def hand_out(self, stream: str, seq: int) -> list[bytes]:
         """Encoded newest messages of a published `stream`, from number `seq` on.
@@ -180,7 +235,7 @@ class StreamActor:
             streams=self.counts(),
             sent=self.sent(),
             vitals=read_vitals(),
-            alerts=tuple(self._newest_alerts),
+            alerts=tuple(self.alerts.newest),
             problems=tuple(self._problems),
             values=self._values(),
         )
@@ -192,16 +247,14 @@ class StreamActor:
         """
         exit_soon()
         self._stopping.set()
-        if self.subscriber is not None:
-            self.subscriber.wake()
+        for runner in self.runners:
+            runner.wake()
         if self._thread is not None:
             self._thread.join(timeout=10.0)
         self._close()
         report = self.report()
         for publisher in self.publishers.values():
             publisher.close()
-        if self.subscriber is not None:
-            self.subscriber.close()
         return report
 
     def meet(self) -> None:
@@ -225,27 +278,42 @@ class StreamActor:
         self.publishers[stream] = Publisher(self.scope, stream, unsendable)
         return self.publishers[stream]
 
-    def reader(self, depths: dict[str, int], who: str = "") -> Subscriber:
-        """Open streams for reading; `who` names this reader in alerts."""
+    def reader(
+        self, depths: Mapping[str, int], who: str = "", within: frozenset[str] = frozenset()
+    ) -> Subscriber:
+        """Open streams for reading.
+
+        Args:
+            depths: Queue depths by stream.
+            who: Name of the reader in alerts.
+            within: Streams that this actor publishes itself.
+        """
 
         def unreadable(reason: str) -> None:
             self._problem("unreadable", f"{who or self.name} cannot read {reason}")
 
-        return Subscriber(self.scope, depths, unreadable)
+        return Subscriber(self.scope, depths, unreadable, within)
+
+    def publish(self, message: Message[Any]) -> Message[Any]:
+        """Send a message to its readers in this process and in others; returns what was sent."""
+        for runner in self.runners:
+            if runner.opened and message.stream in runner.within:
+                runner.subscriber.accept(message)
+        return self.publishers[message.stream].publish(message)
 
     def _problem(self, kind: str, text: str) -> None:
         """Raise an alert, once, for an item that cannot be sent or read; reported at the end."""
         with self._alerting:
-            if text not in self._problems and len(self._problems) < _ALERTS_KEPT:
+            if text not in self._problems and len(self._problems) < _PROBLEMS_KEPT:
                 self._problems.append(text)
                 self.alert(kind, text)
 
-    def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
+    def alert(self, kind: str, text: str) -> None:
         """Publish an alert at the current mission time; thread-safe."""
-        self.tell(kind, text, self.clock.now(), values)
+        self.publish_alert(kind, text, self.clock.now(), {})
 
-    def tell(
-        self, kind: str, text: str, stamp: int, values: dict[str, Any], source: str = ""
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
     ) -> None:
         """Publish an alert; thread-safe.
 
@@ -258,80 +326,94 @@ class StreamActor:
             values: Further figures by name.
             source: Whose alert it is; empty for this actor's own.
         """
-        source = source or self.name
         with self._alerting:
-            before = self._told.get((source, kind, text))
-            if before is not None and 0 <= stamp - before < _REPEATED:
-                return
-            self._told[source, kind, text] = stamp
-            while len(self._told) > _ALERTS_KEPT:
-                self._told.pop(next(iter(self._told)))
-            header = Header(self.alerts.sent, stamp, source)
-            alert = Alert(header, kind, text, values)
-            if self.alerts.measure(alert, header, host_time_ns()).item is None:
-                header = Header(self.alerts.sent, stamp, source)
-                alert = Alert(header, kind, text, {})
-                self.alerts.measure(alert, header, host_time_ns())
-            self._newest_alerts.append(alert)
+            message = self.alerts.message(kind, text, stamp, values, source)
+            if message is not None and self.publish(message).item is None:
+                # Its figures cannot be sent: the words can.
+                plain = replace(message.item, values={}) if message.item else None
+                again = self.alerts.outlet.measure(plain, message.header, host_time_ns())
+                self.publish(again)
 
-    def follow(self, stamp: int) -> None:
-        """Note the mission time of a received message; the wall clock advances by itself."""
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert of the application's process, so that it is recorded."""
+        self.alert(kind, text)
 
     def reads(self) -> list[str]:
-        """Names of the streams that this actor reads."""
-        return list(self._reads)
+        """Names of the streams that this actor reads from others."""
+        streams = {
+            stream
+            for runner in self.runners
+            for stream in runner.node.reads
+            if stream not in runner.within
+        }
+        return sorted(streams)
 
     def counts(self) -> dict[str, StreamCount]:
-        """Messages received and dropped, by stream."""
-        if self.subscriber is None:
-            return {}
+        """Messages received and dropped by each node, by `stream>node`."""
         return {
-            stream: StreamCount(received, self.subscriber.dropped[stream])
-            for stream, received in list(self.subscriber.received.items())
+            f"{stream}>{runner.node.name}": count
+            for runner in self.runners
+            if runner.opened
+            for stream, count in runner.counts().items()
         }
 
     def sent(self) -> dict[str, SentCount]:
         """Messages published, by stream."""
-        return {stream: _sent(publisher) for stream, publisher in self.publishers.items()}
+        outlets = [self.alerts.outlet]
+        outlets += [outlet for one in self.runners for outlet in tuple(one.node.outlets.values())]
+        return {
+            outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies)) for outlet in outlets
+        }
 
     @property
     def stopping(self) -> bool:
         """True after `stop` was called."""
         return self._stopping.is_set()
 
+    def rest(self, seconds: float) -> None:
+        """Wait for so many wall seconds, or until the actor is stopped."""
+        self._stopping.wait(seconds)
+
     def _guard(self) -> None:
         try:
             self._run()
-        except AeroDaaSError as error:
-            self._fail(error)
         except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
-            self._fail(AeroDaaSError(f"{self.name}: {failure_line(error)}"))
+            self.fail(error)
         else:
-            self._phase = "done"
+            if self._phase != "failed":
+                self._phase = "done"
 
-    def _fail(self, error: AeroDaaSError) -> None:
-        self._error = error
+    def fail(self, error: Exception) -> None:
+        """End as failed, with an alert; called in the thread of a node whose step raised."""
+        if not isinstance(error, AeroDaaSError):
+            error = AeroDaaSError(f"{self.name}: {failure_line(error)}")
+        self._error = self._error or error
         self._phase = "failed"
         self.alert("actor_failed", str(error))
 
-    @abstractmethod
-    def _open(self) -> None:
-        """Open models, cameras, publishers."""
-
-    @abstractmethod
     def _run(self) -> None:
-        """Run until `stopping`."""
+        """Run each node in a thread; watch for those that hang until all have ended."""
+        self._threads = [runner.start_thread() for runner in self.runners]
+        given_up = math.inf
+        while any(one.is_alive() for one in self._threads) and time.monotonic() < given_up:
+            if self.stopping:
+                given_up = min(given_up, time.monotonic() + _PARTING)
+            for thread in tuple(self._threads):
+                thread.join(_LOOK_INTERVAL / len(self._threads))
+            for runner in self.runners:
+                runner.watch()
 
     def _close(self) -> None:
-        """Release the resources of `_open`."""
+        """Close the nodes; what closing one raises becomes the actor's error."""
+        for runner in self.runners:
+            error = runner.close()
+            self._error = self._error or error
 
     def _values(self) -> dict[str, Any]:
-        return {}
+        return merged_values(runner.node for runner in self.runners)
 
 
-def _sent(publisher: Publisher) -> SentCount:
-    newest = sorted(publisher.latencies)
-    if not newest:
-        return SentCount(publisher.sent, None, None)
-    middle, high = newest[len(newest) // 2], newest[int(0.99 * (len(newest) - 1))]
-    return SentCount(publisher.sent, middle, high)
+class SensorActor(NodeActor):
+    """Actor of a camera, whose images must not wait for analyses."""
+
+    niceness = 5

@@ -14,9 +14,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from aerodaas.actors.drone.vehicle_controller import VehicleController
-from aerodaas.actors.streams import codec, local_publisher, local_subscriber, subscriber
 from aerodaas.actors.worker import Worker
+
+from aerodaas.actors.streams import codec, local_publisher, local_subscriber, subscriber
+from aerodaas.runtime.controller import VehicleController
 
 __all__ = ["FOLDER", "dump", "install"]
 

@@ -22,13 +22,13 @@ import typer
 
 import aerodaas
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
-from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.streams import Publisher, Subscriber
 from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.cameras.simulated import SimulatedCamera
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import OpenStream
+from aerodaas.runtime.controller import RobotSpec, VehicleController
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.types.clock import NANOSECONDS, LockstepClock, host_time_ns

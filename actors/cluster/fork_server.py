@@ -32,7 +32,7 @@ __all__ = ["main"]
 
 _EARLY = ("aerodaas.mission.loop", "aerodaas.drivers.simulated", "aerodaas.recording.recorder")
 """Modules of the server, imported while Ray starts. None imports Ray or starts a thread."""
-_LATE = ("ray._private.workers.default_worker", "aerodaas.actors.run.actor_classes")
+_LATE = ("ray._private.workers.default_worker", "aerodaas.actors.run.flight")
 """Further modules of a template."""
 _MOST_TEMPLATES = 4
 _READ_LATER = {"PYTHONBREAKPOINT", "PYTHONUNBUFFERED", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"}

@@ -8,10 +8,6 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from aerodaas.actors.streams import Publisher
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Header
-
 __all__ = ["BackgroundPublisher"]
 
 _log = logging.getLogger(__name__)
@@ -50,12 +46,6 @@ class BackgroundPublisher:
             self._waiting.put(work)
         else:
             self.dropped += 1
-
-    def publish(self, publisher: Publisher, item: object, now: int) -> None:
-        """Queue `item`, measured at this moment, which is `now` in mission time."""
-        measured = host_time_ns()
-        stream = publisher.stream
-        self.do(lambda: publisher.measure(item, Header(publisher.sent, now, stream), measured))
 
     def close(self) -> None:
         """Finish the queue; later work is done at once in the caller's thread."""

@@ -13,11 +13,20 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
+from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
+from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.session import Session
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.clock import NANOSECONDS
 
-__all__ = ["PlannerExecutor"]
+__all__ = ["PlannerExecutor", "planner_for"]
 
 T = TypeVar("T")
 
+_PLANS_PATIENCE = 4.0
+"""Multiple of the plan's timeout after which a scheduler without an answer is stopped."""
+_LEAST_PATIENCE = 5.0
+"""Least timeout in wall seconds: enough for an actor's restart at any mission speed."""
 _NICENESS = 10
 """Niceness of its process: a plan may take longer, but must not delay the setpoint loop."""
 
@@ -84,3 +93,21 @@ class PlannerExecutor(Executor):
         except RayActorError:
             raise RuntimeError("the scheduler's actor died; it starts anew") from None
         return result
+
+
+def planner_for(session: Session, spec: RobotSpec, scheduler: TrajectoryScheduler) -> Planner:
+    """Create the planner of a scheduler; an isolated one plans in an actor, which starts first.
+
+    Args:
+        session: The run.
+        spec: The robot that is planned for.
+        scheduler: Its trajectory scheduler.
+    """
+    if not scheduler.isolated:
+        return BackgroundPlanner(scheduler)
+    patience = _PLANS_PATIENCE * spec.robot.mission.plan_timeout
+    wall = session.host_seconds(round(patience * NANOSECONDS))
+    executor = PlannerExecutor(
+        max(_LEAST_PATIENCE, wall), solve, scheduler, application=session.application
+    )
+    return BackgroundPlanner(scheduler, executor)

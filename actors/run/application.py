@@ -20,13 +20,11 @@ from typing import Any
 
 from aerodaas.actors.run.sources import Source, imported_names, own_sources, serve
 from aerodaas.actors.streams import definitions as _definitions
-from aerodaas.actors.streams.pickling_errors import culprit
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.plugins import main_name
 from aerodaas.dataflow.graph import Graph
-from aerodaas.types.errors import GraphError
 
-__all__ = ["Application", "capture", "require_sendable"]
+__all__ = ["Application", "capture"]
 
 _LARGEST = 1 << 20
 """Bytes of a class beyond which it is sent only with the items that need it."""
@@ -215,24 +213,3 @@ def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
         return []
     package = namespace.get("__package__") or ""
     return [(name, [str(file.parent)]) for name in imported_names(text, package)]
-
-
-def require_sendable(graph: Graph, *plugins: object) -> None:
-    """Raise GraphError, by name, for an object that must be sent but cannot be pickled."""
-    for node in graph.nodes.values():
-        for trigger in node.triggers:
-            _require(trigger.when, f"the condition of {node.id}'s trigger")
-        if node.kind != "sensor":
-            _require(node.work, f"{type(node.work).__name__} ({node.id})")
-    for plugin in plugins:
-        _require(plugin, type(plugin).__name__)
-
-
-def _require(one: object, name: str) -> None:
-    try:
-        _definitions.pickled_class(one)
-    except Exception as error:
-        raise GraphError(
-            f"{name} runs in a process of its own: {culprit(one, error)}; "
-            "make in open() what cannot travel"
-        ) from error

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors.cluster.ray_cluster import nodes_at
-from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.isolation import isolation_options
-from aerodaas.actors.run.plan import AnalyticsActorPlan, FlightPlan
+from aerodaas.runtime.dispatch.offload import CloudProcess
+from aerodaas.runtime.plan import AnalyticsActorPlan, FlightPlan
 
 __all__ = ["environment_options"]
 

@@ -16,21 +16,21 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
-from aerodaas.actors.base import ActorInfo, StreamActor
+from aerodaas.actors.base import ActorInfo, NodeActor, SensorActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
 from aerodaas.actors.cluster.orphan_reaper import REAPER, OrphanReaperActor, ReaperHost, Watched
 from aerodaas.actors.cluster.ray_cluster import options_for
+from aerodaas.actors.dispatch.dispatcher import DispatcherActor, DispatcherSpec
 from aerodaas.actors.dispatch.executor import CloudExecutor
-from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
-from aerodaas.actors.run.actor_classes import actor_classes
+from aerodaas.actors.recorder import RecorderActor, RecorderSpec
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.environment_options import environment_options
-from aerodaas.actors.run.growth import Growth, growth
+from aerodaas.actors.run.live import live_source
 from aerodaas.actors.run.losses import (
     DeadError,
     SilentError,
@@ -39,14 +39,18 @@ from aerodaas.actors.run.losses import (
     drone_lost,
 )
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
-from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 from aerodaas.config.options import LiveViews
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
+from aerodaas.runtime.dispatch.offload import CloudProcess
+from aerodaas.runtime.growth import Growth, growth
+from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
-from aerodaas.runtime.stream_names import done_stream
+from aerodaas.runtime.session import MESSAGE_DEPTH
+from aerodaas.runtime.stream_names import alert_stream, done_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert, Header
@@ -87,7 +91,6 @@ class Flight:
         `live` says who looks on at what is recorded.
         """
         self.plan = plan
-        self._classes = actor_classes(plan.session)
         # The recorder on a cluster node does not share our working directory.
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
@@ -105,16 +108,17 @@ class Flight:
         for name, specs, place in zip(plan.drone_actors, plan.drones, plan.edges, strict=True):
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             others = tuple(other for other in plan.drone_actors if other != name)
-            own = others if plan.conduct is None else plan.conduct
-            args, setup = (session, name, specs, own), (vehicle_variables(),)
-            self._create(name, self._classes.drone, place, args, setup=setup)
+            args, setup = (session, name, specs, others), (vehicle_variables(),)
+            self._create(name, DroneActor, place, args, setup=setup)
         self._create_cameras(plan.cameras)
         self._create_analyses(plan.analyses, environments)
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance, live, self._watched())
-            self._create("recorder", self._classes.recorder, edge, recorder, restarts=_RESTARTS)
+            streams = {**plan.recorded, alert_stream("recorder"): MESSAGE_DEPTH}
+            spec = RecorderSpec(self.recording, streams, provenance, live)
+            args, setup = (session, "recorder", self._watched()), (None, spec)
+            self._create("recorder", RecorderActor, edge, args, restarts=_RESTARTS, setup=setup)
             self._reaper = self._members["recorder"].handle
         else:
             self._reaper = self._create_reaper()
@@ -279,16 +283,10 @@ class Flight:
         actor's opening; the run then continues unchanged.
         """
         change = growth(self.plan, plan)
-        drones = [self._members[name].handle for name in sorted(self._ids())]
-        held = drones if plan.conduct is not None else []
+        self._changing = True
         try:
-            self._changing = True
-            if not all(ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
-                raise MissionError("the mission did not come to rest, so nothing can join it")
-            self._join(change, plan)
+            self._join(change)
         finally:
-            for drone in held:
-                drone.release.remote()
             self._end_change()
         self.plan = plan
 
@@ -308,7 +306,7 @@ class Flight:
             member.answered_at = time.monotonic()
         self._changing = False
 
-    def _join(self, change: Growth, plan: FlightPlan) -> None:
+    def _join(self, change: Growth) -> None:
         known = set(self._members)
         environments = environment_options(replace(self.plan, analyses=change.analyses))
         try:
@@ -328,21 +326,18 @@ class Flight:
             self._members = {name: one for name, one in self._members.items() if name in known}
             self._inform_reaper()
             raise
-        for name, streams in change.acknowledging.items():
-            ask(self._members[name].handle.acknowledge.remote(streams))
         if (recorder := self._members.get("recorder")) is not None and change.recorded:
             recorder.further |= change.recorded
-            recorder.info = ask(recorder.handle.listen.remote(change.recorded), _GROWING)
+            recorder.info = ask(
+                recorder.handle.listen.remote("recorder", change.recorded), _GROWING
+            )
         for robots in change.drones:
             drone = self._members[self._drones[robots[0].robot.id]]
             drone.info = ask(drone.handle.grow.remote(robots, _GROWING), 2 * _GROWING)
-            if plan.conduct is not None:
-                scheduled = drone.handle.use_schedule.remote(plan.conduct, _GROWING)
-                drone.info = ask(scheduled, 2 * _GROWING)
         for stream, ends in change.ending.items():
             camera = self._members[f"sensor/{stream}"]
-            camera.setup = (ends,)
-            ask(camera.handle.end_mission_when_finished.remote(ends))
+            camera.setup = (None, *(replace(spec, ends=ends) for spec in camera.setup[1:]))
+            ask(camera.handle.end_mission_when_finished.remote(stream, ends))
         self._connect_all()
         self._start(fresh)
 
@@ -353,7 +348,7 @@ class Flight:
     def flying(self) -> bool:
         """Whether a drone may be in the air and thus needs its actor."""
         drones = [self._members[name].handle for name in self._ids()]
-        return self.plan.conduct is None and any(map(may_fly, drones))
+        return any(map(may_fly, drones))
 
     @property
     def headless(self) -> str:
@@ -381,6 +376,13 @@ class Flight:
             if stream in info.publishes:
                 return self._members[name].handle, info.node_id
         return None
+
+    def reader(self, stream: str, over: Callable[[], bool]) -> LiveReader | None:
+        """A reader of `stream` for the application; None if no actor publishes it."""
+        publisher = self.publisher(stream)
+        if publisher is None:
+            return None
+        return LiveReader(live_source(self.plan.session, stream, *publisher), over)
 
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their final reports."""
@@ -422,7 +424,7 @@ class Flight:
         return [member.handle for member in self._members.values() if member.name != "recorder"]
 
     def _watched(self) -> Watched:
-        application = ApplicationProcess(time_waits=self.plan.conduct is not None)
+        application = ApplicationProcess(time_waits=False)
         drones = [self._members[name].handle for name in self._ids()]
         return Watched(application, drones, self._ended_first(), list(self._helpers))
 
@@ -441,7 +443,7 @@ class Flight:
     def _create(
         self,
         name: str,
-        kind: type[StreamActor],
+        kind: type[NodeActor],
         place: Placement,
         args: tuple[Any, ...],
         *,
@@ -467,12 +469,9 @@ class Flight:
 
     def _create_cameras(self, cameras: Iterable[Cameras]) -> None:
         for camera in cameras:
-            args = (self.plan.session, camera.stream, camera.sensor, camera.state)
             name = f"sensor/{camera.stream}"
-            setup = (camera.ends,)
-            self._create(
-                name, self._classes.sensor, camera.place, args, restarts=_RESTARTS, setup=setup
-            )
+            args, setup = (self.plan.session, name), (None, camera)
+            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, setup=setup)
 
     def _create_analyses(
         self, actors: Iterable[AnalyticsActorPlan], environments: Mapping[str, Mapping[str, Any]]
@@ -480,7 +479,7 @@ class Flight:
         for actor in actors:
             self._create(
                 actor.name,
-                self._classes.analytics,
+                NodeActor,
                 actor.place,
                 (self.plan.session, actor.name),
                 setup=(ProcessVariables(private_variables(actor.runtime_env)), *actor.nodes),
@@ -501,10 +500,12 @@ class Flight:
             for node in actor.nodes
         }
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
-        args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        setup = (edge, executors)
-        kind = self._classes.dispatcher
-        self._create("dispatcher", kind, Placement(), args, restarts=_RESTARTS, setup=setup)
+        spec = DispatcherSpec(
+            dispatch.scheduler, dispatch.managed, dispatch.resources, edge, tuple(executors)
+        )
+        args, setup = (self.plan.session, "dispatcher"), (None, spec)
+        place = Placement()
+        self._create("dispatcher", DispatcherActor, place, args, restarts=_RESTARTS, setup=setup)
 
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
@@ -628,7 +629,6 @@ class Flight:
         if member.lost_at is None:
             member.lost_at = time.monotonic()
             self.note("actor_lost", str(error))
-            self._wait_no_longer()
         member.report = ActorReport("failed", error)
 
     def _back(self, member: Member) -> None:
@@ -637,13 +637,7 @@ class Flight:
             member.lost_at, member.silent = None, False
             member.answered_at = time.monotonic()
             member.report = ActorReport("running")
-            self._wait_no_longer()
             self.note("actor_back", f"{member.name} is back after {absence:.1f} s")
-
-    def _wait_no_longer(self) -> None:
-        if self.plan.conduct is not None:
-            for name in self._ids():
-                self._members[name].handle.wait_no_longer.remote()
 
     def note(self, kind: str, text: str) -> None:
         """Publish an alert of the application's process; in any thread.
@@ -655,7 +649,6 @@ class Flight:
             for _, reports in tuple(self._answers.values())
             for report in reports.values()
         ]
-        # In lockstep, time follows the drones; else it goes on by itself.
         clock = self.plan.session.starting_at(self._origin).clock()
         header = Header(len(self._notes), max([clock.now(), *stamps]), "application")
         self._notes.append(Alert(header, kind, text))
@@ -675,7 +668,7 @@ class Flight:
                     ray.get(actor.set_origin.remote(self._origin))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:
-                        member.info = ray.get(actor.listen.remote(member.further))
+                        member.info = ray.get(actor.listen.remote("recorder", member.further))
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
                     # It may hang before its next report.

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.actors.streams import definitions as _definitions
-from aerodaas.actors.streams.pickling_errors import culprit
 from aerodaas.actors.streams.plain import NotPlainError, Plain, flatten, rebuild
+from aerodaas.runtime.sending import culprit
 from aerodaas.types.data import Header
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.status import Message, TraceSpan

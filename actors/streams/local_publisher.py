@@ -13,6 +13,7 @@ import select
 import socket
 import threading
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -189,8 +190,8 @@ class LocalPublisher:
         self.refused = 0
         """Number of messages not sent for lack of memory."""
 
-    def send(self, encoded: Encoded) -> None:
-        """Send a message to all readers that have subscribed by now."""
+    def send(self, encode: Callable[[], Encoded]) -> None:
+        """Send the message that `encode` makes to all readers that have subscribed by now."""
         with self._lock:
             if self._news.closed:
                 return
@@ -199,7 +200,7 @@ class LocalPublisher:
                 for arrival in self._arrivals.new():
                     self._admit(arrival)
             if self._readers:
-                self._send(encoded)
+                self._send(encode())
 
     def lend(self, size: int) -> NDArray[np.uint8] | None:
         """Return `size` bytes of a slot for the first large array of the next message.

@@ -16,13 +16,10 @@ from aerodaas.actors.streams.codec import Encoded, UnsendableError
 from aerodaas.actors.streams.local_publisher import LocalPublisher
 from aerodaas.actors.streams.remote import RemoteReader, send_to
 from aerodaas.cameras.base import own_memory
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message, TraceSpan
+from aerodaas.types.status import Message
 
 __all__ = ["Publisher", "RemoteReader"]
 
-_LATENCIES_KEPT = 256
 _MESSAGES_KEPT = 4
 
 
@@ -42,56 +39,27 @@ class Publisher:
         self._unsendable = unsendable
         self.scope = scope
         self.stream = stream
-        self.sent = 0
-        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
-        """Milliseconds from capture to publishing, newest last."""
         self.remote: list[RemoteReader] = []
         self._local = LocalPublisher(scope, stream) if shared_memory_available() else None
+        self._sent = 0
         self._kept: deque[tuple[int, bytes]] | None = None
 
-    def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
-        """Publish a measurement, the first message of its path; `captured` is host time in ns."""
-        span = TraceSpan(self.stream, captured, host_time_ns())
-        return self._send(header.stamp, header, captured, (span,), item)
+    def publish(self, message: Message[Any]) -> Message[Any]:
+        """Send a message to all readers; returns it as it was sent, perhaps without its item.
 
-    def derive(
-        self,
-        item: Any,  # noqa: ANN401
-        origin: Message[Any],
-        received: int,
-        stamp: int,
-    ) -> Message[Any]:
-        """Publish the result of `origin`, which was received at host time `received`."""
-        spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns()))
-        return self._send(stamp, origin.header, origin.captured, spans, item)
-
-    def _send(
-        self,
-        stamp: int,
-        header: Header,
-        captured: int,
-        spans: tuple[TraceSpan, ...],
-        item: Any,  # noqa: ANN401
-    ) -> Message[Any]:
-        self.latencies.append((spans[-1].published - captured) / 1e6)
-        message = Message(self.stream, self.sent, stamp, header, captured, spans, item)
-        self.sent += 1
-        problem = ""
-        try:
-            encoded = Encoded(message)
-        except UnsendableError as error:
-            problem = str(error)
-            message = replace(message, item=None)
-            encoded = Encoded(message)
+        Without a reader in another process, nothing is encoded.
+        """
+        self._sent = message.seq + 1
+        outgoing = _Outgoing(message)
         if self._local is not None:
-            self._local.send(encoded)
+            self._local.send(outgoing.encode)
         if self.remote:
-            send_to(self.remote, self.stream, encoded)
+            send_to(self.remote, self.stream, outgoing.encode())
         if self._kept is not None:
-            self._kept.append((message.seq, encoded.to_bytes()))
-        if problem:
-            self._unsendable(problem)
-        return message
+            self._kept.append((message.seq, outgoing.encode().to_bytes()))
+        if outgoing.problem:
+            self._unsendable(outgoing.problem)
+        return outgoing.message
 
     def since(self, seq: int) -> list[bytes]:
         """Encoded newest messages from number `seq` on; thread-safe.
@@ -101,7 +69,7 @@ class Publisher:
         """
         if self._kept is None:
             self._kept = deque(maxlen=_MESSAGES_KEPT)
-        first = seq if seq <= self.sent else 0
+        first = seq if seq <= self._sent else 0
         return [data for number, data in list(self._kept) if number >= first]
 
     def picture_memory(self, height: int, width: int) -> NDArray[np.uint8]:
@@ -117,3 +85,23 @@ class Publisher:
         """Close the stream."""
         if self._local is not None:
             self._local.close()
+
+
+class _Outgoing:
+    """A message that is encoded once, when the first reader needs it."""
+
+    def __init__(self, message: Message[Any]) -> None:
+        self.message = message
+        self.problem = ""
+        """Why the item cannot be sent; empty if it can."""
+        self._encoded: Encoded | None = None
+
+    def encode(self) -> Encoded:
+        if self._encoded is None:
+            try:
+                self._encoded = Encoded(self.message)
+            except UnsendableError as error:
+                self.problem = str(error)
+                self.message = replace(self.message, item=None)
+                self._encoded = Encoded(self.message)
+        return self._encoded

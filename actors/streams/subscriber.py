@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from queue import SimpleQueue
 from typing import Any
 
@@ -29,12 +29,19 @@ class Subscriber:
         scope: str,
         depths: Mapping[str, int],
         unreadable: Callable[[str], None] = warnings.warn,
+        within: Collection[str] = (),
     ) -> None:
-        """Subscribe to the streams of `depths`; `scope` is the prefix of their names on this node.
+        """Subscribe to streams.
 
-        A message whose item cannot be rebuilt here is received empty, and `unreadable` is called
-        with the reason, in any thread.
+        Args:
+            scope: Prefix of the streams' names on this node.
+            depths: Queue depth of each stream.
+            unreadable: Called in any thread with the reason why an item cannot be rebuilt here; its
+                message is received empty.
+            within: Streams that this process publishes itself, of which it is given the messages
+                by `accept`.
         """
+        self._within = frozenset(within)
         self._unreadable = unreadable
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
         self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
@@ -97,6 +104,12 @@ class Subscriber:
             self._delivered[stream].append(message)
         self.wake()
 
+    def accept(self, message: Message[Any]) -> None:
+        """Add a message of this process."""
+        with self._called:
+            self._delivered[message.stream].append(message)
+        self.wake()
+
     def wake(self) -> None:
         """Make a waiting `receive` return."""
         with self._called:
@@ -113,7 +126,8 @@ class Subscriber:
     def _subscribe(self, depths: Mapping[str, int]) -> None:
         if self._local is not None:
             for stream, depth in depths.items():
-                self._local.subscribe(stream, depth)
+                if stream not in self._within:
+                    self._local.subscribe(stream, depth)
 
     def _await_call(self, timeout: float) -> None:
         with self._called:

@@ -174,8 +174,9 @@ def _navigation(edge: NavigationEdge) -> GuestNavigation:
 
 def _program(environment: Environment, namespace: dict[str, Any]) -> bytes:
     """The guest's analyses and conditions, with the modules that they come from."""
-    from aerodaas.actors.run.application import capture, require_sendable  # noqa: PLC0415
+    from aerodaas.actors.run.application import capture  # noqa: PLC0415
     from aerodaas.actors.streams.definitions import pickled_class  # noqa: PLC0415
+    from aerodaas.runtime.sending import require_sendable  # noqa: PLC0415
 
     graph = environment.graph
     require_sendable(graph)

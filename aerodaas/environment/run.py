@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
@@ -39,14 +39,17 @@ from aerodaas.types.identifiers import told
 from aerodaas.types.status import MissionState
 
 if TYPE_CHECKING:
-    from aerodaas.actors.run.application import Application
     from aerodaas.actors.run.flight import Flight
-    from aerodaas.actors.run.plan import FlightPlan
     from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment
+    from aerodaas.runtime.inline_flight import InlineFlight
+    from aerodaas.runtime.live import LiveReader
+    from aerodaas.runtime.plan import FlightPlan
     from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
     from aerodaas.terminal.console import FlightView
+
+MakeFlight: TypeAlias = "type[Flight | InlineFlight]"
 
 __all__ = ["Run"]
 
@@ -78,7 +81,7 @@ class Run:
         self.state: FlightState | None = None
         self._console: ConsoleServer | None = None
         self._environment = environment
-        self._flight: Flight | None = None
+        self._flight: Flight | InlineFlight | None = None
         self._view: FlightView
         self._over = self._awaited = False
         self._finished = threading.Event()
@@ -96,12 +99,13 @@ class Run:
             raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
         return simulated and self.options.speed is None if wanted is None else wanted
 
+    @property
+    def _inline(self) -> bool:
+        """Whether the nodes are stepped in this process."""
+        return self.lockstep
+
     def start(self) -> None:
-        """Start all actors; raises the project's errors, with nothing left running."""
-        from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
-            ray_cluster as cluster,
-        )
-        from aerodaas.actors.run.live import LiveReader  # noqa: PLC0415
+        """Start all nodes; raises the project's errors, with nothing left running."""
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
         from aerodaas.terminal.console import FlightView, StartupView  # noqa: PLC0415
 
@@ -116,11 +120,8 @@ class Run:
                 "give --record another path or move the file away"
             )
         console = self._console_server()
-        cluster.begin(self.options.address)
-        from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
-
         with StartupView(self.options) as starting:
-            cluster.connect(self.options.address, starting.begin)
+            make_flight = self._runtime(starting.begin)
             raise_on_signals()
             provenance = Provenance.collect(
                 app=self.options.application,
@@ -129,7 +130,8 @@ class Run:
                 document=document,
             )
             options = self.options
-            flight = Flight(plan, self.recording, provenance, LiveViews(options.live, options.ros2))
+            views = LiveViews(options.live, options.ros2)
+            flight = make_flight(plan, self.recording, provenance, views)
             starting.begin("opening vehicles, cameras and models")
             try:
                 flight.launch(starting.step)
@@ -141,15 +143,14 @@ class Run:
         self._view = FlightView(self.options, self.config)
         self._flight = flight
         self._launched = time.monotonic()
-        session = plan.session
 
         def read(stream: str) -> LiveReader:
-            publisher = flight.publisher(stream)
-            if publisher is None:
+            reader = flight.reader(stream, lambda: self._over)
+            if reader is None:
                 raise GraphError(
                     f"{stream} does not run: call get_data_stream() before start_mission()"
                 )
-            return LiveReader(session, stream, *publisher, lambda: self._over)
+            return reader
 
         for note in self._environment.guest_notes:
             flight.note(note.kind, note.text)
@@ -163,6 +164,22 @@ class Run:
         if console is not None:
             self._open_console(console)
         atexit.register(self.abandon)
+
+    def _runtime(self, begin_step: Callable[[str], None]) -> MakeFlight:
+        """The class of the flight: in this process, or on Ray, which is then started."""
+        if self._inline:
+            from aerodaas.runtime.inline_flight import InlineFlight  # noqa: PLC0415
+
+            return InlineFlight
+        from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
+            ray_cluster as cluster,
+        )
+
+        cluster.begin(self.options.address)
+        from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
+
+        cluster.connect(self.options.address, begin_step)
+        return Flight
 
     def _check_served(self) -> None:
         """Raise ConfigError for what cannot be served to others while flying."""
@@ -234,7 +251,7 @@ class Run:
 
     def grow(self) -> None:
         """Start the graph's additions; raises the reason if that is impossible."""
-        from aerodaas.actors.run.plan import (  # noqa: PLC0415 - ray only where it is needed
+        from aerodaas.runtime.plan import (  # noqa: PLC0415 - ray only where it is needed
             make_plan,
         )
 
@@ -257,7 +274,7 @@ class Run:
         flight.learn(self._application(scheduler))
         flight.use_scheduler(scheduler)
 
-    def _flying(self, hence: str) -> Flight:
+    def _flying(self, hence: str) -> Flight | InlineFlight:
         if self._flight is None or self._over:
             raise MissionError(f"the mission is over: {hence}")
         return self._flight
@@ -327,8 +344,8 @@ class Run:
 
     def plan(self) -> FlightPlan:
         """Plan the actors of the flight; raises the errors of a graph that cannot fly."""
-        from aerodaas.actors.run.plan import make_plan  # noqa: PLC0415
         from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
+        from aerodaas.runtime.plan import make_plan  # noqa: PLC0415
         from aerodaas.runtime.session import Session  # noqa: PLC0415
 
         self._check_world()
@@ -361,17 +378,22 @@ class Run:
             rehearse(spec.robot, spec.initial, self.config, spec.scheduler)
         return plan
 
-    def _application(self, *others: object) -> Application:
-        """Present definitions of the application, those of `others` included.
+    def _application(self, *others: object) -> Any:  # noqa: ANN401 - the actors' own
+        """Definitions of the application for actors, those of `others` included; None inline.
 
-        Raises GraphError, with the name, for an object that cannot be sent.
+        Raises GraphError, with the name, for an object that cannot be sent: inline, too, so that
+        what flies in simulated time flies in real time.
         """
-        from aerodaas.actors.run.application import capture, require_sendable  # noqa: PLC0415
+        from aerodaas.runtime.sending import require_sendable  # noqa: PLC0415
 
         environment = self._environment
         used = (environment.trajectory_scheduler(), environment.analytics_scheduler(), *others)
         plugins = [one for one in used if one is not None]
-        application = capture(self.graph, self.config, *plugins)
+        application = None
+        if not self._inline:
+            from aerodaas.actors.run.application import capture  # noqa: PLC0415
+
+            application = capture(self.graph, self.config, *plugins)
         require_sendable(self.graph, *plugins)
         return application
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from aerodaas.runtime.node import Node
 from aerodaas.types.data import Alert
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.health import HealthReport
@@ -22,6 +24,7 @@ __all__ = [
     "RobotReport",
     "SentCount",
     "StreamCount",
+    "merged_values",
 ]
 
 LATENCIES_KEPT = 20_000
@@ -39,6 +42,12 @@ class RobotReport:
     """Milliseconds from capture to command, newest last."""
     health: HealthReport | None = None
     """The list before take-off as it was gone through last."""
+
+    @property
+    def notable(self) -> tuple[object, ...]:
+        """What the application is told at once, rather than at its next look."""
+        status = self.status
+        return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
 
 
 class Latencies:
@@ -75,6 +84,15 @@ class SentCount:
     """Latency from capture to publishing of the newest messages; None before the first."""
     p99_ms: float | None
 
+    @classmethod
+    def of(cls, count: int, latencies: Sequence[float]) -> SentCount:
+        """The count of `count` messages, of which the newest had these latencies in ms."""
+        if not latencies:
+            return cls(count, None, None)
+        ordered = sorted(latencies)
+        last = len(ordered) - 1
+        return cls(count, ordered[len(ordered) // 2], ordered[int(0.99 * last)])
+
 
 @dataclass(frozen=True)
 class ActorReport:
@@ -92,6 +110,20 @@ class ActorReport:
     """Descriptions of items that could not be sent or read."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures specific to the kind of actor."""
+
+
+def merged_values(nodes: Iterable[Node]) -> dict[str, Any]:
+    """Figures of the nodes of one report; tables and lists of the same name are joined."""
+    values: dict[str, Any] = {}
+    for node in nodes:
+        for name, value in node.values().items():
+            if isinstance(value, dict):
+                values.setdefault(name, {}).update(value)
+            elif isinstance(value, list):
+                values.setdefault(name, []).extend(value)
+            else:
+                values[name] = value
+    return values
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
+from aerodaas.runtime.node import NEVER
 from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, LockstepClock, ScaledClock
 
 __all__ = [
@@ -18,7 +19,6 @@ __all__ = [
     "CONTROL_RATE",
     "FRAME_DEPTH",
     "MESSAGE_DEPTH",
-    "NEVER",
     "Session",
     "next_due",
 ]
@@ -27,8 +27,6 @@ FRAME_DEPTH = 8
 """Queue depth of frames for a reader of all of them; each is megabytes of shared memory."""
 MESSAGE_DEPTH = 32
 """Queue depth of other messages for a reader of all of them."""
-NEVER = 2**63 - 1
-"""A timestamp that is never reached."""
 CONTROL_RATE = 20.0
 """Setpoint loop cycles per second: ten times the rate that PX4 requires in offboard mode."""
 CONTROL_PERIOD_NS = int(NANOSECONDS / CONTROL_RATE)
@@ -40,7 +38,7 @@ class Session:
 
     environment: EnvironmentConfig
     speed: float | None = 1.0
-    """Mission seconds per wall second; None for lockstep."""
+    """Mission seconds per wall second; None for simulated time."""
     id: str = field(default_factory=lambda: f"aerodaas/{uuid.uuid4().hex[:12]}")
     """Prefix of the run's stream names; unique on a host."""
     origin_ns: int | None = None
@@ -48,7 +46,7 @@ class Session:
     timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     """Sorted timestamps in nanoseconds at which sources without a rate are due."""
     edge: EdgeShare | None = None
-    """Share of an edge that other flights use, too; None in lockstep, which waits for all work."""
+    """Share of an edge that other flights use, too; None in simulated time."""
     locks: Path | None = None
     """Folder of a provider's locks, which the drones' actors on its machine hold."""
     application: Any = None
@@ -80,14 +78,14 @@ class Session:
         return replace(self, origin_ns=origin_ns)
 
     @property
-    def lockstep(self) -> bool:
-        """True if mission time advances only when all actors have processed its data."""
+    def simulated(self) -> bool:
+        """True if mission time is simulated: it advances when all of a moment is done."""
         return self.speed is None
 
     @property
     def simulates_executions(self) -> bool:
-        """True in lockstep, if tasks of the analytics scheduler take mission time."""
-        return self.lockstep and self.environment.simulation.execution_times is not None
+        """True in simulated time, if tasks of the analytics scheduler take mission time."""
+        return self.simulated and self.environment.simulation.execution_times is not None
 
     def clock(self) -> Clock:
         """New mission clock for a process of this run."""

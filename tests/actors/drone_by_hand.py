@@ -9,17 +9,13 @@ from typing import Any
 from flying import robot
 
 from aerodaas.actors.drone.actor import DroneActor
-from aerodaas.actors.drone.vehicle_controller import RobotSpec
-from aerodaas.actors.lockstep.drone import LockstepDroneActor
-from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.streams import Subscriber
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.mission.commands import Command
+from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
-__all__ = ["DroneByHand", "LockstepDroneByHand", "drone_by_hand", "spec_by_hand"]
+__all__ = ["DroneByHand", "drone_by_hand", "spec_by_hand"]
 
 
 class DroneByHand(DroneActor):
@@ -32,14 +28,9 @@ class DroneByHand(DroneActor):
 
     def open_here(self) -> None:
         """What `prepare` does on a node of Ray's."""
-        self.subscriber = Subscriber(self.scope, self._reads)
-        self.alerts = self.publisher(f"alerts/{self.name}")
-        self._open()
+        self.publisher(self.alerts.outlet.stream)
+        self._open(())
         self._phase = "ready"
-
-
-class LockstepDroneByHand(DroneByHand, LockstepDroneActor):
-    """The same in lockstep."""
 
 
 class _InThisProcess(NearestNeighborScheduler):
@@ -66,7 +57,7 @@ def spec_by_hand(
 
 def drone_by_hand(
     *initial: Command,
-    speed: float | None,
+    speed: float,
     navigation: tuple[str, ...] = (),
     requesters: tuple[str, ...] = (),
     locks: Path | None = None,
@@ -82,11 +73,6 @@ def drone_by_hand(
     (only,) = environment.robots
     spec = spec_by_hand(only, *initial, navigation=navigation, requesters=requesters)
     session, name = Session(environment, speed, locks=locks), "drone/drone"
-    actor: DroneByHand
-    if speed is None:
-        schedule = LockstepSchedule({}, {}, windows={state_stream("drone"): 0})
-        actor = LockstepDroneByHand(session, name, (spec,), schedule)
-    else:
-        actor = DroneByHand(session, name, (spec,))
+    actor = DroneByHand(session, name, (spec,))
     actor.open_here()
     return actor

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from drone_by_hand import DroneByHand, drone_by_hand
 from flying import hop
+from publishing import send
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.mission.commands import AddNavigation, End, OpenStream, Request, StreamItem
@@ -81,7 +82,7 @@ def _flying(**words: Any) -> DroneByHand:  # noqa: ANN401
 def _send(actor: DroneByHand, stream: str, item: object) -> None:
     if stream not in actor.publishers:
         actor.publisher(stream)
-    actor.publishers[stream].measure(item, Header(1, actor.clock.now(), stream), host_time_ns())
+    send(actor.publishers[stream], item, Header(1, actor.clock.now(), stream), host_time_ns())
 
 
 def _eventually(holds: Any) -> None:  # noqa: ANN401
@@ -156,7 +157,7 @@ def test_a_mission_whose_every_turn_raises_leaves_the_vehicle_to_itself() -> Non
     actor = _flying()
     actor.start(host_time_ns())
     _eventually(lambda: actor.robots()["drone"].status.state is MissionState.LOITERING)
-    controller = actor._controllers["drone"]
+    controller = actor._node._controllers["drone"]
     mission: Any = controller.mission
     mission.update = None
     _eventually(lambda: actor.report().phase == "failed")

@@ -10,18 +10,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from drone_by_hand import DroneByHand, LockstepDroneByHand, drone_by_hand, spec_by_hand
+from drone_by_hand import DroneByHand, drone_by_hand, spec_by_hand
 from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.change_signal import ChangeSignal
-from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.reports import LATENCIES_KEPT, Latencies
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.stream_names import state_stream
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.errors import MissionError
@@ -38,15 +36,12 @@ def _square(name: str) -> AeroNavigation:
     return AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops, priority=len(name) % 3)
 
 
-@pytest.mark.parametrize(
-    "speed", [None, pytest.param(4.0, marks=pytest.mark.slow)], ids=["lockstep", "real time"]
-)
-def test_reading_never_meets_a_mission_that_changes(speed: float | None) -> None:
+def test_reading_never_meets_a_mission_that_changes() -> None:
     """100,000 reads from four threads while commands and plans turn the queue over: none raises.
 
     Reports are whole: the target is not among what is pending, nothing is visited twice.
     """
-    actor = drone_by_hand(AddNavigation(_square("first")), speed=speed, mission=_HOLD)
+    actor = drone_by_hand(AddNavigation(_square("first")), speed=4.0, mission=_HOLD)
     actor.start(host_time_ns())
     done = threading.Event()
     interval = sys.getswitchinterval()
@@ -102,8 +97,8 @@ def test_a_report_says_what_a_command_did_as_soon_as_it_is_answered() -> None:
 
 def test_commands_after_the_end_are_refused_at_once() -> None:
     """The loop turns no more, and the answer says how the mission ended."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=None)
-    actor.start(0)
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
+    actor.start(host_time_ns())
     _until_over(actor)
     before = actor.robots()["drone"]
     assert before.status.state is MissionState.LANDED
@@ -220,11 +215,11 @@ def test_a_call_that_waits_for_a_change_returns_without_one() -> None:
 
 def test_an_alert_in_the_same_words_is_told_again_only_after_a_while() -> None:
     """Others are told at once; what is told goes by mission time."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=None)
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
     second = 1_000_000_000
     for stamp in range(12):
-        actor.tell("kind", "the same", stamp * second, {})
-        actor.tell("kind", f"another {stamp}", stamp * second, {})
+        actor.publish_alert("kind", "the same", stamp * second, {})
+        actor.publish_alert("kind", f"another {stamp}", stamp * second, {})
     told = [one for one in actor.report().alerts if one.text == "the same"]
     assert [one.header.stamp // second for one in told] == [0, 5, 10]
     assert len(actor.report().alerts) == 15
@@ -283,13 +278,9 @@ def test_alerts_of_drones_on_one_link_say_whose_they_are() -> None:
         {"name": "shared", "robots": robots, "simulation": {"world": "empty"}}
     )
     specs = tuple(spec_by_hand(one, AddNavigation(hop((1, 0)))) for one in environment.robots)
-    schedule = LockstepSchedule(
-        {}, {}, windows={state_stream(name): 0 for name in ("west", "east")}
-    )
-    session = Session(environment, None)
-    actor = LockstepDroneByHand(session, "drone/west+east", specs, schedule)
+    actor = DroneByHand(Session(environment, 20.0), "drone/west+east", specs)
     actor.open_here()
-    actor.start(0)
+    actor.start(host_time_ns())
     _until_over(actor)
     told = [one for one in actor.report().alerts if one.kind == "takeoff_refused"]
     actor.stop()

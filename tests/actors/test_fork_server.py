@@ -28,7 +28,7 @@ import numpy as np
 told = {"words": sys.argv[1:], "folder": os.getcwd(), "name": __name__, "first": sys.path[0]}
 told |= {"mine": os.environ.get("MINE"), "job": os.environ["RAY_JOB_ID"]}
 told |= {"drawn": [random.random(), np.random.random()], "id": os.getpid(), "parent": os.getppid()}
-told["ready"] = "aerodaas.actors.run.actor_classes" in sys.modules
+told["ready"] = "aerodaas.actors.run.flight" in sys.modules
 told["group"] = os.getpgid(0) == os.getpid()
 print(json.dumps(told), flush=True)
 """

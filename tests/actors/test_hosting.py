@@ -120,7 +120,7 @@ def test_the_failure_of_one_drone_is_no_other_ones(monkeypatch: pytest.MonkeyPat
     """It is left to itself and told by name; the others of its actor fly on, obey and land."""
     with _actors(("west", "north")) as (actor,):
         _eventually(lambda: _is(actor, "north", MissionState.LOITERING))
-        controller = actor._controllers["west"]
+        controller = actor._node._controllers["west"]
         mission: Any = controller.mission
         mission.update = None
         _eventually(lambda: any(one.kind == "drone_failed" for one in actor.report().alerts))
@@ -131,7 +131,7 @@ def test_the_failure_of_one_drone_is_no_other_ones(monkeypatch: pytest.MonkeyPat
         assert _is(actor, "north", MissionState.LOITERING)
         assert actor.report().phase == "running"
         assert actor.command("north", End()).accepted
-        north = actor._controllers["north"]
+        north = actor._node._controllers["north"]
         land, landed_again = north.vehicle.land, []
 
         def landing() -> None:

@@ -14,12 +14,12 @@ from inference_server import Serving, serving
 from pydantic import SecretStr
 
 from aerodaas import Analytics, Environment, Frame
-from aerodaas.actors.dispatch.offload import allowed, cloud_processes, priced
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
 from aerodaas.dataflow.graph import Node
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
+from aerodaas.runtime.dispatch.offload import allowed, cloud_processes, priced
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 from aerodaas.types.data import Detection, Detections
 from aerodaas.types.errors import GraphError

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from publishing import send
 
 from aerodaas.actors.streams import Publisher, Subscriber
 from aerodaas.cameras.base import PlacingCamera
@@ -40,7 +41,7 @@ class _Link:
         header = Header(self._stamp, self._stamp, "c")
         measured = np.full(image.shape[:2], 7, np.uint16) if image is not None and depth else None
         frame = None if image is None else Frame(header, image, depth=measured)
-        self.publisher.measure(frame, header, 0)
+        send(self.publisher, frame, header, 0)
         self._stamp += 1
 
     def read(self) -> Frame | None:
@@ -139,7 +140,7 @@ def test_what_is_not_the_whole_memory_arrives(
 def test_what_has_no_room_beside_the_picture_is_written_elsewhere(link: _Link) -> None:
     """An item may hold far more than the picture that was asked for."""
     image = link.draw(4)
-    link.publisher.measure([image, np.ones(5_000_000, np.uint8)], Header(9, 9, "c"), 0)
+    send(link.publisher, [image, np.ones(5_000_000, np.uint8)], Header(9, 9, "c"), 0)
     picture, more = link.reader.receive(0)[-1].item or (None, None)
     assert (np.asarray(picture) == 4).all()
     assert np.asarray(more).sum() == 5_000_000

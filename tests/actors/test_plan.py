@@ -1,4 +1,4 @@
-"""From a graph to actors: placement, acknowledgements, and who is waited for in lockstep."""
+"""From a graph to nodes and actors: placement, and what is observed in simulated time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from analyses import Above, Broken, Jitter, ProcessId, Ticker, Weave
 from flying import FLAT, Flyer, hop, robot
 
 from aerodaas import Environment
-from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.run.plan import FlightPlan, make_plan
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.plan import FlightPlan, make_plan
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.types.errors import GraphError, SchedulerError
@@ -49,16 +48,9 @@ def camera(env: Environment) -> AeroStreamData[Any]:
 
 
 def plan(env: Environment, speed: float | None = None) -> FlightPlan:
-    """The plan of what was built so far; None is lockstep."""
+    """The plan of what was built so far; None is simulated time."""
     scheduler = env.trajectory_scheduler()
     return make_plan(Session(env.config, speed), env.graph, env.compute(), scheduler)
-
-
-def conduct(env: Environment) -> LockstepSchedule:
-    """The plan's schedule of acknowledgements."""
-    schedule = plan(env).conduct
-    assert schedule is not None
-    return schedule
 
 
 def test_nothing_flies_without_navigation(environment: Environment) -> None:
@@ -119,72 +111,24 @@ def test_unread_sensors_of_a_flying_robot_run_all_the_same(environment: Environm
     assert {"drone/cam", "drone/odom", "drone/@state", "drone/@status"} <= set(made.recorded)
 
 
-def test_what_steers_is_waited_for(environment: Environment) -> None:
-    """No measurement that can change a flight is under way while time goes on."""
+def test_a_simulated_vehicle_is_observed_when_others_measure_it(environment: Environment) -> None:
+    """At the times of cameras and external sources, beside the loop's own; never in real time."""
     env = environment
     env.get_robot_by_id("drone").navigate(Weave().analyse(odometry(env)))
     Broken().analyse(camera(env))
-    windows = conduct(env).windows
-    assert windows["drone/odom"] == 0
-    assert windows["drone/cam"] > 0
-    assert windows["drone/@state"] > 0
-
-
-def test_what_triggers_or_wakes_what_steers_is_waited_for(environment: Environment) -> None:
-    """A trigger's command steers, and so does waking an analysis that does."""
-    env = environment
-    drone = env.get_robot_by_id("drone")
-    drone.navigate(hop((1, 0)))
-    sleeper, waker, ticker = Above(1, "sleeper"), Broken(), Ticker()
-    sleeper.analyse(odometry(env))
-    waker.analyse(camera(env))
-    waker.trigger(sleeper)
-    assert conduct(env).windows["drone/cam"] > 0
-    sleeper.trigger(drone.end_mission)
-    ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
-    ticker.trigger(drone.pause_mission)
-    windows = conduct(env).windows
-    assert windows["drone/cam"] == windows["drone/odom"] == windows["ticker"] == 0
-
-
-def test_analyses_that_wake_each_other_are_no_endless_question(environment: Environment) -> None:
-    """A circle of wakes ends."""
-    env = environment
-    env.get_robot_by_id("drone").navigate(hop((1, 0)))
-    one, other = Above(1, "one"), Above(2, "other")
-    one.analyse(odometry(env))
-    other.analyse(odometry(env))
-    one.trigger(other)
-    other.trigger(one)
-    assert conduct(env).windows["drone/odom"] > 0
-
-
-@pytest.mark.parametrize("recording", [True, False])
-def test_every_measurement_is_acknowledged_by_its_readers(tmp_path: Path, recording: bool) -> None:  # noqa: FBT001
-    """Each end of each way acknowledges once; the recorder does for every message."""
-    content = {**CONTENT, "recording": {"enabled": recording}}
-    env = Environment(Flyer(tmp_path).write(content))
-    follow = Weave().analyse(odometry(env))
-    env.get_robot_by_id("drone").navigate(follow)
-    Jitter().analyse(odometry(env))
-    counts = conduct(env).acknowledgements
-    # The drone for what Weave says, and Jitter itself; or the recorder for each of the streams.
-    assert counts["drone/odom"] == (4 if recording else 2)
-    assert counts["drone/@state"] == (1 if recording else 0)
-    (actor,) = plan(env).analyses
-    silent = {node.stream: node.acknowledges for node in actor.nodes}
-    assert silent == {"drone/weave": False, "drone/jitter": not recording}
+    Ticker().deploy(env.get_compute_resource_by_id("edge")).instantiate()
+    assert plan(env).observed == {"drone/cam": 10.0, "ticker": Ticker.rate}
+    assert plan(env, 1.0).observed is None
 
 
 def test_in_real_time_each_drone_has_its_own_actor(tmp_path: Path) -> None:
-    """In lockstep one actor flies them all and conducts the time."""
+    """In simulated time one node flies them all."""
     content = {**FLAT, "robots": [robot("one"), robot("two", start=[0, 5, 0])]}
     env = Environment(Flyer(tmp_path).write(content))
     for name in ("one", "two"):
         env.get_robot_by_id(name).navigate(hop((1, 0)))
     assert [len(group) for group in plan(env, speed=1.0).drones] == [1, 1]
     assert [len(group) for group in plan(env).drones] == [2]
-    assert plan(env, speed=1.0).conduct is None
 
 
 def test_simulated_drones_of_a_large_flight_share_actors(tmp_path: Path) -> None:
@@ -253,15 +197,10 @@ def _dispatched(env: Environment, speed: float | None = None) -> FlightPlan:
 def test_a_simulated_cloud_is_there_where_executions_take_mission_time(tmp_path: Path) -> None:
     """It has slots and no process; in real time, and where nothing takes time, it is left out."""
     env = _watched(tmp_path, {"execution_times": "nominal"})
-    dispatch, conduct = _dispatched(env).dispatch, _dispatched(env).conduct
+    dispatch = _dispatched(env).dispatch
     assert dispatch is not None
-    assert conduct is not None
     assert (dispatch.resources.cloud_slots, dispatch.cloud) == (3, ())
-    assert all(one.offloadable and not one.acknowledges for one in dispatch.managed)
-    # A frame is acknowledged by recorder and dispatcher, a result by the recorder.
-    assert conduct.acknowledgements["drone/cam"] == 2
-    assert conduct.answers == {"drone/one": 1, "drone/two": 1}
-    assert conduct.windows["drone/cam"] == 0
+    assert all(one.offloadable for one in dispatch.managed)
     for speed, simulation in ((1.0, {"execution_times": "nominal"}), (None, {})):
         dispatch = _dispatched(_watched(tmp_path, simulation), speed).dispatch
         assert dispatch is not None
@@ -270,7 +209,7 @@ def test_a_simulated_cloud_is_there_where_executions_take_mission_time(tmp_path:
 
 
 def test_nothing_flies_on_a_simulated_cloud_in_real_time(tmp_path: Path) -> None:
-    """An analysis that is deployed there has no place; in lockstep it has one."""
+    """An analysis that is deployed there has no place; in simulated time it has one."""
     env = _watched(tmp_path, {"execution_times": "nominal"})
     SyntheticAnalytics("far_off", 0, 0).deploy(env.get_compute_resource_by_id("far")).analyse(
         camera(env)

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from drone_by_hand import spec_by_hand
 
-from aerodaas.actors.run.hosting import MOST_ALONE, by_actor
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.runtime.hosting import MOST_ALONE, by_actor
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import Session
 from aerodaas.types.errors import ConfigError

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.runtime.session import CONTROL_PERIOD_NS, NEVER, Session, next_due
+from aerodaas.runtime.node import NEVER
+from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session, next_due
 from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
 
 rates = st.floats(0.1, 240.0) | st.integers(1, 240).map(float)
@@ -74,7 +75,7 @@ def test_the_session_tells_its_clock() -> None:
     """No speed is lockstep; a speed scales the wall's time."""
     environment = EnvironmentConfig.model_validate({"robots": [{"id": "d"}]})
     assert isinstance(Session(environment, None).clock(), LockstepClock)
-    assert Session(environment, None).lockstep
+    assert Session(environment, None).simulated
     quick = Session(environment, 5.0).starting_at(3)
     assert quick.clock() == ScaledClock(5.0, 3)
     assert quick.host_seconds(10 * NANOSECONDS) == 2.0

@@ -6,6 +6,7 @@ import uuid
 
 import numpy as np
 import pytest
+from publishing import send
 from required import needs
 
 from aerodaas.actors.streams import MAX_DEPTH, Publisher, Subscriber, shared_memory_available
@@ -26,7 +27,7 @@ def test_a_slow_recorder_starves_nobody() -> None:
     received = 0
     for number in range(3 * MAX_DEPTH):
         picture = np.full(1000, number % 256, np.uint8)
-        publisher.measure(picture, Header(number, number, "camera"), 0)
+        send(publisher, picture, Header(number, number, "camera"), 0)
         received += len(quick.receive(0.0))
     assert received == 3 * MAX_DEPTH
     for subscriber in slow:
@@ -44,7 +45,7 @@ def test_what_a_slow_reader_lost_is_counted() -> None:
     subscriber = Subscriber(scope, {"camera": 8})
     received = 0
     for number in range(50):
-        publisher.measure(number, Header(number, number, "camera"), 0)
+        send(publisher, number, Header(number, number, "camera"), 0)
         if number % 20 == 0:
             received += len(subscriber.receive(0.0))
     while messages := subscriber.receive(0.0):

@@ -21,6 +21,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+from publishing import send
 from required import needs, needs_root
 
 from aerodaas.actors.streams import (
@@ -52,7 +53,7 @@ def scope_of_its_own() -> str:
 def publish(publisher: Publisher, number: int, size: int = 8) -> None:
     """Publish an array full of its number."""
     header = Header(number, number, "camera")
-    publisher.measure(np.full(size // 8, number, np.int64), header, 0)
+    send(publisher, np.full(size // 8, number, np.int64), header, 0)
 
 
 def number_in(message: Message[Any]) -> int:
@@ -202,7 +203,7 @@ from aerodaas.actors.streams import Publisher
 from aerodaas.types.data import Header
 publisher, number = Publisher(sys.argv[1], "s"), 0
 while True:
-    publisher.measure(np.full(20_000, number), Header(number, number, "camera"), 0)
+    send(publisher, np.full(20_000, number), Header(number, number, "camera"), 0)
     number += 1
     if number == 20:
         print("talks", flush=True)
@@ -239,7 +240,7 @@ from aerodaas.types.data import Header
 state, frames = Publisher(sys.argv[1], "state"), Publisher(sys.argv[1], "frames")
 for number in range(100_000):
     for publisher, size in ((state, 1), (frames, 1 + number % 2000)):
-        publisher.measure(np.full(size, number), Header(number, number, "camera"), 0)
+        send(publisher, np.full(size, number), Header(number, number, "camera"), 0)
 """
 
 
@@ -307,11 +308,13 @@ def test_what_not_all_have_when_its_publisher_dies_nobody_gets(
 _RELAY = """
 import sys
 from aerodaas.actors.streams import Publisher, Subscriber
+from aerodaas.runtime.node import Outlet
 frames, tasks = Subscriber(sys.argv[1], {"frames": 1}), Publisher(sys.argv[1], "tasks")
+outlet = Outlet("tasks")
 print(flush=True)
 while True:
     for message in frames.receive(5.0):
-        tasks.derive(message.item, message, 0, message.stamp)
+        tasks.publish(outlet.derive(message.item, message, 0, message.stamp))
 """
 
 
@@ -421,7 +424,7 @@ from aerodaas.types.data import Header
 publisher, old = Publisher(sys.argv[1], "s"), Subscriber(sys.argv[1], {"s": 1})
 new = Subscriber(sys.argv[1], {"s": 1})
 def publish(number):
-    publisher.measure(number, Header(number, number, "camera"), 0)
+    send(publisher, number, Header(number, number, "camera"), 0)
     return [[m.item for m in one.receive(0.0)] for one in (old, new)]
 link = next(iter(os.scandir("/proc/self/fd")))
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ray
+from publishing import send
 from required import needs
 from stream_reader import Reader, Seen, digest
 
@@ -64,7 +65,7 @@ class Link:
 
     def publish(self, stamp: int, item: object) -> Message[Any]:
         """Publish a measurement."""
-        return self.publisher.measure(item, Header(stamp, stamp, "camera"), 7 * stamp)
+        return send(self.publisher, item, Header(stamp, stamp, "camera"), 7 * stamp)
 
     def settle(self) -> None:
         """Wait until whatever was sent has arrived."""
@@ -204,7 +205,7 @@ def test_many_readers_see_the_same() -> None:
     publisher = Publisher(scope, "s")
     readers = [Subscriber(scope, {"s": 8}) for i in range(12)]
     for stamp in range(5):
-        publisher.measure(stamp, Header(stamp, stamp, "c"), 0)
+        send(publisher, stamp, Header(stamp, stamp, "c"), 0)
     for subscriber in readers:
         assert [message.item for message in subscriber.receive(0)] == list(range(5))
         subscriber.close()
@@ -218,7 +219,7 @@ def test_one_subscriber_keeps_the_order_in_which_its_streams_were_named() -> Non
     subscriber = Subscriber(scope, {"a": 4, "b": 4})
     for stamp in range(3):
         for name, publisher in publishers.items():
-            publisher.measure(f"{name}{stamp}", Header(stamp, stamp, name), 0)
+            send(publisher, f"{name}{stamp}", Header(stamp, stamp, name), 0)
     assert [message.item for message in subscriber.receive(0)] == [
         "a0",
         "a1",
@@ -235,7 +236,7 @@ def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
     """`receive` sleeps, and returns as soon as there is a reason to."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
     publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 1})
-    publisher.measure("x", Header(0, 0, "c"), 0)
+    send(publisher, "x", Header(0, 0, "c"), 0)
     assert [message.item for message in subscriber.receive(60.0)] == ["x"]
     subscriber.wake()
     assert subscriber.receive(60.0) == []
@@ -267,7 +268,7 @@ def test_a_reader_that_is_killed_harms_nobody() -> None:
     def publish(times: int) -> None:
         nonlocal stamp
         for _ in range(times):
-            publisher.measure(Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
+            send(publisher, Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
             stamp += 1
             assert [message.seq for message in subscriber.receive(0)] == [stamp - 1]
 
@@ -293,7 +294,7 @@ from aerodaas.types.data import Header
 publisher = Publisher(sys.argv[1], "s")
 sys.stdin.readline()
 for stamp in range(5):
-    publisher.measure(stamp, Header(stamp, stamp, "c"), 0)
+    send(publisher, stamp, Header(stamp, stamp, "c"), 0)
 print("sent", flush=True)
 time.sleep(600)
 """
@@ -346,10 +347,10 @@ def test_who_asks_is_given_the_newest_once() -> None:
     def numbers(first: int) -> list[int]:
         return [decode_message(memoryview(data)).seq for data in publisher.since(first)]
 
-    publisher.measure(0, Header(0, 0, "camera"), 0)
+    send(publisher, 0, Header(0, 0, "camera"), 0)
     assert numbers(0) == []
     for stamp in range(1, 8):
-        publisher.measure(stamp, Header(stamp, stamp, "camera"), stamp)
+        send(publisher, stamp, Header(stamp, stamp, "camera"), stamp)
     assert numbers(0) == [4, 5, 6, 7]
     assert numbers(7) == [7]
     assert numbers(8) == []

@@ -1,13 +1,10 @@
-"""Lockstep with executions that take mission time, on the edge and in a simulated cloud."""
+"""Simulated time with executions that take mission time, on the edge and in a simulated cloud."""
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Callable
-from pathlib import Path
+from dataclasses import replace
 from typing import Any, ClassVar
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -17,30 +14,32 @@ from flying import Flyer, hop, recorded, robot
 from aerodaas import (
     AeroNavigation,
     Environment,
-    Frame,
     NavigableAnalytics,
     NavigationType,
     VelocityCommand,
 )
-from aerodaas.actors.dispatch.dispatcher import Managed
-from aerodaas.actors.lockstep.timed_dispatcher import TimedDispatcherActor
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.runtime.dispatch.dispatcher import Managed
 from aerodaas.runtime.dispatch.executions import Executions
+from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
+from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import done_stream, task_stream
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
+    AnalyticsScheduler,
     Profile,
     Resources,
+    SendToCloud,
     Task,
     TaskOutcome,
     TaskPlace,
 )
-from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.sample import SamplePath
@@ -48,7 +47,7 @@ from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Header, Readings
 from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.status import Message
+from aerodaas.types.status import Decision, Message
 
 _CAMERA = {"driver": "simulated", "rate": 4, "settings": {"width": 64, "height": 36}}
 
@@ -69,23 +68,6 @@ def _content(**simulation: Any) -> dict[str, Any]:  # noqa: ANN401
         "recording": {"images": "none"},
         "simulation": {"world": "empty", "execution_times": "nominal", **simulation},
     }  # fmt: skip
-
-
-class Mortal(FrameNumbers):
-    """Ends its process at one frame, once."""
-
-    name = "one"
-    isolated = True
-
-    def __init__(self, mark: Path) -> None:
-        self._mark = mark
-
-    def process(self, item: Frame, context: Context) -> Readings:
-        """Die at frame 12."""
-        if item.header.id == 12 and not self._mark.exists():
-            self._mark.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
-        return super().process(item, context)
 
 
 class One(FrameNumbers):
@@ -240,30 +222,6 @@ def test_a_drone_flies_by_results_as_old_as_they_would_be(flyer: Flyer) -> None:
     assert np.ptp(first.robots["drone"].position[:, 1]) > 0.3
 
 
-@pytest.mark.slow
-@pytest.mark.wall_clock
-def test_an_executor_that_dies_is_waited_for(flyer: Flyer) -> None:
-    """Mission time waits for it, and its work is done again: no task is lost."""
-
-    def watch(env: Environment) -> None:
-        env.set_analytics_scheduler("ec_edf")
-        drone = env.get_robot_by_id("drone")
-        model = Mortal(flyer.folder / "died")
-        model.deploy(env.get_compute_resource_by_id("edge"))
-        model.analyse(drone.get_sensor_by_id("camera0").get_data_stream())
-        drone.navigate(hop((2, 0), hover=8.0))
-
-    content = _content()
-    del content["schedulers"]["tasks"]["two"]
-    run = flyer.fly(watch, content, seed=5)
-    assert (flyer.folder / "died").exists()
-    actions = {one["action"] for one in _decisions(run) if _ends(one)}
-    assert actions == {"done"}
-    assert recorded(run).robots["drone"].outcome.startswith("landed")
-    numbers = [int(one["values"]["number"]) for one in _decisions(run) if _ends(one)]
-    assert len(numbers) == len(set(numbers))
-
-
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
@@ -300,23 +258,38 @@ def test_a_cloud_that_takes_too_long_or_cannot_do_it_gives_no_result(
     environment = EnvironmentConfig.model_validate(
         {"robots": [robot()], "simulation": {"execution_times": "nominal"}}
     )
-    actor = TimedDispatcherActor(
+    dispatcher = SimulatedDispatcher(
         Session(environment, None),
-        Dems(),
+        _Cloud(),
         (Managed("model", ("camera",), profile, offloadable=offloadable),),
         Resources(2, 4000 * MILLISECOND),
     )
-    sent: list[Task] = []
-    told: list[tuple[Any, ...]] = []
-    task = Task(1, profile, 1000 * MILLISECOND, 9999 * MILLISECOND)
-    with (
-        patch.object(actor, "_send_task", lambda task, _: sent.append(task)),
-        patch.object(actor, "_guarded", lambda *words: told.append(words)),
-    ):
-        actor._frames[1] = Message("camera", 0, 0, Header(0, 0, "camera"), 0, (), None)
-        actor.run_cloud(task, 1000 * MILLISECOND)
-        (event,) = actor._events
-        assert event.at == ends_ms * MILLISECOND
-        actor._happen(event, event.at)
-    assert sent == ([task] if failure is None else [])
-    assert told == [("finished", task, event.at, *([failure] if failure else []))]
+    executor = InlineExecutor()
+    executor.add("dispatcher", [dispatcher])
+    executor.open([dispatcher])
+    executor.start([dispatcher])
+    start = 1000 * MILLISECOND
+    frame = Message("camera", 0, start, Header(0, start, "camera"), 0, (), "picture")
+    executor.clock.advance_to(start)
+    tasks = dispatcher.step(start, [frame])
+    sent = [message for message in tasks if message.stream == task_stream("model")]
+    assert len(sent) == (failure is None)
+    for message in sent:
+        answer = replace(message, stream=done_stream("model"), item="found")
+        assert not dispatcher.step(start, [answer])
+    assert dispatcher.due == ends_ms * MILLISECOND
+    executor.clock.advance_to(dispatcher.due)
+    published = dispatcher.step(dispatcher.due, [])
+    results = [message.item for message in published if message.stream == "model"]
+    outcomes = [one.item.action for one in published if isinstance(one.item, Decision)]
+    assert results == (["found"] if failure is None else [])
+    assert outcomes[-1] == (TaskOutcome.DONE if failure is None else failure).value
+    dispatcher.close()
+
+
+class _Cloud(AnalyticsScheduler):
+    """Sends every task to the cloud."""
+
+    def task_arrived(self, task: Task, now: int) -> list[SendToCloud]:  # noqa: ARG002
+        """Send it."""
+        return [SendToCloud(task, "always")]

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas import AeroListData, Environment, Waypoint
-from aerodaas.actors.run.plan import FlightPlan, make_plan
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.config.model import validated
 from aerodaas.config.overrides import overridden
 from aerodaas.mission.commands import AddNavigation
+from aerodaas.runtime.plan import FlightPlan, make_plan
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.types.errors import AmbiguousIdError, ConfigError, GraphError, UnknownIdError

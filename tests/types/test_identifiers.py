@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from aerodaas import AeroNavigation, Analytics, Environment, Waypoint
-from aerodaas.actors import stream_names as _names
-from aerodaas.actors.run.plan import make_plan
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.guests.document import GuestDocument
 from aerodaas.config.model import validated
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.protocol.schemas import AccountIn, GrantIn, MissionIn
 from aerodaas.recording.encoding import stream_of, topic
+from aerodaas.runtime import stream_names as _names
+from aerodaas.runtime.plan import make_plan
 from aerodaas.runtime.session import Session
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.identifiers import (

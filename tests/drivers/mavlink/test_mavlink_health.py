@@ -203,6 +203,15 @@ def test_a_gps_is_silent_after_four_seconds_of_others(gaps: int, *, silent: bool
     assert health.faults(15.0) == []
 
 
+def test_a_gap_in_what_is_heard_counts_as_one_second() -> None:
+    """Three gaps of ten seconds are three, the fourth four, the fifth more."""
+    health = Health()
+    health.take(gps(3), 0.0)
+    for gap in range(1, 6):
+        health.take(shaking(), 10.0 * gap)
+        assert bool(health.faults(10.0 * gap)) is (gap == 5)
+
+
 def test_a_fix_that_is_lost() -> None:
     """By what is left of it, if there ever was one; the attitude is a complaint of its own."""
     assert lasting(gps(3), gps(2)) == ["GPS: a fix in the plane only"]
@@ -292,6 +301,16 @@ def test_sensors_that_are_ill_are_all_named() -> None:
 CHECK, GPS = mavlink.MAV_SYS_STATUS_PREARM_CHECK, mavlink.MAV_SYS_STATUS_SENSOR_GPS
 GYRO = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
 SEQUENCE = itertools.count()
+
+
+def test_what_grows_slowly_is_told_in_steps() -> None:
+    """A text that changed with every metre would be told with every metre."""
+    health = Health()
+    told = set()
+    for tenth in range(1200):
+        health.take(estimator(along=tenth / 10), tenth / 10)
+        told |= set(health.faults(tenth / 10))
+    assert len(told) == 5
 
 
 def test_an_estimator_that_is_lost_leaves_no_position() -> None:
@@ -427,6 +446,77 @@ def test_what_px4_acts_for_is_told_before_what_a_mode_lacks() -> None:
     assert px4.protection_reasons(telemetry, 101.0, 12.0)[1] == "battery: critical"
     report(telemetry.events, "check_modes_offboard_signal")
     assert not px4.protection_reasons(telemetry, 200.0, 12.0)
+
+
+NAN = float("nan")
+UNKNOWN = 65535
+
+
+def cells_of(cells: list[int], *more: int, number: int = 0) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """Cells in millivolts, ten and four."""
+    filled = [*cells, *[UNKNOWN] * (10 - len(cells))]
+    return mavlink.MAVLink_battery_status_message(
+        number, 0, 0, 2000, filled, 0, 0, 0, 50, 0, 1, [*more, *[0] * (4 - len(more))]
+    )
+
+
+def after(*messages: Any) -> Health:  # noqa: ANN401
+    """Health after these messages."""
+    health = Health()
+    for message in messages:
+        health.take(message, 100.0)
+    return health
+
+
+@pytest.mark.parametrize(
+    ("message", "cells"),
+    [
+        (cells_of([4100, 4090, 4110]), (4.1, 4.09, 4.11)),
+        (cells_of([3700] * 10, 3600, 3650), (3.7,) * 10 + (3.6, 3.65)),
+        (cells_of([4200]), (4.2,)),
+        (cells_of([12600]), None),
+        (cells_of([]), None),
+    ],
+)
+def test_cells(message: Any, cells: tuple[float, ...] | None) -> None:  # noqa: ANN401
+    """A battery's whole voltage, which stands in the first one's place, is no cell."""
+    assert after(message).cells == cells
+    assert after(message, cells_of([4000, 3000], number=1)).cells == cells
+
+
+def test_cycles() -> None:
+    """Of the first battery, where it counts them."""
+    message = mavlink.MAVLink_smart_battery_info_message
+
+    def info(cycles: int, number: int = 0) -> Any:  # noqa: ANN401
+        return message(number, 0, 0, 5000, 4800, cycles, b"", b"", 0, 0, 0, 0)
+
+    assert after(info(120)).cycles == 120
+    assert after(info(120), info(7, number=1)).cycles == 120
+    assert after(info(UNKNOWN)).cycles is None
+
+
+def test_misfits() -> None:
+    """The compass' own, and the largest of all others; what is no number does not count."""
+    px4 = mavlink.MAVLink_estimator_status_message
+    health = after(px4(0, 0x3F, 0.2, NAN, 0.4, 0.3, NAN, NAN, 0.5, 0.4))
+    assert (health.compass, health.estimator) == pytest.approx((0.3, 0.4))
+    ekf = mavlink.MAVLink_ekf_status_report_message(0x3F, 0.1, 0.7, 0.2, 0.5, 0.0)
+    health = after(ekf)
+    assert (health.compass, health.estimator) == pytest.approx((0.5, 0.7))
+    health = after(px4(0, 0x3F, NAN, NAN, NAN, NAN, NAN, NAN, 0.5, 0.4))
+    assert (health.compass, health.estimator) == (None, None)
+
+
+def test_vibration_and_fix() -> None:
+    """The axis that shakes most; a fix in the plane is none in space."""
+    assert after(mavlink.MAVLink_vibration_message(0, 1.0, 3.0, 2.0, 0, 0, 0)).vibration == 3.0
+    for kind, fixed in ((3, True), (6, True), (2, False), (0, False)):
+        gps = mavlink.MAVLink_gps_raw_int_message(0, kind, 1, 1, 0, 80, 80, 0, 0, 9)
+        assert after(gps).gps_fix is fixed
+        assert after(gps).gps_rtk == ("RTK fixed" if kind == 6 else "")
+    nothing = after()
+    assert (nothing.vibration, nothing.gps_fix, nothing.cells) == (None, None, None)
 
 
 @pytest.mark.parametrize("family", ["px4", "ardupilot"])

@@ -7,8 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from autopilot import HERE
-from bench import Bench
+from autopilot import HERE, Bench
 from emulated import FAMILIES, Stepped
 
 from aerodaas.config.remote_id import RemoteIdConfig

@@ -22,10 +22,16 @@ EVERYTHING = bytes(range(256))
 """Each byte once: what a terminal would take for a line's end, an interrupt or a pause as well."""
 
 
+class Clock:
+    """A clock that the test moves."""
+
+    now = 50.0
+
+
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """The transports' clock."""
-    moved = SimpleNamespace(now=50.0)
+    moved = Clock()
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moved.now))
     return moved
 
@@ -94,7 +100,7 @@ def test_a_peer_that_was_away_is_heard_again() -> None:
     sender.close()
 
 
-def test_a_tcp_line_is_tried_again_each_second(clock: SimpleNamespace) -> None:
+def test_a_tcp_line_is_tried_again_each_second(clock: Clock) -> None:
     """While it is cut nothing is sent, nothing raises, and the server is left alone meanwhile."""
     with socket.create_server((HOST, 0)) as server:
         server.settimeout(5.0)
@@ -191,9 +197,7 @@ def test_a_full_tcp_line_gets_whole_packets() -> None:
         client.close()
 
 
-def test_a_serial_device_that_is_pulled_out_is_opened_again(
-    clock: SimpleNamespace, tmp_path: Path
-) -> None:
+def test_a_serial_device_that_is_pulled_out_is_opened_again(clock: Clock, tmp_path: Path) -> None:
     """A second after the cut and each second from then on; colons in its name are its own."""
     device = tmp_path / "pci-0000:00:14.0-usb-0:1.2"
     master, slave = os.openpty()

@@ -5,20 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.actors.dispatch.dispatcher import Managed
-from aerodaas.actors.dispatch.offload import (
-    CloudProcess,
-    allowed,
-    cloud_processes,
-    priced,
-    short_name,
-)
-from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
-from aerodaas.actors.lockstep.barrier import paths, widest
-from aerodaas.actors.lockstep.schedule import LockstepSchedule
-from aerodaas.actors.run.hosting import by_actor
-from aerodaas.actors.triggers import TriggerSpec
-from aerodaas.actors.worker import NodeSpec, Wake
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
@@ -33,15 +19,24 @@ from aerodaas.config.model import (
 from aerodaas.dataflow.graph import Graph, NavigationEdge, Node
 from aerodaas.dataflow.handles import SENSOR_ITEMS
 from aerodaas.mission.commands import TRIGGERED, initial_commands
+from aerodaas.runtime.analysis import AnalysisSpec, Wake
+from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.checks import check_graph, check_places, check_plugins, check_tasks
+from aerodaas.runtime.controller import RobotSpec, VehicleController
+from aerodaas.runtime.dispatch.dispatcher import Managed
 from aerodaas.runtime.dispatch.executions import Executions
+from aerodaas.runtime.dispatch.offload import (
+    CloudProcess,
+    allowed,
+    cloud_processes,
+    priced,
+    short_name,
+)
+from aerodaas.runtime.hosting import by_actor
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.runtime.stream_names import (
-    ACKS,
-    ADVANCE,
     DECISIONS,
-    PROGRESS,
     alert_stream,
     done_stream,
     end_stream,
@@ -50,6 +45,7 @@ from aerodaas.runtime.stream_names import (
     task_stream,
     trigger_stream,
 )
+from aerodaas.runtime.triggers import TriggerSpec
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
@@ -59,19 +55,20 @@ from aerodaas.types.identifiers import told
 
 __all__ = ["AnalyticsActorPlan", "Cameras", "DispatchPlan", "FlightPlan", "make_plan"]
 
-_CAMERA_WINDOW = 4
-_STATE_WINDOW = 16
-
 
 @dataclass(frozen=True)
 class Cameras:
-    """Plan of one camera's actor."""
+    """Plan of one camera."""
 
     stream: str
     sensor: SensorConfig
     state: str
     ends: bool
     place: Placement
+
+    def make(self, session: Session) -> CameraNode:
+        """Make the node."""
+        return CameraNode(session, self.stream, self.sensor, self.state, ends=self.ends)
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ class AnalyticsActorPlan:
 
     name: str
     place: Placement
-    nodes: tuple[NodeSpec, ...]
+    nodes: tuple[AnalysisSpec, ...]
     runtime_env: RuntimeEnvConfig | None = None
 
 
@@ -106,8 +103,8 @@ class FlightPlan:
     cameras: tuple[Cameras, ...]
     analyses: tuple[AnalyticsActorPlan, ...]
     dispatch: DispatchPlan | None
-    conduct: LockstepSchedule | None
-    """None in real time."""
+    observed: dict[str, float] | None
+    """Rates in Hz of what measures a simulated vehicle, by source; None in real time."""
     recorded: dict[str, int]
     """Streams for the recorder and their queue depths; empty without a recorder."""
 
@@ -139,10 +136,6 @@ class _Planner:
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
         self._add_sensors()
-        self.simulated = frozenset[str]()
-        """Analyses whose executions take mission time in lockstep."""
-        if session.simulates_executions:
-            self.simulated = frozenset(node.id for node in self.managed())
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
     def _add_sensors(self) -> None:
@@ -185,16 +178,6 @@ class _Planner:
             self.reaches_a_drone(one, asked | {stream}) for one in further - asked
         )
 
-    def acknowledgements(self, stream: str) -> int:
-        recorded, later = self.recorded, self.simulated
-        return paths(self.graph, stream, self.steering, recorded=recorded, later=later)
-
-    def is_waited_for(self, node: Node) -> bool:
-        """Whether mission time waits for the analysis itself, for want of a reader."""
-        if node.id in self.simulated:
-            return False  # it answers when its execution is over
-        return self.session.lockstep and not self.acknowledgements(node.id)
-
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
             Cameras(
@@ -222,9 +205,9 @@ class _Planner:
         if self.dispatch_with is None or not nodes:
             return None
         Executions.of(self.session.environment.simulation)  # so that a wrong one is told here
-        # In lockstep the cloud has no processes: it is simulated, or of no benefit, because time
-        # is held while an analysis runs.
-        compute = {} if self.session.lockstep else self.compute
+        # In simulated time the cloud has no processes: it is simulated, or of no benefit, because
+        # time is held while an analysis runs.
+        compute = {} if self.session.simulated else self.compute
         envs = {node.id: self.runtime_env_of(node) for node in nodes}
         return DispatchPlan(
             scheduler=self.dispatch_with,
@@ -235,7 +218,7 @@ class _Planner:
 
     def cloud_slots(self, nodes: list[Node]) -> int:
         """Executions that the cloud has room for at once."""
-        if self.session.lockstep and not self.session.simulates_executions:
+        if self.session.simulated and not self.session.simulates_executions:
             return 0
         sites = {one.id: one for node in nodes for one in allowed(node, self.compute)}
         return sum(one.executors for one in sites.values())
@@ -250,7 +233,6 @@ class _Planner:
             stream=node.id,
             inputs=tuple(node.inputs),
             profile=priced(profile, sites),
-            acknowledges=self.is_waited_for(node),
             open_times=frozenset(time for time in times if getattr(own, time) is None),
             triggers=self.triggers_of(node),
             offloadable=bool(sites),
@@ -267,14 +249,14 @@ class _Planner:
             for trigger in node.triggers
         )
 
-    def node_spec(self, node: Node) -> NodeSpec:
+    def analysis_spec(self, node: Node) -> AnalysisSpec:
         managed = self.is_managed(node)
         wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
-        return NodeSpec(
+        return AnalysisSpec(
             stream=done_stream(node.id) if managed else node.id,
             work=self.work_of(node),
             inputs={
-                name: self.depth(name) if self.session.lockstep else 1
+                name: self.depth(name) if self.session.simulated else 1
                 for name in ([task_stream(node.id)] if managed else node.inputs)
             },
             robot=self.robot_of(node),
@@ -284,8 +266,7 @@ class _Planner:
             # The dispatcher publishes the results of managed analyses, from edge and cloud.
             triggers=() if managed else self.triggers_of(node),
             kind=self.place_of(node).kind,
-            acknowledges=self.is_waited_for(node) and not managed,
-            answers_always=managed or self.session.lockstep,
+            answers_always=managed,
             wakes=tuple(trigger_stream(node.id, waker.id) for waker in wakers),
             frames=tuple(node.inputs) if managed else (),
         )
@@ -322,7 +303,7 @@ class _Planner:
         return told(node.id, self.session.environment.runtime_env) or node.runtime_env
 
     def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
-        shared: dict[Placement, list[NodeSpec]] = {}
+        shared: dict[Placement, list[AnalysisSpec]] = {}
         guests: dict[str, list[Node]] = {}
         actors = []
         for node in self.analyses():
@@ -331,13 +312,13 @@ class _Planner:
                 guests.setdefault(node.work.guest, []).append(node)
             elif node.work.isolated or env is not None:
                 name = f"analytics/{node.id}"
-                spec = self.node_spec(node)
+                spec = self.analysis_spec(node)
                 actors.append(AnalyticsActorPlan(name, self.place_of(node), (spec,), env))
             else:
-                shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
+                shared.setdefault(self.place_of(node), []).append(self.analysis_spec(node))
         for guest, mine in guests.items():
             # Never beside the owner's or another guest's: one's end is that of its actor.
-            specs = tuple(self.node_spec(node) for node in mine)
+            specs = tuple(self.analysis_spec(node) for node in mine)
             actors.append(AnalyticsActorPlan(guest_actor(guest), self.edge_of(None), specs))
         for place, nodes in shared.items():
             name = f"analytics/{place.node or place.kind}"
@@ -367,59 +348,11 @@ class _Planner:
             scheduler=self.scheduler,
         )
 
-    def _room(self, source: str) -> int:
-        """Most measurements, beyond the newest, whose results fit into the readers' queues."""
-        return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
-
-    def is_awaited(self, source: str) -> bool:
-        """Whether time stands still until all that a measurement of `source` leads to is done.
-
-        A dispatcher with simulated executions has to have all frames of a moment.
-        """
-        return self.reaches_a_drone(source) or self.reaches_simulated(source)
-
-    def reaches_simulated(self, stream: str) -> bool:
-        """Whether an analysis whose executions are simulated is downstream."""
-        return any(
-            node.id in self.simulated or self.reaches_simulated(node.id)
-            for node in self.graph.downstream(stream)
-        )
-
-    def conduct(
-        self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]
-    ) -> LockstepSchedule:
+    def observed(self, cameras: tuple[Cameras, ...]) -> dict[str, float]:
+        """Rates of what measures a simulated vehicle: cameras and external sources."""
         rates = {camera.stream: camera.sensor.rate for camera in cameras}
-        for node in self.analyses():
-            if node.kind == "external":
-                rates[node.id] = node.work.rate
-        own = [
-            stream
-            for spec in specs
-            for stream in (
-                state_stream(spec.robot.id),
-                *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
-            )
-        ]
-        windows = {
-            source: 0 if self.is_awaited(source) else min(size, self._room(source))
-            for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
-            for source in sources
-        }
-        readers = [
-            f"{ACKS}/{node.id}" for node in self.analyses() if not self.acknowledgements(node.id)
-        ]
-        if self.recorded:
-            readers.append(f"{ACKS}/recorder")
-        if self.simulated:
-            windows[ADVANCE] = 0
-            readers.append(PROGRESS)
-        return LockstepSchedule(
-            rates=rates,
-            acknowledgements={source: self.acknowledgements(source) for source in windows},
-            windows=windows,
-            readers=tuple(readers),
-            answers={stream: self.acknowledgements(stream) for stream in self.simulated},
-        )
+        external = [node for node in self.analyses() if node.kind == "external"]
+        return {**rates, **{node.id: node.work.rate for node in external}}
 
 
 def make_plan(
@@ -469,7 +402,7 @@ def make_plan(
         cameras=cameras,
         analyses=analyses,
         dispatch=dispatch,
-        conduct=planner.conduct(specs, cameras) if session.lockstep else None,
+        observed=planner.observed(cameras) if session.simulated else None,
         recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
-from aerodaas.actors.drone.vehicle_controller import RobotSpec
 from aerodaas.drivers.loading import link_of
+from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import Session
 from aerodaas.types.errors import ConfigError
@@ -26,7 +26,7 @@ def by_actor(
 ) -> tuple[tuple[RobotSpec, ...], ...]:
     """Distribute robots, each with its place in `edges`, over drone actors.
 
-    In lockstep one actor flies all of them. In real time each robot has an actor, and thus a
+    In simulated time one node flies all of them. In real time each robot has an actor, and thus a
     process, of its own, with two exceptions: robots on one link share the process that opens it,
     and the simulated ones of a large flight share actors, for the processes of fifty of them, and
     what these tell each other, would keep a machine busy by themselves. Raises ConfigError for a

@@ -6,23 +6,23 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from aerodaas.actors.streams import Publisher
+from aerodaas.runtime.node import Outlet
 from aerodaas.runtime.stream_names import DECISIONS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Result, Task, TaskOutcome
 from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
-from aerodaas.types.status import Decision
+from aerodaas.types.status import Decision, Message
 
 __all__ = ["Counts", "DecisionLog"]
 
 
 class DecisionLog:
-    """Publisher of each task's decisions and outcome."""
+    """Decisions and outcomes of each task, as messages."""
 
-    def __init__(self, publisher: Publisher, many: set[str]) -> None:
-        """Publish on `publisher`; `many` are the analyses of several cameras."""
-        self._publisher = publisher
+    def __init__(self, outlet: Outlet, many: set[str]) -> None:
+        """Number the messages by `outlet`; `many` are the analyses of several cameras."""
+        self._outlet = outlet
         self._many = many
 
     def label(self, task: Task) -> str:
@@ -31,15 +31,23 @@ class DecisionLog:
         source = f"{task.source}:" if model in self._many else ""
         return f"{model}#{source}{task.segment}"
 
-    def note(
+    def message(
         self,
         task: Task,
         action: str,
         reason: str,
         now: int,
         totals: Mapping[str, float] | None = None,
-    ) -> None:
-        """Publish one decision or outcome; `totals` are further figures."""
+    ) -> Message[Decision]:
+        """Make the message of one decision or outcome.
+
+        Args:
+            task: The task.
+            action: Decision or outcome, as in `Decision`.
+            reason: Why, in a few words.
+            now: Mission time, nanoseconds.
+            totals: Further figures by name.
+        """
         slack = task.deadline + task.reserve - now
         waited = (now - task.arrival) / 1e6
         # The tasks of a frame arrive at the same time; their numbers give the order.
@@ -50,9 +58,9 @@ class DecisionLog:
         if task.reserve:
             values["reserve_ms"] = task.reserve / 1e6
         values |= totals or {}
-        header = Header(self._publisher.sent, now, DECISIONS)
+        header = Header(self._outlet.sent, now, DECISIONS)
         record = Decision(now, self.label(task), action, reason, values)
-        self._publisher.measure(record, header, host_time_ns())
+        return self._outlet.measure(record, header, host_time_ns())
 
 
 class Counts:

@@ -1,12 +1,12 @@
-"""Additions to the running actors for a graph that has grown in flight."""
+"""Additions to a running flight for a graph that has grown in flight."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from aerodaas.actors.drone.vehicle_controller import RobotSpec
-from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, FlightPlan
-from aerodaas.actors.worker import NodeSpec
+from aerodaas.runtime.analysis import AnalysisSpec
+from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, FlightPlan
 from aerodaas.types.errors import GraphError
 
 __all__ = ["Growth", "growth"]
@@ -22,11 +22,8 @@ class Growth:
     """Running cameras whose last image now ends, or no longer ends, the mission, by stream."""
     analyses: tuple[AnalyticsActorPlan, ...]
     """Analytics actors to be started."""
-    joining: dict[str, tuple[NodeSpec, ...]]
+    joining: dict[str, tuple[AnalysisSpec, ...]]
     """Analyses that join a running actor, by its name."""
-    acknowledging: dict[str, dict[str, bool]]
-    """Running analyses that start or stop to acknowledge, because they are, or are no longer, the
-    last of their path: by actor and stream."""
     drones: tuple[tuple[RobotSpec, ...], ...]
     """All robots of the new plan, by actor."""
     recorded: dict[str, int]
@@ -40,21 +37,13 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
     flight.
     """
     _require_same_tasks(old, new)
-    running = {node.stream: node for actor in old.analyses for node in actor.nodes}
+    running = {node.stream for actor in old.analyses for node in actor.nodes}
     known = {actor.name for actor in old.analyses}
     ended = {camera.stream: camera.ends for camera in old.cameras}
     fresh = [
         (actor, tuple(node for node in actor.nodes if node.stream not in running))
         for actor in new.analyses
     ]
-    acknowledging = {
-        actor.name: {
-            node.stream: node.acknowledges
-            for node in actor.nodes
-            if node.stream in running and running[node.stream].acknowledges != node.acknowledges
-        }
-        for actor in new.analyses
-    }
     return Growth(
         cameras=tuple(one for one in new.cameras if one.stream not in ended),
         ending={
@@ -68,7 +57,6 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
             if nodes and actor.name not in known
         ),
         joining={actor.name: nodes for actor, nodes in fresh if nodes and actor.name in known},
-        acknowledging={name: streams for name, streams in acknowledging.items() if streams},
         drones=new.drones,
         recorded={
             stream: depth for stream, depth in new.recorded.items() if stream not in old.recorded

@@ -1,4 +1,4 @@
-"""Diagnosis of pickling errors: the part of an object that cannot be pickled."""
+"""What is sent to other processes by value: checks that an object can be, and says why not."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from ray import cloudpickle
+import cloudpickle
 
-__all__ = ["culprit"]
+from aerodaas.dataflow.graph import Graph
+from aerodaas.types.errors import GraphError
+
+__all__ = ["culprit", "require_sendable"]
 
 _DEEPEST = 6
 _MOST = 1000
@@ -29,6 +32,35 @@ def culprit(item: object, error: Exception) -> str:
     return f"{_called(item)} cannot be sent: {place}{' '.join(str(reason).split())}"
 
 
+def require_sendable(graph: Graph, *plugins: object) -> None:
+    """Refuse a graph with an object that must be sent but cannot be pickled.
+
+    Args:
+        graph: The application's graph.
+        plugins: Objects outside the graph that are sent, too, such as schedulers.
+
+    Raises:
+        GraphError: With the object's name and the part that cannot be pickled.
+    """
+    for node in graph.nodes.values():
+        for trigger in node.triggers:
+            _require(trigger.when, f"the condition of {node.id}'s trigger")
+        if node.kind != "sensor":
+            _require(node.work, f"{type(node.work).__name__} ({node.id})")
+    for plugin in plugins:
+        _require(plugin, type(plugin).__name__)
+
+
+def _require(item: object, name: str) -> None:
+    try:
+        cloudpickle.dumps(item, protocol=5)
+    except Exception as error:
+        raise GraphError(
+            f"{name} runs in a process of its own: {culprit(item, error)}; "
+            "make in open() what cannot travel"
+        ) from error
+
+
 def _search(item: object, error: Exception, depth: int) -> tuple[str, Exception]:
     """Path to the innermost part that fails, and its error."""
     if depth < _DEEPEST:
@@ -42,7 +74,7 @@ def _search(item: object, error: Exception, depth: int) -> tuple[str, Exception]
 
 def _failure(part: object) -> Exception | None:
     try:
-        cloudpickle.dumps(part)  # pyright: ignore[reportPrivateImportUsage]
+        cloudpickle.dumps(part)
     except Exception as error:  # noqa: BLE001 - a user's class may raise anything
         return error
     return None

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from aerodaas.actors.drone.background_publisher import BackgroundPublisher
-from aerodaas.actors.drone.planner import PlannerExecutor
-from aerodaas.actors.streams import Publisher
 from aerodaas.config.model import RobotConfig, SensorConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.mission.commands import (
@@ -25,12 +22,13 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
+from aerodaas.mission.planner import BackgroundPlanner, Planner
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.runtime.node import NEVER, Outlet
 from aerodaas.runtime.reports import Latencies
-from aerodaas.runtime.session import NEVER, Session
+from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import (
     photo_stream,
     reply_stream,
@@ -41,7 +39,7 @@ from aerodaas.runtime.stream_names import (
 )
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.terrain.ground import agreed_sea_level
-from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
+from aerodaas.types.clock import Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.geometry import GeodeticOrigin
@@ -54,14 +52,10 @@ from aerodaas.types.vehicle import (
     VehicleState,
 )
 
-__all__ = ["RobotSpec", "VehicleController", "sensor_item"]
+__all__ = ["MakePlanner", "RobotSpec", "VehicleController", "sensor_item"]
 
-_PLANS_PATIENCE = 4.0
-"""Multiple of the plan's timeout after which a scheduler without an answer is stopped."""
 _TURNS_FAILED = 20
 """Failed loop cycles in a row (one second) after which the loop gives up the vehicle."""
-_LEAST_PATIENCE = 5.0
-"""Least timeout in wall seconds: enough for an actor's restart at any mission speed."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -93,12 +87,29 @@ class RobotSpec:
     scheduler: TrajectoryScheduler
 
 
-class VehicleController:
-    """Controller of one robot, called by the drone's actor."""
+MakePlanner: TypeAlias = Callable[["RobotSpec", TrajectoryScheduler], Planner]
 
-    def __init__(self, spec: RobotSpec, session: Session, background: BackgroundPublisher) -> None:
-        """Create the vehicle; `open` connects it and creates the mission."""
-        self._background = background
+
+class VehicleController:
+    """Controller of one robot, called by its node."""
+
+    def __init__(
+        self,
+        spec: RobotSpec,
+        session: Session,
+        publish: Callable[[Message[Any]], None],
+        make_planner: MakePlanner,
+    ) -> None:
+        """Create the vehicle; `open` connects it and creates the mission.
+
+        Args:
+            spec: The robot.
+            session: The run.
+            publish: Called with each message to publish.
+            make_planner: Makes the planner of a trajectory scheduler.
+        """
+        self._send = publish
+        self._make_planner = make_planner
         self.spec = spec
         self.id = spec.robot.id
         self.latencies = Latencies()
@@ -108,6 +119,7 @@ class VehicleController:
         self._photographed = 0
         """How many of the mission's pictures have been published."""
         self._turned = -1
+        self._outlets: Mapping[str, Outlet] = {}
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
         self._failures = 0
@@ -125,9 +137,9 @@ class VehicleController:
         """Disconnect it; in any thread."""
         self.vehicle.close()
 
-    def open(self, publishers: dict[str, Publisher]) -> None:
-        """Create the mission of the connected vehicle; `publishers` are by stream."""
-        self._publishers = publishers
+    def open(self, outlets: Mapping[str, Outlet]) -> None:
+        """Create the mission of the connected vehicle; `outlets` are by stream."""
+        self._outlets = outlets
         # Once: to ask a protocol about an instance looks up all its members each time.
         self._stepped = self.vehicle if isinstance(self.vehicle, SteppedVehicle) else None
         self._played = self.vehicle if isinstance(self.vehicle, PlayedVehicle) else None
@@ -135,7 +147,7 @@ class VehicleController:
         sea_level = self._sea_level()
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
-        self._planner = self.make_planner(self.spec.scheduler)
+        self._planner = self._make_planner(self.spec, self.spec.scheduler)
         self.mission = Mission(
             robot,
             self._planner,
@@ -161,22 +173,6 @@ class VehicleController:
         told = self.vehicle.sea_level if isinstance(self.vehicle, SeaLevelVehicle) else None
         return agreed_sea_level(None if home is None else home.above_sea, told)
 
-    def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
-        """Create the planner for `scheduler`; may take seconds to start."""
-        if not scheduler.isolated:
-            return BackgroundPlanner(scheduler)
-        patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
-        wall = self._session.host_seconds(round(patience * NANOSECONDS))
-        return BackgroundPlanner(
-            scheduler,
-            PlannerExecutor(
-                max(_LEAST_PATIENCE, wall),
-                solve,
-                scheduler,
-                application=self._session.application,
-            ),
-        )
-
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
         """Streams that the controller of this robot publishes, except replies."""
@@ -193,18 +189,16 @@ class VehicleController:
             self.vehicle.use_clock(clock)
             # It was read while connecting, by the vehicle's own clock.
             self.state = replace(self.state, stamp=clock.now())
-        self._publish_takeoff(clock.now())
+        if not self._session.simulated:
+            # A replay needs the state in which the mission takes off; in simulated time the first
+            # cycle, at 0 s, publishes it.
+            self._publish(state_stream(self.id), self.state, clock.now())
         self.handle(Start(), clock.now())
 
-    def _publish_takeoff(self, now: int) -> None:
-        """Publish the state in which the mission takes off, which a replay needs."""
-        self._publish(state_stream(self.id), self.state, now)
-
-    def grow(self, spec: RobotSpec, publishers: dict[str, Publisher]) -> None:
-        """Accept further streams; `publishers` are for replies to further analyses."""
+    def grow(self, spec: RobotSpec) -> None:
+        """Accept the further streams of `spec`."""
         self.spec = spec
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
-        self._publishers.update(publishers)
 
     def use_planner(self, planner: Planner) -> None:
         """Use `planner` from now on, starting with the current queue."""
@@ -212,6 +206,10 @@ class VehicleController:
         self.mission.use_planner(planner)
         if isinstance(former, BackgroundPlanner):
             former.close()
+
+    def planner_of(self, scheduler: TrajectoryScheduler) -> Planner:
+        """Create the planner of another scheduler; it may take seconds to start."""
+        return self._make_planner(self.spec, scheduler)
 
     def advance_to(self, stamp: int) -> None:
         """Advance a simulated vehicle's time."""
@@ -271,21 +269,20 @@ class VehicleController:
                 self.vehicle.hold()
         return SetpointRecord(now, None, None)
 
-    def observe(self, now: int) -> list[tuple[str, int]]:
+    def observe(self, now: int) -> None:
         """Publish the vehicle's state and the readings of the sensors that are due.
 
-        Returns (stream, stamp) of each. At the time of a loop cycle the state is the one that the
-        cycle used, so that a replay gets the mission's own input.
+        At the time of a loop cycle the state is the one that the cycle used, so that a replay gets
+        the mission's own input.
         """
         seen = self.loop.state if self._turned == now else None
         state = self.state = seen or self.vehicle.read()
-        published = [self._publish(state_stream(self.id), state, now)]
+        self._publish(state_stream(self.id), state, now)
         for sensor in self.spec.sensors:
             if self._due[sensor.id] <= now:
                 self._due[sensor.id] = self._next_due(sensor, now)
                 item = sensor_item(sensor, state, self.mission.status)
-                published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
-        return published
+                self._publish(f"{self.id}/{sensor.id}", item, now)
 
     def _next_due(self, sensor: SensorConfig, after: int) -> int:
         return self._session.next_due(f"{self.id}/{sensor.id}", sensor.rate, after)
@@ -318,6 +315,6 @@ class VehicleController:
         with contextlib.suppress(AeroDaaSError):
             self.vehicle.land()
 
-    def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
-        self._background.publish(self._publishers[stream], item, now)
-        return stream, now
+    def _publish(self, stream: str, item: object, now: int) -> None:
+        outlet = self._outlets[stream]
+        self._send(outlet.measure(item, Header(outlet.sent, now, stream), host_time_ns()))

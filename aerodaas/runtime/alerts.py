@@ -1,0 +1,58 @@
+"""Alerts of one part of a run: numbered, without repetitions, the newest ones kept."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from aerodaas.runtime.node import Outlet
+from aerodaas.runtime.stream_names import alert_stream
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.status import Message
+
+__all__ = ["AlertLog"]
+
+_KEPT = 50
+_REPEATED = 5 * NANOSECONDS
+"""Mission time within which an alert with the same text is suppressed, nanoseconds."""
+
+
+class AlertLog:
+    """Alerts of one part of a run; thread-safe."""
+
+    def __init__(self, name: str) -> None:
+        """Start the alerts of the part `name`."""
+        self.outlet = Outlet(alert_stream(name))
+        self.newest: deque[Alert] = deque(maxlen=_KEPT)
+        self._name = name
+        self._lock = threading.Lock()
+        self._raised: dict[tuple[str, str, str], int] = {}
+        """Mission time of each of the newest alerts, by source, kind and text."""
+
+    def message(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
+    ) -> Message[Alert] | None:
+        """Make the message of an alert; None if the same one was made within the last seconds.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+            stamp: Mission time in nanoseconds.
+            values: Further figures by name.
+            source: Name of the part that raises it; empty for this one.
+        """
+        source = source or self._name
+        with self._lock:
+            before = self._raised.get((source, kind, text))
+            if before is not None and 0 <= stamp - before < _REPEATED:
+                return None
+            self._raised[source, kind, text] = stamp
+            while len(self._raised) > _KEPT:
+                self._raised.pop(next(iter(self._raised)))
+            header = Header(self.outlet.sent, stamp, source)
+            alert = Alert(header, kind, text, dict(values))
+            self.newest.append(alert)
+            return self.outlet.measure(alert, header, host_time_ns())

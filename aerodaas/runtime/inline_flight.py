@@ -1,0 +1,361 @@
+"""Flight of a plan in simulated time, in the application's own process."""
+
+from __future__ import annotations
+
+import copy
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from typing_extensions import Self
+
+from aerodaas.config.options import LiveViews
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.recording.provenance import Provenance
+from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
+from aerodaas.runtime.camera import CameraNode
+from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
+from aerodaas.runtime.drone import DroneNode
+from aerodaas.runtime.growth import growth
+from aerodaas.runtime.inline import InlineExecutor
+from aerodaas.runtime.live import LiveReader
+from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.node import NEVER, Node
+from aerodaas.runtime.plan import Cameras, FlightPlan
+from aerodaas.runtime.recorder import RecorderNode
+from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
+from aerodaas.runtime.session import MESSAGE_DEPTH
+from aerodaas.runtime.stream_names import alert_stream
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.vitals import read_vitals
+
+__all__ = ["InlineFlight"]
+
+_ANSWER_TIMEOUT = 60.0
+"""Wall seconds within which a call is served: between two moments, one may open a model."""
+_REPORT_INTERVAL = 0.02
+"""Wall seconds between two reports of the drones."""
+_VITALS_INTERVAL = 0.5
+"""Wall seconds between two recorded readings of the process' vitals."""
+_NOTES_KEPT = 50
+
+
+class InlineFlight:
+    """The nodes of one run, stepped in a thread of this process; a context manager."""
+
+    headless = ""
+    """Address of a lost head; empty, for no cluster is used."""
+    flying = False
+    """Whether a drone outlives the application: a simulated one ends with it."""
+    reachable = True
+
+    def __init__(
+        self,
+        plan: FlightPlan,
+        recording: Path | None = None,
+        provenance: Provenance | None = None,
+        live: LiveViews | None = None,
+    ) -> None:
+        """Create the nodes of `plan`.
+
+        Args:
+            plan: The run.
+            recording: Path of the MCAP file; None for none.
+            provenance: Versions, configuration and application, for the recording.
+            live: Who looks on at what is recorded.
+        """
+        self.plan = plan
+        self._executor = InlineExecutor()
+        self._drone: DroneNode | None = None
+        self._cameras: dict[str, CameraNode] = {}
+        self._analyses: list[AnalysisNode] = []
+        self._dispatcher: SimulatedDispatcher | None = None
+        self._recorder: RecorderNode | None = None
+        for camera in plan.cameras:
+            self._add_camera(camera)
+        for actor in plan.analyses:
+            self._add_analyses(actor.name, actor.nodes)
+        if plan.dispatch is not None:
+            scheduler = copy.deepcopy(plan.dispatch.scheduler)
+            managed, resources = plan.dispatch.managed, plan.dispatch.resources
+            self._dispatcher = SimulatedDispatcher(plan.session, scheduler, managed, resources)
+            self._executor.add("dispatcher", [self._dispatcher])
+        for name, specs in zip(plan.drone_actors, plan.drones, strict=True):
+            self._drone = DroneNode(
+                plan.session, name, specs, _planner_maker(), observed=plan.observed or {}
+            )
+            self._executor.add(name, [self._drone], first=True)
+        if recording is not None and plan.recorded and provenance is not None:
+            streams = {**plan.recorded, alert_stream("recorder"): MESSAGE_DEPTH}
+            self._recorder = RecorderNode(plan.session, recording, streams, provenance, live)
+            self._executor.add("recorder", [self._recorder])
+        self._executor.order(self._nodes())
+        self._calls = LoopCalls(lambda: None, self._publish_reports)
+        self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
+        self._changed = threading.Condition()
+        self._stopping = False
+        self._sensed = False
+        self._over = False
+        self._stopped = False
+        self._robots: dict[str, RobotReport] = {}
+        self._look: object = None
+        """What of the robots the application is told at once."""
+        self._notes: list[Alert] = []
+
+    def _add_camera(self, camera: Cameras) -> CameraNode:
+        node = camera.make(self.plan.session)
+        self._cameras[camera.stream] = node
+        self._executor.add(f"sensor/{camera.stream}", [node])
+        return node
+
+    def _add_analyses(self, part: str, specs: Sequence[AnalysisSpec]) -> list[AnalysisNode]:
+        # A flight works with copies, as actors do: the application's own objects stay as they are.
+        memo: dict[int, object] = {}
+        nodes = [
+            AnalysisNode(self.plan.session, replace(spec, work=copy.deepcopy(spec.work, memo)))
+            for spec in specs
+        ]
+        self._analyses += nodes
+        self._executor.add(part, nodes)
+        return nodes
+
+    def _nodes(self) -> list[Node]:
+        """All nodes in the order in which ready ones are stepped."""
+        last = [
+            node for node in (self._dispatcher, self._drone, self._recorder) if node is not None
+        ]
+        return [*self._cameras.values(), *_by_dependence(self._analyses), *last]
+
+    def __enter__(self) -> Self:
+        """Return the flight, which is stopped on exit."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the flight."""
+        self.stop()
+
+    def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
+        """Open everything and start flying; raises the errors of a node's opening.
+
+        `progress` is called with the name of each part that is ready.
+        """
+        logging.captureWarnings(capture=True)
+        self._handler = self._executor.log_handler(logging.WARNING)
+        logging.getLogger("aerodaas").addHandler(self._handler)
+        for part in tuple(self._executor.parts.values()):
+            self._executor.open(part.nodes)
+            progress(part.name)
+        self._publish_reports()
+        self._thread.start()
+
+    def _run(self) -> None:
+        executor = self._executor
+        reported = recorded = time.monotonic()
+        # Pure readers start first.
+        executor.start(reversed(self._nodes()))
+        while not self._stopping and not self._ended():
+            self._calls.serve()
+            now = executor.next_moment
+            if now == NEVER:
+                break
+            executor.advance_to(now)
+            clock = time.monotonic()
+            if clock - reported >= _REPORT_INTERVAL:
+                reported = clock
+                self._publish_reports()
+            if clock - recorded >= _VITALS_INTERVAL:
+                recorded = clock
+                self._record_vitals()
+        self._calls.close("the mission is over")
+        self._end_executions()
+        self._record_vitals()
+        self._publish_reports()
+        with self._changed:
+            self._over = True
+            self._changed.notify_all()
+
+    def _end_executions(self) -> None:
+        """Let the simulated executions of the last frames end, so that each has its outcome."""
+        dispatcher = self._dispatcher
+        if dispatcher is None:
+            return
+        self._executor.retire(node for node in self._nodes() if node is not self._recorder)
+        while dispatcher.executing and dispatcher.due != NEVER:
+            self._executor.step(dispatcher, dispatcher.due)
+
+    def _ended(self) -> bool:
+        if self._drone is not None:
+            failed = self._executor.parts[self._drone.name].phase == "failed"
+            return failed or self._drone.over
+        cameras = self._cameras.items()
+        return self._sensed or all(
+            self._executor.parts[f"sensor/{stream}"].phase == "failed" or camera.finished
+            for stream, camera in cameras
+        )
+
+    def _record_vitals(self) -> None:
+        """Record the vitals of this process, which runs all nodes."""
+        if self._recorder is not None:
+            reading = {f"inline@{os.uname().nodename}": read_vitals()}
+            self._recorder.write_vitals(reading, self._executor.clock.now())
+
+    def _publish_reports(self) -> None:
+        if self._drone is None:
+            return
+        self._robots = self._drone.reports()
+        look = (len(self._notes), [report.notable for report in self._robots.values()])
+        if look != self._look:
+            with self._changed:
+                self._look = look
+                self._changed.notify_all()
+
+    def poll(self, newest: int = 200) -> FlightState:
+        """State of the run, with the `newest` latencies of each robot."""
+        robots = {
+            name: replace(report, latencies=self._drone.latencies(name, newest))
+            for name, report in self._robots.items()
+            if self._drone is not None
+        }
+        return FlightState(robots, self.reports(), self._over, self.notes)
+
+    @property
+    def notes(self) -> tuple[Alert, ...]:
+        """The newest alerts of the application."""
+        return tuple(self._notes[-_NOTES_KEPT:])
+
+    @property
+    def recordings(self) -> tuple[Path, ...]:
+        """File of the recording."""
+        return () if self._recorder is None else (self._recorder.path,)
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The report of each part."""
+        return {name: part.report() for name, part in tuple(self._executor.parts.items())}
+
+    def await_change(self, timeout: float) -> None:
+        """Return once a mission has changed, or after `timeout` seconds."""
+        with self._changed:
+            before = self._look
+            self._changed.wait_for(lambda: self._over or self._look != before, timeout)
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Execute a command on a robot's mission, between two moments."""
+        drone = self._drone
+        assert drone is not None  # noqa: S101 - a robot flies
+        try:
+            return self._calls.ask(
+                lambda: drone.command(robot, command, self._executor.clock.now()), _ANSWER_TIMEOUT
+            )
+        except LoopOverError as over:
+            return Answer(accepted=False, text=f"{over}: {self._robots[robot].status.state.value}")
+
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert of the application; in any thread."""
+        header = Header(len(self._notes), self._executor.clock.now(), "application")
+        self._notes.append(Alert(header, kind, text))
+        if self._drone is not None:
+            # By the drone's stream of alerts, which is recorded.
+            self._executor.parts[self._drone.name].alert(kind, text)
+
+    def learn(self, application: object) -> None:
+        """Do nothing: every definition of the application is in this process."""
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Use the trajectory scheduler `scheduler` for all robots from now on."""
+        drone = self._drone
+        if drone is not None:
+            planners = drone.planners_of(scheduler)
+            self._calls.ask(lambda: drone.use_planners(planners), _ANSWER_TIMEOUT)
+
+    def grow(self, plan: FlightPlan) -> None:
+        """Continue with `plan`, that of the current graph.
+
+        Raises GraphError for a change that is impossible in flight, and the errors of a new
+        node's opening; the run then continues unchanged.
+        """
+        self._calls.ask(lambda: self._grow(plan), _ANSWER_TIMEOUT)
+        self.plan = plan
+
+    def _grow(self, plan: FlightPlan) -> None:
+        change, executor = growth(self.plan, plan), self._executor
+        fresh: list[Node] = []
+        try:
+            fresh += map(self._add_camera, change.cameras)
+            groups = {actor.name: actor.nodes for actor in change.analyses}
+            for part, specs in (*groups.items(), *change.joining.items()):
+                fresh += self._add_analyses(part, specs)
+            executor.order(self._nodes())
+            executor.open(fresh)
+        except BaseException:
+            for node in fresh:
+                node.close()
+            executor.remove(fresh)
+            self._cameras = {
+                stream: node for stream, node in self._cameras.items() if node not in fresh
+            }
+            self._analyses = [node for node in self._analyses if node not in fresh]
+            raise
+        for stream, ends in change.ending.items():
+            self._cameras[stream].ends = ends
+        if self._drone is not None:
+            for specs in change.drones:
+                self._drone.grow(specs, plan.observed, executor.clock.now())
+            executor.subscribe(self._drone)
+        if self._recorder is not None:
+            self._recorder.reads.update(change.recorded)
+            executor.subscribe(self._recorder)
+        executor.start(fresh)
+
+    def end_sensing(self) -> None:
+        """End a run without drones, which otherwise goes on as long as its cameras."""
+        self._sensed = True
+
+    def reader(self, stream: str, over: Callable[[], bool]) -> LiveReader | None:
+        """A reader of `stream` for the application; None if no node publishes it."""
+        if not self._executor.publishes(stream):
+            return None
+        return LiveReader(self._executor.tap(stream), over)
+
+    def stop(self) -> dict[str, ActorReport]:
+        """Stop the flight, close everything, and return the final reports."""
+        if not self._stopped:
+            self._stopped = self._stopping = True
+            if self._thread.ident is not None:
+                self._thread.join()
+            self._executor.close()
+            logging.getLogger("aerodaas").removeHandler(self._handler)
+        return self.reports()
+
+    def leave(self) -> None:
+        """End with the application: a simulated drone does not outlive it."""
+        self.stop()
+
+
+def _planner_maker() -> Callable[[RobotSpec, TrajectoryScheduler], Planner]:
+    """A maker of planners that plan in the loop itself, with one copy of each scheduler."""
+    memo: dict[int, object] = {}
+    return lambda _, scheduler: InlinePlanner(copy.deepcopy(scheduler, memo))
+
+
+def _by_dependence(nodes: Sequence[AnalysisNode]) -> list[AnalysisNode]:
+    """The analyses, each after those whose results it reads."""
+    ordered: list[AnalysisNode] = []
+    by_stream = {node.spec.stream: node for node in nodes}
+
+    def visit(node: AnalysisNode, above: frozenset[str]) -> None:
+        for stream in node.spec.inputs:
+            if stream in by_stream and stream not in above:
+                visit(by_stream[stream], above | {stream})
+        if node not in ordered:
+            ordered.append(node)
+
+    for node in nodes:
+        visit(node, frozenset((node.spec.stream,)))
+    return ordered

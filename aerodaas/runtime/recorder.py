@@ -1,0 +1,184 @@
+"""Recorder node: writes every stream of a run to an MCAP file."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aerodaas.config.options import LiveViews
+from aerodaas.recording.provenance import Provenance
+from aerodaas.runtime.node import Host, Node
+from aerodaas.runtime.session import Session
+from aerodaas.runtime.stream_names import vitals_stream
+from aerodaas.types.data import Header
+from aerodaas.types.errors import RecordingError, failure_line
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.payload import Photo
+from aerodaas.types.status import Message
+from aerodaas.types.vitals import Vitals
+
+if TYPE_CHECKING:
+    from aerodaas.recording.live import LiveServer
+    from aerodaas.recording.photo_album import PhotoAlbum
+    from aerodaas.recording.recorder import FlightRecorder
+    from aerodaas.recording.ros.live import RosGraph
+
+__all__ = ["RecorderNode"]
+
+
+class RecorderNode(Node):
+    """Records its streams; a full disk ends the recording, not the flight."""
+
+    def __init__(
+        self,
+        session: Session,
+        path: Path,
+        streams: Mapping[str, int],
+        provenance: Provenance,
+        views: LiveViews | None = None,
+    ) -> None:
+        """Record to a new file.
+
+        Args:
+            session: The run.
+            path: Path of the MCAP file; if it exists, the first of `flight.2.mcap`,
+                `flight.3.mcap`, … that does not.
+            streams: Queue depths of the streams to record.
+            provenance: Versions, configuration and application, for the file's metadata.
+            views: Who looks on at what is recorded.
+        """
+        super().__init__("recorder", streams)
+        self.path = path
+        self.failure = ""
+        """Why the recording had to stop; empty while it goes on."""
+        self._session = session
+        self._provenance = provenance
+        self._views = views or LiveViews()
+        self._readings = 0
+        self._recorder: FlightRecorder | None = None
+        self._album: PhotoAlbum | None = None
+        self._live: LiveServer | None = None
+        self._ros: RosGraph | None = None
+
+    def open(self, host: Host) -> None:
+        """Create the file; raises RecordingError if it cannot be written."""
+        super().open(host)
+        # The application's process imports this module, but does not need the writers.
+        from aerodaas.recording.live import LiveServer  # noqa: PLC0415
+        from aerodaas.recording.photo_album import PhotoAlbum, album_folder  # noqa: PLC0415
+        from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
+
+        environment = self._session.environment
+        home = environment.home
+        address, domain = self._views.foxglove, self._views.ros2
+        self._live = LiveServer(address, self._provenance.name) if address else None
+        if domain is not None:
+            from aerodaas.recording.ros.live import RosGraph  # noqa: PLC0415 - an extra
+
+            quality = environment.recording.jpeg_quality
+            self._ros = RosGraph(domain, self._provenance.started_ns, quality)
+        # A recorder that is set up again keeps its predecessor's file and writes a second part.
+        self.path = _unwritten(self.path)
+        self._album = PhotoAlbum(album_folder(self.path), environment)
+        self._recorder = FlightRecorder(
+            self.path,
+            config=environment.recording,
+            provenance=self._provenance,
+            home=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            fences={robot.id: robot.limits.geofence for robot in environment.robots},
+            live=self._live,
+        )
+
+    @property
+    def shows_live(self) -> bool:
+        """Whether anybody looks on at what is recorded."""
+        return self._views != LiveViews()
+
+    def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
+        """Write the messages."""
+        del now
+        for message in inputs:
+            self.write(message)
+        return ()
+
+    def write(self, message: Message[Any]) -> None:
+        """Write one message; thread-safe."""
+        self._show(message)
+        if self.failure or self._recorder is None:
+            return
+        try:
+            self._recorder.write(message)
+        except RecordingError as error:
+            self.failure = str(error)
+            self.host.alert("recording_stopped", self.failure)
+        if isinstance(message.item, Photo):
+            self._keep(message.stream.partition("/")[0], message.item)
+
+    def write_vitals(self, readings: Mapping[str, Vitals], now: int) -> None:
+        """Record the vitals of the run's processes.
+
+        Args:
+            readings: Vitals by `part@machine`.
+            now: Mission time, nanoseconds.
+        """
+        self._readings += 1
+        for source, reading in readings.items():
+            stream = vitals_stream(source.partition("@")[0])
+            header = Header(self._readings, now, source)
+            self.write(Message(stream, self._readings, now, header, reading.taken, (), reading))
+
+    def count_drops(self, stream: str, count: int) -> None:
+        """Record at once that messages were dropped, because the run may be killed."""
+        if self._recorder is not None:
+            self._recorder.drops(stream, count)
+
+    def _show(self, message: Message[Any]) -> None:
+        """Publish on ROS 2 topics; what fails there ends that, and no recording."""
+        graph = self._ros
+        if graph is None:
+            return
+        try:
+            graph.put(message)
+        except Exception as error:  # noqa: BLE001 - a middleware's
+            self._ros = None
+            graph.close()
+            self.host.alert("ros2_stopped", failure_line(error))
+
+    def _keep(self, robot: str, photo: Photo) -> None:
+        """Keep a picture beside the recording; one that cannot be kept does not end it."""
+        if self._album is None:
+            return
+        try:
+            self._album.add(robot, photo)
+        except RecordingError as error:
+            self.host.alert("photo", str(error))
+
+    def close(self) -> None:
+        """Finish the file; raises RecordingError if the recording had to stop."""
+        if self._recorder is None:
+            return
+        summary = self._recorder.close()
+        if self._album is not None:
+            self._album.close()
+        if self._live is not None:
+            self._live.close()
+        if self._ros is not None:
+            self._ros.close()
+        self._recorder = None
+        if summary.stopped:
+            raise RecordingError(summary.stopped)
+
+    def values(self) -> dict[str, Any]:
+        """Path of the file, and why the recording had to stop."""
+        return {"path": str(self.path), "failure": self.failure}
+
+
+def _unwritten(path: Path) -> Path:
+    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that does not exist."""
+    parts = itertools.count(2)
+    part = path
+    while part.exists():
+        part = path.with_suffix(f".{next(parts)}{path.suffix}")
+    return part

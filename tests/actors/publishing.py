@@ -1,0 +1,21 @@
+"""Sends measurements on a stream, as a node's executor would."""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from aerodaas.actors.streams import Publisher
+from aerodaas.runtime.node import Outlet
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message
+
+__all__ = ["send"]
+
+_OUTLETS: WeakKeyDictionary[Publisher, Outlet] = WeakKeyDictionary()
+
+
+def send(publisher: Publisher, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
+    """Number a measurement, publish it, and return what was sent."""
+    outlet = _OUTLETS.setdefault(publisher, Outlet(publisher.stream))
+    return publisher.publish(outlet.measure(item, header, captured))
