@@ -145,11 +145,11 @@ def run(
         application=application.resolve(),
     )
     if seeds is not None:
-        from aerodaas.cli.seeds.command import run_seeds  # noqa: PLC0415 - loads ray
-        from aerodaas.cli.seeds.job import Job  # noqa: PLC0415 - as above
+        from aerodaas.cli.seeds.command import run_seeds  # noqa: PLC0415 - slow to load
+        from aerodaas.cli.seeds.runs import ApplicationRun  # noqa: PLC0415 - as above
 
-        job = Job(application, context.args, options)
-        run_seeds(job, seeds, jobs=jobs, json_path=json_path, csv_path=csv_path)
+        seeded = ApplicationRun(application, context.args, options)
+        run_seeds(seeded, seeds, jobs=jobs, json_path=json_path, csv_path=csv_path)
         return
     _require_seeds({"--jobs": jobs, "--json": json_path, "--csv": csv_path})
     if live:

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import psutil
 import pytest
-import ray
 from flying import FLAT, Flyer, hop, recorded
 
 from aerodaas.cli.app import main
@@ -45,10 +44,9 @@ drone.start_mission()
 
 
 def run(folder: Path, *words: str) -> int:
-    """`aerodaas run --seeds` on the tests' own Ray; returns the exit code."""
-    address = ray.get_runtime_context().gcs_address
-    told = ["--seeds", "3", "--seed", "3", "--address", address, "--record", str(folder / "out")]
-    sys.argv = ["aerodaas", "run", str(folder / "app.py"), *told, *words]
+    """`aerodaas run --seeds`; returns the exit code."""
+    seeds = ["--seeds", "3", "--seed", "3", "--record", str(folder / "out")]
+    sys.argv = ["aerodaas", "run", str(folder / "app.py"), *seeds, *words]
     with pytest.raises(SystemExit) as ended:
         main()
     return int(ended.value.code or 0)
@@ -137,9 +135,9 @@ def test_an_interruption_lands_all_and_leaves_nothing(flyer: Flyer) -> None:
     folder = flyer.folder
     flyer.write(FLAT)
     (folder / "app.py").write_text(HOP % 900)
-    words = ["--seeds", "3", "--address", ray.get_runtime_context().gcs_address]
+    words = ["run", "app.py", "--seeds", "3", "--record", "out", "--jobs", "2"]
     with subprocess.Popen(
-        [sys.executable, "-c", _MAIN, "run", "app.py", "--record", "out", "--jobs", "2", *words],
+        [sys.executable, "-c", _MAIN, *words],
         cwd=folder,
         env={**os.environ, "SEEDS_OF": str(folder)},
         stderr=subprocess.DEVNULL,
@@ -157,7 +155,8 @@ def test_an_interruption_lands_all_and_leaves_nothing(flyer: Flyer) -> None:
         outcome = summary["robots"]["drone"]["outcome"]
         assert outcome == "landed: interrupted from the keyboard"
     assert not (folder / "out" / "seed-2").exists()
-    assert not _processes_of(folder)
+    psutil.wait_procs(left := _processes_of(folder), timeout=5)
+    assert not any(process.is_running() for process in left)
 
 
 def _flies(place: Path) -> bool:

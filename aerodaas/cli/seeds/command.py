@@ -11,8 +11,7 @@ import typer
 
 from aerodaas.cli.rows import write_csv
 from aerodaas.cli.seeds.figures import rows, show
-from aerodaas.cli.seeds.job import Job
-from aerodaas.cli.seeds.runs import SeededRun, fly_seeds
+from aerodaas.cli.seeds.runs import ApplicationRun, SeededRun, fly_seeds
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.mission_run import recording_folder
 from aerodaas.terminal.progress import show_progress
@@ -22,41 +21,55 @@ __all__ = ["run_seeds"]
 
 
 def run_seeds(
-    job: Job, seeds: int, *, jobs: int | None, json_path: Path | None, csv_path: Path | None
+    run: ApplicationRun,
+    seeds: int,
+    *,
+    jobs: int | None,
+    json_path: Path | None,
+    csv_path: Path | None,
 ) -> None:
-    """Fly `job` with this number of seeds, from its own on; print a table and write files.
+    """Fly an application with several seeds; print a table and write files.
 
-    Raises ConfigError for options that many runs cannot have, MissionError if a run failed.
+    Args:
+        run: The application; the seed of its options, or 0, is the first.
+        seeds: Number of seeds, 1 or more.
+        jobs: Most runs at a time; None for one per core.
+        json_path: File for the table as JSON; None for none.
+        csv_path: The same as CSV.
+
+    Raises:
+        ConfigError: For options that many runs cannot have.
+        MissionError: If a run failed.
     """
-    first = job.options.seed or 0
-    job = replace(job, options=_shared_options(job))
-    name = job.application.stem
+    first = run.options.seed or 0
+    run = replace(run, options=_shared_options(run))
+    name = run.application.stem
     done: list[SeededRun] = []
     try:
         with show_progress() as progress:
             bar = progress.add_task(name, total=seeds)
 
-            def note(run: SeededRun) -> None:
-                done.append(run)
+            def on_end(ended: SeededRun) -> None:
+                done.append(ended)
                 progress.update(bar, completed=len(done))
-                if run.failure:
-                    said = f"seed {run.seed} failed: {run.failure}"
+                if ended.failure:
+                    said = f"seed {ended.seed} failed: {ended.failure}"
                     progress.console.print(said, highlight=False, markup=False, soft_wrap=True)
 
-            fly_seeds(job, range(first, first + seeds), jobs or os.cpu_count() or 1, note)
+            fly_seeds(run, range(first, first + seeds), jobs or os.cpu_count() or 1, on_end)
     finally:
         # Also after Ctrl-C, of those that have ended.
         if done:
-            done.sort(key=lambda run: run.seed)
+            done.sort(key=lambda ended: ended.seed)
             _tell(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
-            typer.echo(f"in {job.options.record}")
-    failed = [str(run.seed) for run in done if run.failure]
+            typer.echo(f"in {run.options.record}")
+    failed = [str(ended.seed) for ended in done if ended.failure]
     if failed:
         raise MissionError(f"{len(failed)} of {seeds} runs failed: seeds {', '.join(failed)}")
 
 
-def _shared_options(job: Job) -> RunOptions:
-    options = job.options
+def _shared_options(run: ApplicationRun) -> RunOptions:
+    options = run.options
     if options.lockstep is False:
         raise ConfigError("--seeds flies as fast as the machine goes: leave --speed out")
     shown = {"--live": options.live, "--console": options.console, "--ros2": options.ros2}
@@ -65,7 +78,7 @@ def _shared_options(job: Job) -> RunOptions:
             raise ConfigError(f"{name} shows one flight, and --seeds flies several: leave it out")
     if options.record is not None and options.record.suffix == ".mcap":
         raise ConfigError("with --seeds, --record names a folder: each run gets one below it")
-    record = options.record or recording_folder(job.application.stem)
+    record = options.record or recording_folder(run.application.stem)
     return replace(options, lockstep=True, record=record.absolute(), view=False, report="figures")
 
 

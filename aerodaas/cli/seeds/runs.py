@@ -1,37 +1,53 @@
 """Runs of one application with several seeds, side by side, each in a process of its own.
 
-All share one local Ray: one for each would cost 5 s of a core and 200 MB more.
+A run inherits nothing of another one, as an application's modules may keep state.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import multiprocessing
 import os
-import pickle
-import select
 import signal
-import subprocess
-import sys
+import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
-from typing_extensions import Self
-
-from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES
-from aerodaas.cli.seeds.job import OUTPUT, Job
-from aerodaas.environment.signals import raise_on_signals
+from aerodaas.cli.application import run_application
+from aerodaas.cli.failure import Failure, failure_of, show_failure
+from aerodaas.config.options import RunOptions
+from aerodaas.environment.signals import heed_interrupts, raise_on_signals
 from aerodaas.recording.report.report import SUMMARY
-from aerodaas.types.errors import ConfigError, RecordingError
+from aerodaas.types.errors import ConfigError, IncompleteError, RecordingError
 
-__all__ = ["SeededRun", "fly_seeds"]
+__all__ = ["ApplicationRun", "SeededRun", "fly_seeds"]
 
+_OUTPUT = "output.txt"
+"""Name of the file, beside the recording, with what a run has printed."""
 _WRONG_INPUT = 2
 """Exit code of a run whose input is wrong, and so that of all others."""
+
+
+@dataclass(frozen=True)
+class ApplicationRun:
+    """An application with its arguments and the options of a run."""
+
+    application: Path
+    words: list[str]
+    """Arguments of the application."""
+    options: RunOptions
+
+    def with_seed(self, seed: int) -> ApplicationRun:
+        """The same with `seed`, recorded in a folder of its own below that of `options.record`."""
+        assert self.options.record is not None  # noqa: S101 - `fly_seeds` needs it
+        folder = self.options.record / f"seed-{seed}"
+        return replace(self, options=replace(self.options, seed=seed, record=folder))
 
 
 @dataclass(frozen=True)
@@ -48,122 +64,127 @@ class SeededRun:
 
 
 def fly_seeds(
-    job: Job, seeds: Iterable[int], jobs: int, done: Callable[[SeededRun], None]
+    run: ApplicationRun, seeds: Sequence[int], jobs: int, done: Callable[[SeededRun], None]
 ) -> list[SeededRun]:
-    """Fly `job` once for each seed, `jobs` at a time; a run that fails ends no other one.
+    """Fly `run` once for each seed, `jobs` at a time; a run that fails ends no other one.
 
     Args:
-        job: What to fly; its `options.record` is the folder that gets a folder for each run.
+        run: What to fly; its `options.record` is the folder that gets a folder for each seed.
         seeds: Seeds of the simulation, each once.
         jobs: Most runs at a time, 1 or more.
-        done: Told of each run that has ended.
+        done: Called with each run that has ended.
 
     Returns:
         The runs, in the order of `seeds`.
 
     Raises:
         ConfigError: With the reason of the first run whose input is wrong, as it is for all.
-        AeroDaaSError: If Ray does not start.
         KeyboardInterrupt: After Ctrl-C, once all runs have landed and ended.
     """
-    seeds = list(seeds)
+    raise_on_signals()
     ended: dict[int, SeededRun] = {}
-    with _shared_ray(job.options.address) as address, _Processes() as flying:
-        job = replace(job, options=replace(job.options, address=address))
-        waiting = deque(seeds)
+    waiting = deque(seeds)
+    flying: dict[Connection, tuple[SpawnProcess, int, Path]] = {}
+    try:
         while waiting or flying:
             while waiting and len(flying) < jobs:
-                flying.start(job.with_seed(waiting.popleft()))
-            for run in flying.await_end():
-                ended[run.seed] = run
-                done(run)
+                seed = waiting.popleft()
+                answer, process, folder = _start(run.with_seed(seed))
+                flying[answer] = process, seed, folder
+            ready = wait(list(flying))
+            for answer in [answer for answer in flying if answer in ready]:
+                process, seed, folder = flying[answer]
+                failure = _failure(answer, process)
+                del flying[answer]
+                summary = _summary(folder / SUMMARY)
+                ended[seed] = SeededRun(seed, folder, failure, summary)
+                done(ended[seed])
+    finally:
+        _interrupt([process for process, _, _ in flying.values()])
     return [ended[seed] for seed in seeds]
 
 
-@contextlib.contextmanager
-def _shared_ray(address: str | None) -> Iterator[str]:
-    """Address of a Ray for all runs: the one that is asked for, or a local one meanwhile."""
-    joined = address or os.environ.get("RAY_ADDRESS")
-    if joined:
-        yield joined
-        return
-    ray = LocalRay(LOCAL_VARIABLES)
+def _start(run: ApplicationRun) -> tuple[Connection, SpawnProcess, Path]:
+    """Start the process of a run: its answer, itself, and the folder of the recording."""
+    folder = run.options.record
+    assert folder is not None  # noqa: S101 - it has a seed
     try:
-        yield ray.address
-    finally:
-        ray.end()
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / _OUTPUT).touch()
+    except OSError as error:
+        raise RecordingError(f"cannot write into {folder}: {error.strerror}") from None
+    spawn = multiprocessing.get_context("spawn")
+    answer, answering = spawn.Pipe(duplex=False)
+    process = spawn.Process(target=_fly, args=(run, folder / _OUTPUT, answering))
+    process.start()
+    # The process now holds its only other end, so that its end is the end of the answer.
+    answering.close()
+    return answer, process, folder
 
 
-class _Processes:
-    """The processes under way; a context manager, whose exit interrupts and awaits them."""
+def _failure(answer: Connection, process: SpawnProcess) -> str:
+    """Why a run failed, once its process has answered or ended; empty if it did not.
 
-    def __init__(self) -> None:
-        self._flying: dict[int, tuple[subprocess.Popen[bytes], Job]] = {}
-        """By the descriptor of their answer."""
-
-    def __len__(self) -> int:
-        return len(self._flying)
-
-    def __enter__(self) -> Self:
-        raise_on_signals()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        processes = [process for process, job in self._flying.values()]
-        self._flying.clear()
-        while any(process.poll() is None for process in processes):
-            for process in processes:
-                process.send_signal(signal.SIGINT)
-            # Ctrl-C once more interrupts them once more: then they end without landing.
-            with contextlib.suppress(KeyboardInterrupt):
-                for process in processes:
-                    process.wait()
-
-    def start(self, job: Job) -> None:
-        folder = job.options.record
-        assert folder is not None  # noqa: S101 - it has a seed
+    Raises ConfigError for a wrong input.
+    """
+    with answer:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            output = (folder / OUTPUT).open("wb")
-        except OSError as error:
-            raise RecordingError(f"cannot write into {folder}: {error.strerror}") from None
-        with output:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "aerodaas.cli.seeds"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=output,
-                # Ctrl-C at the terminal reaches this process alone, which then tells the others.
-                start_new_session=True,
-            )
-        assert process.stdin is not None  # noqa: S101 - asked for
-        assert process.stdout is not None  # noqa: S101 - asked for
-        self._flying[process.stdout.fileno()] = process, job
-        with contextlib.suppress(BrokenPipeError):
-            process.stdin.write(pickle.dumps(job))
-            process.stdin.flush()
+            failure: Failure | None = answer.recv()
+        except EOFError:
+            failure = None
+    process.join()
+    if failure is None:
+        code = process.exitcode
+        return f"its process ended with code {code}, see {_OUTPUT}" if code else ""
+    if failure.code == _WRONG_INPUT:
+        raise ConfigError(failure.text)
+    return failure.text
 
-    def await_end(self) -> list[SeededRun]:
-        """Wait until a process ends; returns the runs that have ended."""
-        ready, _, _ = select.select(list(self._flying), [], [])
-        return [self._end(descriptor) for descriptor in ready]
 
-    def _end(self, descriptor: int) -> SeededRun:
-        process, job = self._flying[descriptor]
-        assert process.stdout is not None  # noqa: S101 - asked for
-        text = process.stdout.read().decode(errors="replace")
-        code = process.wait()
-        del self._flying[descriptor]
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                pipe.close()
-        if code == _WRONG_INPUT and text:
-            raise ConfigError(text)
-        folder, seed = job.options.record, job.options.seed
-        assert folder is not None  # noqa: S101 - it has a seed
-        assert seed is not None  # noqa: S101 - likewise
-        failure = (text or f"its process ended with code {code}, see {OUTPUT}") if code else ""
-        return SeededRun(seed, folder, failure, _summary(folder / SUMMARY))
+def _interrupt(processes: Sequence[SpawnProcess]) -> None:
+    """Have the drones of these processes land, and wait for their ends."""
+    while alive := [process for process in processes if process.is_alive()]:
+        for process in alive:
+            assert process.pid is not None  # noqa: S101 - started
+            os.kill(process.pid, signal.SIGINT)
+        # Ctrl-C once more interrupts them once more: then they end without landing.
+        with contextlib.suppress(KeyboardInterrupt):
+            for process in alive:
+                process.join()
+
+
+def _fly(run: ApplicationRun, output: Path, answer: Connection) -> None:
+    """Fly in a process of its own; the exit code is that of `aerodaas run`.
+
+    An incomplete mission is no failure here: it is an outcome among others of the seeds, with
+    figures of its own.
+    """
+    # Ctrl-C at the terminal reaches the command alone, which then interrupts the runs.
+    os.setsid()
+    heed_interrupts()
+    threading.Thread(target=_end_with_parent, name="tie", daemon=True).start()
+    printed = os.open(output, os.O_WRONLY | os.O_TRUNC)
+    os.dup2(printed, 1)
+    os.dup2(printed, 2)
+    try:
+        run_application(run.application, run.words, run.options)
+    except IncompleteError as error:
+        show_failure(failure_of(error))
+    except KeyboardInterrupt:
+        raise SystemExit(128 + signal.SIGINT) from None
+    except Exception as error:  # noqa: BLE001 - the application may raise anything
+        failure = failure_of(error)
+        show_failure(failure)
+        answer.send(failure)
+        raise SystemExit(failure.code) from None
+
+
+def _end_with_parent() -> None:
+    """End this process and its children once the command has ended, however it did."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # noqa: S101 - `_fly` runs in a child
+    parent.join()
+    os.killpg(os.getpgrp(), signal.SIGKILL)
 
 
 def _summary(path: Path) -> dict[str, Any] | None:
