@@ -143,9 +143,13 @@ def runtime(plugin_folder: Path) -> Iterator[None]:
 
 
 @pytest.fixture
-def flyer(runtime: None, tmp_path: Path) -> Flyer:  # noqa: ARG001 - flights need Ray
-    """Flies applications in this process, their files under `tmp_path`."""
-    return Flyer(tmp_path)
+def flyer(
+    plugin_folder: Path,  # noqa: ARG001 - flights import from there
+    tmp_path: Path,
+    request: pytest.FixtureRequest,
+) -> Flyer:
+    """Flies applications, their files under `tmp_path`; on Ray those that go by the clock."""
+    return Flyer(tmp_path, lambda: request.getfixturevalue("runtime"))
 
 
 @pytest.fixture

@@ -44,8 +44,10 @@ def hop(*places: tuple[float, float], hover: float = 0.0) -> AeroNavigation:
 class Flyer:
     """Makes environments in a folder of the test's own and flies them."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, start_ray: Callable[[], object] | None = None) -> None:
+        """Write into `folder`; `start_ray` is called before a flight that goes by the clock."""
         self.folder = folder
+        self._start_ray = start_ray
 
     def write(self, content: dict[str, Any], name: str = "environment.json") -> Path:
         """Write an environment file."""
@@ -56,6 +58,8 @@ class Flyer:
     @contextmanager
     def options(self, **words: Any) -> Iterator[None]:  # noqa: ANN401
         """Options of the runs made inside, as `aerodaas run` would set them; without plots."""
+        if words.get("speed") is not None or words.get("lockstep") is False:
+            self._begin_ray()
         record = self.folder / "flight"
         token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))
         try:
@@ -88,7 +92,10 @@ class Flyer:
         **words: Any,  # noqa: ANN401
     ) -> Iterator[Environment]:
         """Fly as `fly` does, and let the test act in flight; its end waits for the mission's."""
-        path = self.write(content or FLAT)
+        content = content or FLAT
+        path = self.write(content)
+        if any(robot.get("driver", "simulated") != "simulated" for robot in content["robots"]):
+            self._begin_ray()
         with self.options(**words):
             environment = Environment(path)
             build(environment)
@@ -99,6 +106,10 @@ class Flyer:
                 run.abandon()
                 raise
             run.wait()
+
+    def _begin_ray(self) -> None:
+        if self._start_ray is not None:
+            self._start_ray()
 
 
 def recorded(run: Run) -> RecordedFlight:
