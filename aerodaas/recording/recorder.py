@@ -7,7 +7,7 @@ has no publish time and does not report a full disk.
 from __future__ import annotations
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -120,7 +120,8 @@ class FlightRecorder:
         self._most = 1 if live else _BATCH
         self._batching = threading.Lock()
         """Held to add to the batch, and to pass it on; taken before the other lock."""
-        self._ahead = threading.Semaphore(_AHEAD)
+        self._passed_on: deque[Future[None]] = deque()
+        """Batches of which it is not known yet that they are written."""
         self._thread = ThreadPoolExecutor(1, "recorder")
         self._closing = threading.Event()
         try:
@@ -171,7 +172,7 @@ class FlightRecorder:
         self._flusher.join()
         with self._batching:
             if self._summary is None:
-                self._pass_on()
+                self._thread.submit(self._write_batch, self._batch)
                 self._thread.shutdown()
                 with self._lock:
                     self._summary = self._finish()
@@ -195,19 +196,21 @@ class FlightRecorder:
                 self._pass_on().result()
 
     def _pass_on(self) -> Future[None]:
-        """Have the thread write the batch; the result is there once that is done."""
-        self._ahead.acquire()
+        """Have the thread write the batch; the result is there once that is done.
+
+        Raises what writing an earlier batch has raised, which is an error of this program.
+        """
+        if len(self._passed_on) >= _AHEAD:
+            self._passed_on.popleft().result()
         batch, self._batch = self._batch, []
-        return self._thread.submit(self._write_batch, batch)
+        self._passed_on.append(self._thread.submit(self._write_batch, batch))
+        return self._passed_on[-1]
 
     def _write_batch(self, batch: list[Message[Any]]) -> None:
-        try:
-            for message in batch:
-                entries = self._entries(message)
-                with self._lock:
-                    self._add(entries, message)
-        finally:
-            self._ahead.release()
+        for message in batch:
+            entries = self._entries(message)
+            with self._lock:
+                self._add(entries, message)
 
     def _write_drops(self, stream: str, count: int) -> None:
         with self._lock:
