@@ -316,10 +316,10 @@ class Flight:
             # Before they start: the application may be killed at any time.
             self._inform_reaper()
             self._prepare(fresh, lambda _: None)
-            for name, nodes in change.joining.items():
-                member = self._members[name]
-                member.info = ask(member.handle.join.remote(*nodes), _PREPARE_TIMEOUT)
-                member.setup += nodes
+            for actor in change.joining:
+                member = self._members[actor.name]
+                member.info = ask(member.handle.join.remote(*actor.nodes), _PREPARE_TIMEOUT)
+                member.setup += actor.nodes
         except BaseException:
             for name in set(self._members) - known:
                 ray.kill(self._members[name].handle)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from aerodaas.config.options import RunOptions
 from aerodaas.types.errors import ConfigError
@@ -12,7 +12,13 @@ if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
     from aerodaas.protocol.schemas import MissionOut
 
-__all__ = ["build_application", "run_application", "speed_option", "submit_application"]
+__all__ = [
+    "build_application",
+    "run_application",
+    "runtime_option",
+    "speed_option",
+    "submit_application",
+]
 
 
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
@@ -61,6 +67,15 @@ def submit_application(application: Path, words: list[str], options: RunOptions)
         raise ConfigError(f"{application} is flown by no provider: name one")
     written = compile_mission(environment, application.stem)
     return submit(environment.provider, written.document, written.models, options)
+
+
+def runtime_option(text: str | None) -> Literal["inline", "ray"] | None:
+    """Read `--runtime`; raises ConfigError for one that there is not."""
+    if text is None or text == "inline":
+        return text
+    if text == "ray":
+        return "ray"
+    raise ConfigError(f"--runtime is inline or ray, not {text!r}")
 
 
 def speed_option(text: str | None) -> tuple[float | None, bool | None]:

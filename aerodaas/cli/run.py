@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.application import run_application, speed_option
+from aerodaas.cli.application import run_application, runtime_option, speed_option
 from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
@@ -31,6 +31,13 @@ def run(
             help="Mission seconds per wall second, or `max`: as fast as the machine goes, "
             "repeatable to the last digit. Default: `max` if every robot is simulated and there "
             "is no --console, else 1."
+        ),
+    ] = None,
+    runtime: Annotated[
+        str | None,
+        typer.Option(
+            help="Where the parts of a flight in simulated time run: `inline`, in this process "
+            "(default), or `ray`, cameras and analyses each in a process of its own."
         ),
     ] = None,
     record: Annotated[
@@ -131,6 +138,7 @@ def run(
         environment=env,
         speed=factor,
         lockstep=lockstep,
+        runtime=runtime_option(runtime),
         seed=seed,
         scheduler=scheduler,
         record=record,

@@ -79,6 +79,9 @@ class RunOptions:
     """Mission seconds per wall second."""
     lockstep: bool | None = None
     """Simulated time as fast as the machine goes; None: where all robots are simulated."""
+    runtime: Literal["inline", "ray"] | None = None
+    """Where cameras and analyses run in simulated time: in the application's process, or in actors
+    on Ray; None: inline, unless `address` names a cluster."""
     seed: int | None = None
     record: Path | None = None
     """Folder for the recording, the plots and the summary."""

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.config.extras import require_extra
@@ -49,7 +50,7 @@ if TYPE_CHECKING:
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
     from aerodaas.terminal.console import FlightView
 
-MakeFlight: TypeAlias = "type[Flight | InlineFlight]"
+MakeFlight: TypeAlias = "Callable[..., Flight | InlineFlight]"
 
 __all__ = ["Run"]
 
@@ -100,9 +101,18 @@ class Run:
         return simulated and self.options.speed is None if wanted is None else wanted
 
     @property
-    def _inline(self) -> bool:
-        """Whether the nodes are stepped in this process."""
-        return self.lockstep
+    def _everything_on_ray(self) -> bool:
+        """Whether every camera and analysis of a flight runs in an actor."""
+        options = self.options
+        return not self.lockstep or options.runtime == "ray" or options.address is not None
+
+    @property
+    def _uses_ray(self) -> bool:
+        """Whether anything of a flight runs in an actor: a part with its own environment does."""
+        own = self.config.runtime_env
+        nodes = self.graph.nodes.values()
+        isolated = (node.runtime_env or told(node.id, own) for node in nodes)
+        return self._everything_on_ray or any(env is not None for env in isolated)
 
     def start(self) -> None:
         """Start all nodes; raises the project's errors, with nothing left running."""
@@ -167,19 +177,27 @@ class Run:
 
     def _runtime(self, begin_step: Callable[[str], None]) -> MakeFlight:
         """The class of the flight: in this process, or on Ray, which is then started."""
-        if self._inline:
-            from aerodaas.runtime.inline_flight import InlineFlight  # noqa: PLC0415
+        if self._uses_ray:
+            self._connect(begin_step)
+        if not self.lockstep:
+            from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads ray
 
+            return Flight
+        from aerodaas.runtime.inline_flight import InlineFlight  # noqa: PLC0415
+
+        if not self._uses_ray:
             return InlineFlight
+        from aerodaas.actors.node_proxy import Proxies  # noqa: PLC0415 - loads ray
+
+        return partial(InlineFlight, proxies=Proxies(everything=self._everything_on_ray))
+
+    def _connect(self, begin_step: Callable[[str], None]) -> None:
         from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
             ray_cluster as cluster,
         )
 
         cluster.begin(self.options.address)
-        from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
-
         cluster.connect(self.options.address, begin_step)
-        return Flight
 
     def _check_served(self) -> None:
         """Raise ConfigError for what cannot be served to others while flying."""
@@ -390,7 +408,7 @@ class Run:
         used = (environment.trajectory_scheduler(), environment.analytics_scheduler(), *others)
         plugins = [one for one in used if one is not None]
         application = None
-        if not self._inline:
+        if self._uses_ray:
             from aerodaas.actors.run.application import capture  # noqa: PLC0415
 
             application = capture(self.graph, self.config, *plugins)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, FlightPlan
 from aerodaas.types.errors import GraphError
@@ -22,8 +21,8 @@ class Growth:
     """Running cameras whose last image now ends, or no longer ends, the mission, by stream."""
     analyses: tuple[AnalyticsActorPlan, ...]
     """Analytics actors to be started."""
-    joining: dict[str, tuple[AnalysisSpec, ...]]
-    """Analyses that join a running actor, by its name."""
+    joining: tuple[AnalyticsActorPlan, ...]
+    """Analyses that join running actors of these names."""
     drones: tuple[tuple[RobotSpec, ...], ...]
     """All robots of the new plan, by actor."""
     recorded: dict[str, int]
@@ -40,10 +39,11 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
     running = {node.stream for actor in old.analyses for node in actor.nodes}
     known = {actor.name for actor in old.analyses}
     ended = {camera.stream: camera.ends for camera in old.cameras}
-    fresh = [
-        (actor, tuple(node for node in actor.nodes if node.stream not in running))
+    added = [
+        replace(actor, nodes=tuple(node for node in actor.nodes if node.stream not in running))
         for actor in new.analyses
     ]
+    added = [actor for actor in added if actor.nodes]
     return Growth(
         cameras=tuple(one for one in new.cameras if one.stream not in ended),
         ending={
@@ -51,12 +51,8 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
             for one in new.cameras
             if one.stream in ended and ended[one.stream] != one.ends
         },
-        analyses=tuple(
-            replace(actor, nodes=nodes)
-            for actor, nodes in fresh
-            if nodes and actor.name not in known
-        ),
-        joining={actor.name: nodes for actor, nodes in fresh if nodes and actor.name in known},
+        analyses=tuple(actor for actor in added if actor.name not in known),
+        joining=tuple(actor for actor in added if actor.name in known),
         drones=new.drones,
         recorded={
             stream: depth for stream, depth in new.recorded.items() if stream not in old.recorded

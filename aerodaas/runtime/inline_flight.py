@@ -7,9 +7,10 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from typing_extensions import Self
 
@@ -17,7 +18,7 @@ from aerodaas.config.options import LiveViews
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.planner import InlinePlanner, Planner
 from aerodaas.recording.provenance import Provenance
-from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
+from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
@@ -27,10 +28,10 @@ from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.node import NEVER, Node
-from aerodaas.runtime.plan import Cameras, FlightPlan
+from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, FlightPlan
 from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
-from aerodaas.runtime.session import MESSAGE_DEPTH
+from aerodaas.runtime.session import MESSAGE_DEPTH, Session
 from aerodaas.runtime.stream_names import alert_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.data import Alert, Header
@@ -45,6 +46,20 @@ _REPORT_INTERVAL = 0.02
 _VITALS_INTERVAL = 0.5
 """Wall seconds between two recorded readings of the process' vitals."""
 _NOTES_KEPT = 50
+
+
+class Proxies(Protocol):
+    """Maker of proxies for nodes that run in processes of their own."""
+
+    def camera(self, session: Session, camera: Cameras) -> Node | None:
+        """Proxy of a camera; None if it runs in this process."""
+        ...
+
+    def analysis(
+        self, session: Session, actor: AnalyticsActorPlan, spec: AnalysisSpec
+    ) -> Node | None:
+        """Proxy of an analysis of `actor`; None if it runs in this process."""
+        ...
 
 
 class InlineFlight:
@@ -62,6 +77,7 @@ class InlineFlight:
         recording: Path | None = None,
         provenance: Provenance | None = None,
         live: LiveViews | None = None,
+        proxies: Proxies | None = None,
     ) -> None:
         """Create the nodes of `plan`.
 
@@ -70,18 +86,21 @@ class InlineFlight:
             recording: Path of the MCAP file; None for none.
             provenance: Versions, configuration and application, for the recording.
             live: Who looks on at what is recorded.
+            proxies: Makes proxies of nodes that run in processes of their own; None for none.
         """
         self.plan = plan
+        self._proxies = proxies
         self._executor = InlineExecutor()
         self._drone: DroneNode | None = None
-        self._cameras: dict[str, CameraNode] = {}
-        self._analyses: list[AnalysisNode] = []
+        self._cameras: dict[str, Node] = {}
+        self._analyses: dict[str, Node] = {}
+        """By the stream of their results, in the order of the plan."""
         self._dispatcher: SimulatedDispatcher | None = None
         self._recorder: RecorderNode | None = None
         for camera in plan.cameras:
             self._add_camera(camera)
         for actor in plan.analyses:
-            self._add_analyses(actor.name, actor.nodes)
+            self._add_analyses(actor)
         if plan.dispatch is not None:
             scheduler = copy.deepcopy(plan.dispatch.scheduler)
             managed, resources = plan.dispatch.managed, plan.dispatch.resources
@@ -109,29 +128,30 @@ class InlineFlight:
         """What of the robots the application is told at once."""
         self._notes: list[Alert] = []
 
-    def _add_camera(self, camera: Cameras) -> CameraNode:
-        node = camera.make(self.plan.session)
+    def _add_camera(self, camera: Cameras) -> Node:
+        node = self._proxies.camera(self.plan.session, camera) if self._proxies else None
+        node = node or camera.make(self.plan.session)
         self._cameras[camera.stream] = node
         self._executor.add(f"sensor/{camera.stream}", [node])
         return node
 
-    def _add_analyses(self, part: str, specs: Sequence[AnalysisSpec]) -> list[AnalysisNode]:
+    def _add_analyses(self, actor: AnalyticsActorPlan) -> list[Node]:
+        session, nodes = self.plan.session, {}
         # A flight works with copies, as actors do: the application's own objects stay as they are.
         memo: dict[int, object] = {}
-        nodes = [
-            AnalysisNode(self.plan.session, replace(spec, work=copy.deepcopy(spec.work, memo)))
-            for spec in specs
-        ]
-        self._analyses += nodes
-        self._executor.add(part, nodes)
-        return nodes
+        for spec in actor.nodes:
+            proxy = self._proxies.analysis(session, actor, spec) if self._proxies else None
+            own = replace(spec, work=copy.deepcopy(spec.work, memo))
+            nodes[spec.stream] = proxy or own.make(session)
+        self._analyses |= nodes
+        self._executor.add(actor.name, nodes.values())
+        return list(nodes.values())
 
     def _nodes(self) -> list[Node]:
         """All nodes in the order in which ready ones are stepped."""
-        last = [
-            node for node in (self._dispatcher, self._drone, self._recorder) if node is not None
-        ]
-        return [*self._cameras.values(), *_by_dependence(self._analyses), *last]
+        last = (self._dispatcher, self._drone, self._recorder)
+        analyses = _by_dependence(self._analyses)
+        return [*self._cameras.values(), *analyses, *(node for node in last if node is not None)]
 
     def __enter__(self) -> Self:
         """Return the flight, which is stopped on exit."""
@@ -194,10 +214,10 @@ class InlineFlight:
         if self._drone is not None:
             failed = self._executor.parts[self._drone.name].phase == "failed"
             return failed or self._drone.over
-        cameras = self._cameras.items()
         return self._sensed or all(
-            self._executor.parts[f"sensor/{stream}"].phase == "failed" or camera.finished
-            for stream, camera in cameras
+            self._executor.parts[f"sensor/{stream}"].phase == "failed"
+            or camera.values().get("finished")
+            for stream, camera in self._cameras.items()
         )
 
     def _record_vitals(self) -> None:
@@ -288,9 +308,8 @@ class InlineFlight:
         fresh: list[Node] = []
         try:
             fresh += map(self._add_camera, change.cameras)
-            groups = {actor.name: actor.nodes for actor in change.analyses}
-            for part, specs in (*groups.items(), *change.joining.items()):
-                fresh += self._add_analyses(part, specs)
+            for actor in (*change.analyses, *change.joining):
+                fresh += self._add_analyses(actor)
             executor.order(self._nodes())
             executor.open(fresh)
         except BaseException:
@@ -300,10 +319,14 @@ class InlineFlight:
             self._cameras = {
                 stream: node for stream, node in self._cameras.items() if node not in fresh
             }
-            self._analyses = [node for node in self._analyses if node not in fresh]
+            self._analyses = {
+                stream: node for stream, node in self._analyses.items() if node not in fresh
+            }
             raise
         for stream, ends in change.ending.items():
-            self._cameras[stream].ends = ends
+            camera = self._cameras[stream]
+            if isinstance(camera, CameraNode):
+                camera.ends = ends
         if self._drone is not None:
             for specs in change.drones:
                 self._drone.grow(specs, plan.observed, executor.clock.now())
@@ -344,18 +367,17 @@ def _planner_maker() -> Callable[[RobotSpec, TrajectoryScheduler], Planner]:
     return lambda _, scheduler: InlinePlanner(copy.deepcopy(scheduler, memo))
 
 
-def _by_dependence(nodes: Sequence[AnalysisNode]) -> list[AnalysisNode]:
-    """The analyses, each after those whose results it reads."""
-    ordered: list[AnalysisNode] = []
-    by_stream = {node.spec.stream: node for node in nodes}
+def _by_dependence(nodes: Mapping[str, Node]) -> list[Node]:
+    """The analyses, by the stream of their results, each after those whose results it reads."""
+    ordered: list[Node] = []
 
-    def visit(node: AnalysisNode, above: frozenset[str]) -> None:
-        for stream in node.spec.inputs:
-            if stream in by_stream and stream not in above:
-                visit(by_stream[stream], above | {stream})
-        if node not in ordered:
-            ordered.append(node)
+    def visit(stream: str, above: frozenset[str]) -> None:
+        for source in nodes[stream].reads:
+            if source in nodes and source not in above:
+                visit(source, above | {source})
+        if nodes[stream] not in ordered:
+            ordered.append(nodes[stream])
 
-    for node in nodes:
-        visit(node, frozenset((node.spec.stream,)))
+    for stream in nodes:
+        visit(stream, frozenset((stream,)))
     return ordered
