@@ -1,7 +1,7 @@
 """One scripted autopilot for all MAVLink tests, on a clock that the test moves.
 
 `ScriptedAutopilot` is the peer: its script says what it answers, and to what it stays silent; it
-records what it received. `Bench` flies the driver against it, without threads and sockets.
+records what it received.
 """
 
 from __future__ import annotations
@@ -18,16 +18,15 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import pytest
 
-from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.state.phase import FlightMode
-from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire import link as link_module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.vehicle import VehicleMode, VelocitySetpoint
+from aerodaas.types.vehicle import VelocitySetpoint
 
 __all__ = [
     "ACCEPTED",
@@ -38,10 +37,10 @@ __all__ = [
     "MODE",
     "RISE",
     "SETPOINT",
+    "STEP",
     "STILL",
     "THERE",
     "Answer",
-    "Bench",
     "Family",
     "ScriptedAutopilot",
     "SteppedClock",
@@ -67,7 +66,7 @@ HERE: Peer = ("127.0.0.1", 14550)
 """Address of the scripted autopilot."""
 THERE: Peer = ("10.0.0.2", 14550)
 """Another address."""
-_STEP = 0.05
+STEP = 0.05
 _POSITION = {"px4": 3 << 16, "ardupilot": 5}
 """A pilot's mode, which keeps the position."""
 
@@ -109,7 +108,7 @@ def robot_of(port: int, **settings: Any) -> RobotConfig:  # noqa: ANN401
 class SteppedClock:
     """Seconds that the test moves: each of `turns` is called with the time, `step` apart."""
 
-    def __init__(self, step: float = _STEP) -> None:
+    def __init__(self, step: float = STEP) -> None:
         self.now = 1000.0
         self.step = step
         self.turns: list[Callable[[float], object]] = []
@@ -328,92 +327,3 @@ class ScriptedAutopilot:
         if self.family == "px4":
             return [driver.mode(int(one.param2) << 16 | int(one.param3) << 24) for one in asked]
         return [driver.mode(int(one.param2)) for one in asked]
-
-
-class Bench:
-    """The driver of one robot, and the scripted autopilot that it flies, on one clock."""
-
-    def __init__(
-        self,
-        monkeypatch: pytest.MonkeyPatch,
-        autopilot: ScriptedAutopilot | None = None,
-        **settings: Any,  # noqa: ANN401
-    ) -> None:
-        self.autopilot = autopilot or ScriptedAutopilot()
-        self.clock = self.autopilot.clock
-        self.clock.drive(monkeypatch)
-        self.clock.turns.insert(0, self.autopilot.speak)
-        monkeypatch.setattr(link_module, "open_transport", lambda *_: self.autopilot.wire)
-        home = settings.pop("home", None)
-        self.robot = robot_of(1, **{"failsafes": "ignore", "fallback": "ignore", **settings})
-        environment = {"robots": [self.robot], **({"home": home} if home else {})}
-        self.vehicle = MavlinkVehicle(self.robot, EnvironmentConfig.model_validate(environment))
-
-    @property
-    def now(self) -> float:
-        """Seconds of the clock."""
-        return self.clock.now
-
-    def connect(self) -> None:
-        """Connect, and forget what was received until then."""
-        self.vehicle.connect(5.0)
-        self.clock.advance(1.0)
-        self.autopilot.received.clear()
-
-    def close(self) -> None:
-        """Let go of a vehicle that neither speaks nor answers any more."""
-        self.hush()
-        self.vehicle.close()
-
-    def turn(self, seconds: float = _STEP) -> VehicleMode:
-        """Turn the control loop for a while; the mode that it reads at last."""
-        mode = self.vehicle.read().mode
-        for _ in range(round(seconds / _STEP)):
-            self.clock.advance(_STEP)
-            mode = self.vehicle.read().mode
-        return mode
-
-    def hush(self, *, off: bool = False) -> None:
-        """Have the autopilot say nothing at all, or speak again."""
-        self.autopilot.speaks, self.autopilot.result = off, ACCEPTED if off else None
-
-    def fly(self, height: float = 5.0, mode: FlightMode = FlightMode.HOLD) -> None:
-        """Be found in the air, `height` metres above where it was armed, after a take-off."""
-        self.vehicle.take_off(height)
-        self.autopilot.mode = FlightMode.HOLD if self.autopilot.family == "px4" else mode
-        self.turn(0.2)
-        self.lift()
-        self.rise(height)
-        self.autopilot.mode = mode
-        self.turn(0.5)
-        self.autopilot.received.clear()
-
-    def lift(self) -> None:
-        """Start its motors, and leave the ground in the mode of a take-off."""
-        self.autopilot.armed = True
-        self.turn(0.2)
-        if self.autopilot.family == "px4":
-            self.autopilot.mode = FlightMode.TAKE_OFF
-        self.autopilot.landed = mavlink.MAV_LANDED_STATE_IN_AIR
-
-    def rise(self, metres: float) -> None:
-        """Rise at 2 m/s, and stop there."""
-        self.autopilot.velocity = np.array([0.0, 0.0, -2.0])
-        for _ in range(round(10 * metres)):
-            self.autopilot.position = self.autopilot.position - np.array([0.0, 0.0, 0.1])
-            self.turn()
-        self.autopilot.velocity = np.zeros(3)
-        self.turn()
-
-    def guide(self) -> None:
-        """Fly, and follow a stream of setpoints."""
-        self.fly()
-        for _ in range(40):
-            self.vehicle.send(STILL)
-            self.turn()
-        self.autopilot.mode = FlightMode.GUIDED
-        for _ in range(5):
-            self.vehicle.send(STILL)
-            self.turn()
-        assert self.turn() is VehicleMode.GUIDED
-        self.autopilot.received.clear()

@@ -53,7 +53,7 @@ __all__ = [
 
 LOOPBACK = "127.0.0.1"
 FAMILIES = ("px4", "ardupilot")
-_STEP = 0.01
+_STEP = 0.025
 """Seconds between two turns of both ends."""
 _TURN = 0.05
 """Seconds between two turns of the control loop."""

@@ -174,20 +174,6 @@ def test_a_picture_that_nothing_tells_of_is_lost(ends: Stepped, strike: object) 
         assert failure == PhotoFailure(number, "the camera does not tell of the picture")
 
 
-def test_a_survey_goes_on_where_messages_are_lost(ends: Stepped) -> None:
-    """Each picture is counted; the camera is free for the next one in seconds."""
-    stops = [
-        Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
-        Waypoint("b", 3, 3, 2, photo=True),
-    ]
-    with ends:
-        ready(ends)
-        payload(ends).mute = True
-        mission = ends.mission(stops, MissionConfig(photo_timeout=6.0), ends.vehicle).fly()
-        assert mission.status.photos == (2, 0)
-        assert told(mission, "photo") == []
-
-
 @given(
     image=st.integers(0, 255),
     video=st.integers(0, 255),

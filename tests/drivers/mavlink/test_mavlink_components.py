@@ -79,6 +79,7 @@ def _refuse(ends: Stepped) -> None:
     ends.autopilot.components[CAMERA].payload.camera_refuses = True
 
 
+@pytest.mark.parametrize("ends", ["ardupilot"], indirect=True)
 @pytest.mark.parametrize("strike", [_vanish, _stall, _lie, _refuse])
 def test_what_fails_in_flight_costs_the_second_picture_alone(
     ends: Stepped, strike: Callable[[Stepped], None]

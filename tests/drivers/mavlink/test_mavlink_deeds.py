@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from autopilot import ARM, DENIED, MODE, RISE, SETPOINT, STILL, Bench
+from autopilot import ARM, DENIED, MODE, RISE, SETPOINT, STILL
+from bench import Bench
 
 from aerodaas.drivers.mavlink.microservices.events import event_number
 from aerodaas.drivers.mavlink.state.phase import FlightMode

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from autopilot import Bench, Family, ScriptedAutopilot
+from autopilot import Family, ScriptedAutopilot
+from bench import Bench
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

@@ -26,7 +26,6 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
-from tools.mavlink_vehicle.store import PlanStore
 
 TESTS = Path(__file__).parents[2]
 ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
@@ -270,34 +269,28 @@ def test_the_way_home_takes_the_owners_mission_for_a_flight(flight: Flight) -> N
             assert vehicle.download_mission() == own
 
 
-class Faulty(PlanStore):
-    """Takes plans in the wrong way."""
+def spoil(ends: Stepped, fault: str) -> None:
+    """Have the autopilot take plans in the wrong way."""
+    store = ends.firmware.plans
+    whole = store.handle
 
-    def __init__(self, fault: str, autopilot: EmulatedAutopilot) -> None:
-        super().__init__()
-        self._fault = fault
-        self._autopilot = autopilot
-
-    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
-        """The answers, one of them false."""
-        kind = message.get_type()
-        uploads = kind == "MISSION_ITEM_INT"
-        if self._fault == "stalls" and uploads and message.seq == 2:
+    def handle(message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+        item = message.get_type() == "MISSION_ITEM_INT"
+        if item and message.seq == 2 and fault in {"stalls", "vanishes"}:
+            ends.autopilot.cut(off=fault == "vanishes")
             return []
-        if self._fault == "vanishes" and uploads and message.seq == 2:
-            self._autopilot.cut()
-            return []
-        if self._fault == "refuses" and uploads and message.command == 188:
+        if item and message.command == 188 and fault == "refuses":
             peer = (message.get_srcSystem(), message.get_srcComponent())
             unsupported = mavlink.MAV_MISSION_UNSUPPORTED
             return [mavlink.MAVLink_mission_ack_message(*peer, unsupported, message.mission_type)]
-        if self._fault == "moves" and uploads and message.seq == 2:
+        if item and message.seq == 2 and fault == "moves":
             message.x += 100
-        if self._fault == "shortens" and kind == "MISSION_ITEM_INT" and message.seq == 4:
-            answers = super().handle(message)
-            self.plans[message.mission_type].pop()
-            return answers
-        return super().handle(message)
+        answers = whole(message)
+        if item and message.seq == 4 and fault == "shortens":
+            store.plans[message.mission_type].pop()
+        return answers
+
+    store.handle = handle  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize(
@@ -315,7 +308,7 @@ def test_a_way_home_that_is_not_there_is_no_fallback(
 ) -> None:
     """The connection fails, so that nothing takes off, and the vehicle is as it was."""
     with flight(ARDUPILOT, fallback="set", way_home=WAY).unconnected() as ends:
-        ends.firmware.plans = store = Faulty(fault, ends.autopilot)
+        spoil(ends, fault)
         with pytest.raises(VehicleError, match=f"(?s){word}"):
             ends.vehicle.connect()
         assert not ends.vehicle.connected
@@ -324,7 +317,7 @@ def test_a_way_home_that_is_not_there_is_no_fallback(
         assert {name: held[name] for name in OWN} == OWN
         assert bool(list(state_folder.rglob("*.json"))) is (fault == "vanishes")
         if fault != "vanishes":
-            assert store.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []) == []
+            assert ends.firmware.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []) == []
 
 
 @pytest.mark.parametrize(

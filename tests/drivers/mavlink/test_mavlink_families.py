@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.autopilots.autopilot import ANYWHERE
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
@@ -87,38 +84,6 @@ def test_asking_for_a_mode(mode: FlightMode, px4: tuple[int, int], ardupilot: in
     assert list(order.values) == [1.0, ardupilot, 0.0, 0.0, 0.0, 0.0, 0.0]
     assert (order.mode, order.what) == (mode, f"mode {mode.value}")
     assert order.frame is None
-
-
-@pytest.mark.parametrize(("altitude", "goal"), [(488.5, 491.5), (None, 3.0), (-2.0, 1.0)])
-def test_px4_rises_to_an_altitude_above_the_sea(altitude: float | None, goal: float) -> None:
-    """From hold: armed, then 3 m above where it is; anywhere, and however it looks."""
-    telemetry = Telemetry()
-    telemetry.altitude = altitude
-    hold, arm, climb = PX4().take_off(3.0, telemetry)
-    assert hold.mode is FlightMode.HOLD
-    assert (arm.number, arm.values[0]) == (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-    assert climb.number == mavlink.MAV_CMD_NAV_TAKEOFF
-    assert climb.frame == mavlink.MAV_FRAME_GLOBAL
-    pitch, second, third, yaw, x, y, z = climb.values
-    assert math.isnan(pitch)
-    assert math.isnan(yaw)
-    assert (second, third) == (0.0, 0.0)
-    assert x == y == ANYWHERE == 2**31 - 1
-    assert z == goal
-    assert climb.mode is FlightMode.TAKE_OFF
-
-
-def test_ardupilot_rises_to_a_height_above_home() -> None:
-    """From guided; it takes the height as it is, wherever it stands above the sea."""
-    telemetry = Telemetry()
-    telemetry.altitude = 488.0
-    guided, arm, climb = ArduPilot().take_off(3.0, telemetry)
-    assert guided.mode is FlightMode.GUIDED
-    assert (arm.number, arm.values[0]) == (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-    assert climb.number == mavlink.MAV_CMD_NAV_TAKEOFF
-    assert climb.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-    assert climb.values == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0)
-    assert climb.what == PX4().take_off(3.0, telemetry)[2].what == "take off"
 
 
 @pytest.mark.parametrize(

@@ -90,9 +90,9 @@ class World:
         return bytes(content)
 
 
-def serving(content: bytes = CONTENT, kind: type[FileServer] = FileServer) -> FileServer:
+def serving(content: bytes = CONTENT) -> FileServer:
     """A server with one file."""
-    server = kind()
+    server = FileServer()
     server.files[PATH] = content
     return server
 
@@ -217,17 +217,10 @@ def test_a_server_that_stalls_is_told_with_the_byte() -> None:
         World(lambda _: []).read(len(CONTENT))
 
 
-class Doubtful(FileServer):
-    """Says that each file has ten bytes more."""
-
-    def size(self, name: str) -> int:
-        """More than there is."""
-        return super().size(name) + 10
-
-
-def test_a_size_that_is_a_lie() -> None:
+def test_a_size_that_is_a_lie(monkeypatch: pytest.MonkeyPatch) -> None:
     """More than there is, or another than what was listed."""
-    server = serving(kind=Doubtful)
+    server = serving()
+    monkeypatch.setattr(server, "size", lambda _: len(CONTENT) + 10)
     with pytest.raises(VehicleError, match="ends before byte 60010"):
         World(server.answer).read(60_010)
     with pytest.raises(VehicleError, match="60010 bytes, and was said to have 60000: it is still"):
@@ -285,21 +278,10 @@ def test_what_a_cut_link_left_open_is_closed_at_last() -> None:
     assert [one.opcode for one in world.sent[:6]] == [4, 4, 4, 4, 4, 2]
 
 
-class Inventive(FileServer):
-    """Tells of what it likes."""
-
-    told: tuple[bytes, ...] = ()
-
-    def listing(self, folder: str) -> list[bytes]:
-        """Whatever was set."""
-        del folder
-        return list(self.told)
-
-
 def names_told(*told: bytes) -> list[FtpEntry]:
     """What the client makes of a listing."""
-    server = Inventive()
-    server.told = told
+    server = FileServer()
+    server.listing = lambda _: list(told)  # type: ignore[method-assign]
     world = World(server.answer)
     return world.run(world.client.entries("/logs"))
 

@@ -20,6 +20,8 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
 from tools.mavlink_vehicle import AutopilotOptions
 
+NAN = float("nan")
+UNKNOWN = 65535
 WELL = 0x3F
 """Attitude, velocities and positions of an estimator."""
 HORIZONTAL = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
@@ -203,15 +205,6 @@ def test_a_gps_is_silent_after_four_seconds_of_others(gaps: int, *, silent: bool
     assert health.faults(15.0) == []
 
 
-def test_a_gap_in_what_is_heard_counts_as_one_second() -> None:
-    """Three gaps of ten seconds are three, the fourth four, the fifth more."""
-    health = Health()
-    health.take(gps(3), 0.0)
-    for gap in range(1, 6):
-        health.take(shaking(), 10.0 * gap)
-        assert bool(health.faults(10.0 * gap)) is (gap == 5)
-
-
 def test_a_fix_that_is_lost() -> None:
     """By what is left of it, if there ever was one; the attitude is a complaint of its own."""
     assert lasting(gps(3), gps(2)) == ["GPS: a fix in the plane only"]
@@ -301,16 +294,6 @@ def test_sensors_that_are_ill_are_all_named() -> None:
 CHECK, GPS = mavlink.MAV_SYS_STATUS_PREARM_CHECK, mavlink.MAV_SYS_STATUS_SENSOR_GPS
 GYRO = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
 SEQUENCE = itertools.count()
-
-
-def test_what_grows_slowly_is_told_in_steps() -> None:
-    """A text that changed with every metre would be told with every metre."""
-    health = Health()
-    told = set()
-    for tenth in range(1200):
-        health.take(estimator(along=tenth / 10), tenth / 10)
-        told |= set(health.faults(tenth / 10))
-    assert len(told) == 5
 
 
 def test_an_estimator_that_is_lost_leaves_no_position() -> None:
@@ -448,8 +431,33 @@ def test_what_px4_acts_for_is_told_before_what_a_mode_lacks() -> None:
     assert not px4.protection_reasons(telemetry, 200.0, 12.0)
 
 
-NAN = float("nan")
-UNKNOWN = 65535
+@pytest.mark.parametrize("family", ["px4", "ardupilot"])
+def test_a_connected_vehicle_tells_all_of_it(flight: Flight, family: str) -> None:
+    """As far as the emulated ones model it; without a connection it is an error."""
+    with flight(AutopilotOptions(family=family), fallback="report") as pair:  # type: ignore[arg-type]
+        pair.wait(lambda: pair.vehicle.health().vibration is not None)
+        pair.wait(lambda: pair.vehicle.health().estimator is not None)
+        told = pair.vehicle.health()
+        assert told.gps_fix is True
+        assert told.cells is None
+        assert told.silence is not None
+        assert told.silence < 1.0
+        assert told.clock == pytest.approx(1.8e9, abs=60.0)
+        assert told.stranded
+        pair.vehicle.close()
+        with pytest.raises(VehicleError, match="not connected"):
+            pair.vehicle.health()
+    with flight(AutopilotOptions(family=family)) as pair:  # type: ignore[arg-type]
+        assert pair.vehicle.health().stranded is None
+
+
+def test_a_gap_in_what_is_heard_counts_as_one_second() -> None:
+    """Three gaps of ten seconds are three, the fourth four, the fifth more."""
+    health = Health()
+    health.take(gps(3), 0.0)
+    for gap in range(1, 6):
+        health.take(shaking(), 10.0 * gap)
+        assert bool(health.faults(10.0 * gap)) is (gap == 5)
 
 
 def cells_of(cells: list[int], *more: int, number: int = 0) -> Any:  # noqa: ANN401 - pymavlink has no types
@@ -517,23 +525,3 @@ def test_vibration_and_fix() -> None:
         assert after(gps).gps_rtk == ("RTK fixed" if kind == 6 else "")
     nothing = after()
     assert (nothing.vibration, nothing.gps_fix, nothing.cells) == (None, None, None)
-
-
-@pytest.mark.parametrize("family", ["px4", "ardupilot"])
-def test_a_connected_vehicle_tells_all_of_it(flight: Flight, family: str) -> None:
-    """As far as the emulated ones model it; without a connection it is an error."""
-    with flight(AutopilotOptions(family=family), fallback="report") as pair:  # type: ignore[arg-type]
-        pair.wait(lambda: pair.vehicle.health().vibration is not None)
-        pair.wait(lambda: pair.vehicle.health().estimator is not None)
-        told = pair.vehicle.health()
-        assert told.gps_fix is True
-        assert told.cells is None
-        assert told.silence is not None
-        assert told.silence < 1.0
-        assert told.clock == pytest.approx(1.8e9, abs=60.0)
-        assert told.stranded
-        pair.vehicle.close()
-        with pytest.raises(VehicleError, match="not connected"):
-            pair.vehicle.health()
-    with flight(AutopilotOptions(family=family)) as pair:  # type: ignore[arg-type]
-        assert pair.vehicle.health().stranded is None

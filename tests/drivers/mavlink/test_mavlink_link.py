@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from autopilot import HERE, SETPOINT, THERE, Bench, Wire
+from autopilot import HERE, SETPOINT, THERE, Wire
+from bench import Bench
 from emulated import LOOPBACK, Flight, wait_for
 
 from aerodaas.config.secrets import MAVLINK_KEY
@@ -157,14 +158,6 @@ def test_it_answers_to_the_address_of_its_vehicle(world: World) -> None:
     assert peers == [(), (HERE, THERE), (HERE, THERE), (THERE,), (THERE,)]
 
 
-def test_what_is_sent_is_numbered(world: World) -> None:
-    """A byte that begins anew after 255."""
-    for _ in range(258):
-        world.link.send(BEAT)
-    assert [one.get_seq() for one in world.sent()] == [*range(256), 0, 1]
-    assert world.link.counts.sent == 258
-
-
 def test_who_waits_for_an_answer_gets_it(world: World) -> None:
     """By its name, of the vehicle only, for as long as it waits; several may."""
     world.link.adopt((1, 1), HERE, 100.0)
@@ -247,17 +240,6 @@ def test_everything_is_passed_on_both_ways(monkeypatch: pytest.MonkeyPatch) -> N
     world.link.close()
     assert world.wire.closed
     assert world.station.closed
-
-
-def test_without_a_station_nothing_is_passed_on(world: World) -> None:
-    """And closing lets the wire go."""
-    assert world.opened == [(MavlinkSettings().url, "d")]
-    world.says(BEAT)
-    world.link.turn(100.0)
-    assert world.station.sent == []
-    world.link.close()
-    assert world.wire.closed
-    assert not world.station.closed
 
 
 def forged(key: bytes | None = None, system: int = 1) -> bytes:

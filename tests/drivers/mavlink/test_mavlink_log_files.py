@@ -15,8 +15,6 @@ from aerodaas.testing.channel import Impairment
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.vehicle_log import LogEntry
 from tools.mavlink_vehicle import AutopilotOptions
-from tools.mavlink_vehicle.files import FileServer
-from tools.mavlink_vehicle.store import LogStore
 
 DATAFLASH = b"\xa3\x95\x80" + random.Random(1).randbytes(100_000)
 BEGAN = 1_800_000_000.0
@@ -32,20 +30,15 @@ def pair(flight: Flight) -> Iterator[Stepped]:
     """A vehicle on the ground with two logs, as numbers and as files."""
     with flight(ARDUPILOT) as ends:
         ends.watch(1.0)
-        put(ends, FileServer())
+        ends.firmware.files.files = {
+            "/APM/LOGS/00000006.BIN": DATAFLASH[:90],
+            PATH: DATAFLASH,
+            "/APM/LOGS/LASTLOG.TXT": b"7\n",
+        }
+        ends.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
+        ends.vehicle.telemetry.serves_files = True
+        ends.autopilot.heard.clear()
         yield ends
-
-
-def put(pair: Stepped, server: FileServer) -> None:
-    """Give the vehicle these files, and mend its link."""
-    pair.autopilot.spoil(up=Impairment(), down=Impairment())
-    server.files = {"/APM/LOGS/00000006.BIN": DATAFLASH[:90], PATH: DATAFLASH}
-    server.files["/APM/LOGS/LASTLOG.TXT"] = b"7\n"
-    firmware = pair.autopilot.firmware
-    firmware.files, firmware.logs = server, LogStore()
-    firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
-    pair.vehicle.telemetry.serves_files = True
-    pair.autopilot.heard.clear()
 
 
 def begins(pair: Stepped) -> list[int]:
@@ -115,55 +108,43 @@ def test_what_is_held_of_another_log_is_fetched_anew(
     assert 0 in begins(pair)
 
 
-class Liar(FileServer):
-    """Its checksums are of other files."""
-
-    def checksum(self, name: str) -> int:
-        """Wrong."""
-        return super().checksum(name) ^ 1
-
-
-def test_a_checksum_that_does_not_fit(pair: Stepped, tmp_path: Path) -> None:
+def test_a_checksum_that_does_not_fit(
+    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """No file is better than a wrong one."""
-    put(pair, Liar())
+    monkeypatch.setattr(pair.firmware.files, "checksum", lambda _: 1)
     with pytest.raises(VehicleError, match="has another checksum on the vehicle"):
         pair.vehicle.fetch_log(LOG, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-class Unsummed(FileServer):
-    """Knows no checksums."""
-
-    def answer(self, payload: bytes) -> list[bytes]:
-        """As to any command that it does not know."""
-        if payload[3] == mavlink.MAV_FTP_OPCODE_CALCFILECRC:
-            payload = payload[:3] + b"\x63" + payload[4:]
-            (reply,) = super().answer(payload)
-            return [reply[:5] + bytes([mavlink.MAV_FTP_OPCODE_CALCFILECRC]) + reply[6:]]
-        return super().answer(payload)
-
-
-def test_without_checksums_nothing_is_gone_on_with(pair: Stepped, tmp_path: Path) -> None:
+def test_without_checksums_nothing_is_gone_on_with(
+    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It comes whole, once more: what was held may be anything."""
-    put(pair, Unsummed())
+    server, crc = pair.firmware.files, mavlink.MAV_FTP_OPCODE_CALCFILECRC
+    whole = server.answer
+
+    def unsummed(payload: bytes) -> list[bytes]:
+        if payload[3] != crc:
+            return whole(payload)
+        (reply,) = whole(payload[:3] + b"\x63" + payload[4:])
+        return [reply[:5] + bytes([crc]) + reply[6:]]
+
+    monkeypatch.setattr(server, "answer", unsummed)
     assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
     (tmp_path / PART).write_bytes(b"\xff" * 99_000)
     assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
 
 
-class Escaping(FileServer):
-    """Has one file, whose name leads elsewhere."""
-
-    def listing(self, folder: str) -> list[bytes]:
-        """A way out."""
-        del folder
-        size = len(DATAFLASH)
-        return [f"F../../../{name}.bin\t{size}".encode() for name in ("x", "APM/LOGS/00000007")]
-
-
-def test_a_path_out_of_the_folder_is_not_gone(pair: Stepped, tmp_path: Path) -> None:
+def test_a_path_out_of_the_folder_is_not_gone(
+    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It is no file of ours; the log comes by its number, into the folder."""
-    put(pair, Escaping())
+    ways = [
+        f"F../../../{name}.bin\t{len(DATAFLASH)}".encode() for name in ("x", "APM/LOGS/00000007")
+    ]
+    monkeypatch.setattr(pair.firmware.files, "listing", lambda _: ways)
     folder = tmp_path / "a" / "b" / "c" / "d"
     file = pair.vehicle.fetch_log(LOG, folder)
     assert file == folder / NAME
@@ -187,18 +168,9 @@ def written(pair: Stepped) -> None:
     pair.autopilot.firmware.files.files[PATH] = DATAFLASH + b"more"
 
 
-class Mute(FileServer):
-    """Never answers."""
-
-    def answer(self, payload: bytes) -> list[bytes]:
-        """Nothing."""
-        del payload
-        return []
-
-
 def silent(pair: Stepped) -> None:
     """It says that it has the service, and does not answer."""
-    put(pair, Mute())
+    pair.firmware.files.answer = lambda _: []  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize("lacks", [no_service, twins, written, silent])
@@ -230,3 +202,17 @@ def test_a_pilot_takes_off_in_between(pair: Stepped, tmp_path: Path, *, files: b
     assert max(asked) < 72_000
     connection.commander.give(connection.autopilot.disarm(), now=pair.now)
     pair.wait(lambda: not pair.vehicle.read().armed)
+
+
+def test_px4_has_a_folder_for_each_day(flight: Flight, tmp_path: Path) -> None:
+    """On its card."""
+    ulog = b"ULog\x01\x12\x35" + random.Random(2).randbytes(5_000)
+    with flight() as pair:
+        pair.autopilot.firmware.files.files = {
+            "/fs/microsd/log/2027-01-14/07_00_00.ulg": ulog[:90],
+            "/fs/microsd/log/2027-01-15/08_00_00.ulg": ulog,
+        }
+        file = pair.vehicle.fetch_log(LogEntry(0, len(ulog), None), tmp_path)
+        assert not pair.heard("LOG_REQUEST_DATA")
+    assert file.name == "log-0.ulg"
+    assert file.read_bytes() == ulog

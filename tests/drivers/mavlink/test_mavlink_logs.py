@@ -70,20 +70,6 @@ def test_px4_has_its_own_format(flight: Flight, tmp_path: Path) -> None:
     assert file.read_bytes() == ULOG
 
 
-class Faulty(LogStore):
-    """Answers through `spoil`."""
-
-    def __init__(self, logs: dict[int, bytes], spoil: Callable[[Any], Any]) -> None:
-        super().__init__()
-        self.logs = logs
-        self._spoil = spoil
-
-    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
-        """The answers that are left."""
-        answers = [self._spoil(answer) for answer in super().handle(message)]
-        return [answer for answer in answers if answer is not None]
-
-
 def stalls(message: Any) -> Any:  # noqa: ANN401
     """Nothing after a while."""
     return message if getattr(message, "ofs", 0) < 40_000 else None
@@ -111,10 +97,21 @@ def forgets(message: Any) -> Any:  # noqa: ANN401
     ],
 )
 def test_what_goes_wrong_is_said_and_leaves_no_file(
-    pair: Stepped, tmp_path: Path, spoil: Callable[[Any], Any], said: str
+    monkeypatch: pytest.MonkeyPatch,
+    pair: Stepped,
+    tmp_path: Path,
+    spoil: Callable[[Any], Any],
+    said: str,
 ) -> None:
     """Neither half a log, nor an endless wait."""
-    pair.autopilot.firmware.logs = Faulty({1: DATAFLASH[:90], 2: DATAFLASH}, spoil)
+    store = pair.firmware.logs
+    whole = store.handle
+
+    def handle(message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+        answers = map(spoil, whole(message))
+        return [answer for answer in answers if answer is not None]
+
+    monkeypatch.setattr(store, "handle", handle)
     with pytest.raises(VehicleError, match=said):
         pair.vehicle.fetch_log(pair.vehicle.logs()[1], tmp_path)
     assert list(tmp_path.iterdir()) == []

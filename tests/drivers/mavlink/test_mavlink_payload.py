@@ -83,16 +83,6 @@ def test_a_picture_has_the_autopilots_place(ends: Stepped) -> None:
         assert len(carried(ends).taken) == 2
 
 
-def test_a_picture_that_nobody_asked_for_is_told_too(ends: Stepped) -> None:
-    """Such as one by the pilot's switch, or by the autopilot's own distance trigger."""
-    with ends:
-        ends.find_payload()
-        carried(ends)._take()
-        photo = ends.photo_outcome()
-        assert isinstance(photo, Photo)
-        assert photo.number is None
-
-
 @pytest.mark.parametrize(
     ("fault", "said"),
     [("camera_refuses", "failed"), ("blind", "does not tell of the picture")],
@@ -222,6 +212,7 @@ def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
         assert [photo.label for photo in (first, second)] == ["a", "b"]
 
 
+@pytest.mark.parametrize("ends", ["px4"], indirect=True)
 @pytest.mark.parametrize("fault", ["stuck", "nonsense", "blind", "gone", "camera_refuses"])
 def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, fault: str) -> None:
     """It is told, and the drone flies on, comes home and lands."""

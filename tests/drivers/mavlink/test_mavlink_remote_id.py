@@ -7,7 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from autopilot import HERE, Bench
+from autopilot import HERE
+from bench import Bench
 from emulated import FAMILIES, Stepped
 
 from aerodaas.config.remote_id import RemoteIdConfig
@@ -335,3 +336,14 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
     assert bench.vehicle.health().remote_id == ""
     assert math.isclose(bench.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
     bench.close()
+
+
+def test_a_fixed_place_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever the drone is."""
+    place = {"latitude": -35.5, "longitude": 149.25, "altitude": 600.0}
+    with ends_of(monkeypatch, remote_id={**WHO, "operator": place}) as ends:
+        ends.watch(3.0)
+        system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
+        assert system.operator_location_type == mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_FIXED
+        assert (system.operator_latitude, system.operator_longitude) == (-355000000, 1492500000)
+        assert system.operator_altitude_geo == 600.0

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from autopilot import DENIED, STILL, Bench
+from autopilot import DENIED, STILL
+from bench import Bench
 
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,18 +24,6 @@ HERE: Peer = (LOOPBACK, 4)
 ELSEWHERE: Peer = (LOOPBACK, 5)
 
 
-class _Member:
-    """A vehicle's link that says nothing."""
-
-    key = None
-
-    def __init__(self) -> None:
-        self.pins = SenderPins(lambda: True)
-
-    def send(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        raise NotImplementedError
-
-
 class Shared:
     """Shares of a wire by system id."""
 
@@ -50,7 +39,7 @@ class Shared:
     def share(self, system: int, *, hears_all: bool = False) -> WireShare:
         """A share of the vehicle `system`."""
         name = f"robot{system}"
-        member = _Member()
+        member: Any = SimpleNamespace(pins=SenderPins(lambda: True), key=None)
         return share_wire(f"test:{id(self)}", name, system, member, self.open, hears_all=hears_all)
 
     def hear(self, *arrived: tuple[bytes, Peer]) -> list[list[tuple[bytes, Peer]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -107,31 +108,25 @@ def test_a_radio_may_speak_unsigned() -> None:
     assert sender(KEY).decode(bytearray(radio.pack(sender(None)))).get_type() == "RADIO_STATUS"
 
 
-class Clock:
-    """Time that passes by a tick with each look."""
-
-    now = 2_000_000_000.0
-
-    def __call__(self) -> float:
-        """The next tick."""
-        Clock.now += 1e-5
-        return Clock.now
+@pytest.fixture
+def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time passes by a tick with each look."""
+    ticks = itertools.count()
+    monkeypatch.setattr("time.time", lambda: 2e9 + next(ticks) * 1e-5)
 
 
-def test_a_hundred_runs_are_one_stream_to_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("ticking")
+def test_a_hundred_runs_are_one_stream_to_the_vehicle() -> None:
     """It remembers sixteen until it is started again; each run begins after the one before."""
-    monkeypatch.setattr("time.time", Clock())
     vehicle = sender(KEY)
     for _ in range(100):
         assert vehicle.decode(packet(KEY)).get_type() == "HEARTBEAT"
     assert len(vehicle.signing.stream_timestamps) == 1
 
 
-def test_two_processes_at_once_are_no_replay_of_each_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+@pytest.mark.usefixtures("ticking")
+def test_two_processes_at_once_are_no_replay_of_each_other() -> None:
     """A flight goes on being heard while the vehicle is looked at beside it, one packet each."""
-    monkeypatch.setattr("time.time", Clock())
     vehicle, flight = sender(KEY), sender(KEY)
     look = sender(KEY)
     for _ in range(50):
@@ -139,9 +134,9 @@ def test_two_processes_at_once_are_no_replay_of_each_other(
             assert vehicle.decode(bytearray(BEAT.pack(one))).get_type() == "HEARTBEAT"
 
 
-def test_a_vehicle_whose_clock_is_ahead_is_caught_up_with(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("ticking")
+def test_a_vehicle_whose_clock_is_ahead_is_caught_up_with() -> None:
     """What is signed after one of its packets is newer than that, though the clock is behind."""
-    monkeypatch.setattr("time.time", Clock())
     vehicle, ours = sender(KEY), sender(KEY)
     vehicle.signing.timestamp = ahead = ours.signing.timestamp + 3600 * 100_000
     ours.decode(bytearray(BEAT.pack(vehicle)))

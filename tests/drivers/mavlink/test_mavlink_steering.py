@@ -186,27 +186,6 @@ def test_a_stream_that_paused_is_heard_anew_before_the_mode() -> None:
     assert flight.asked == [(12.5, FlightMode.GUIDED)]
 
 
-@pytest.mark.parametrize("wish", [None, FlightMode.TAKE_OFF])
-def test_who_is_guided_already_is_not_asked_again(wish: FlightMode | None) -> None:
-    """ArduPilot takes off in its guided mode; what it shows then is what was wanted."""
-    flight = Guided(FlightMode.GUIDED)
-    if wish is not None:
-        flight.phase.ask(wish, 9.0)
-    flight.run(10.0, 10.95)
-    assert flight.phase.wish is wish
-    flight.run(11.0, 11.0)
-    assert flight.asked == []
-    assert flight.phase.wish is FlightMode.GUIDED
-
-
-def test_who_was_asked_to_hold_is_asked_for_guided_flight() -> None:
-    """Though its HEARTBEAT still shows the guided mode of before."""
-    flight = Guided(FlightMode.GUIDED)
-    flight.phase.ask(FlightMode.HOLD, 9.0)
-    flight.run(10.0, 11.0)
-    assert flight.asked == [(11.0, FlightMode.GUIDED)]
-
-
 def test_a_place_is_passed_no_faster_than_the_way_there_is_flown() -> None:
     """A setpoint is told as it was clipped."""
     asked = PositionSetpoint(vector(50.0, 0.0, 5.0), None, 9.0, 8.0, np.zeros(3))

@@ -14,10 +14,10 @@ from autopilot import (
     MODE,
     RISE,
     SETPOINT,
-    Bench,
     ScriptedAutopilot,
     acknowledgement,
 )
+from bench import Bench
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

@@ -134,22 +134,6 @@ def test_a_global_position_is_in_degrees_and_metres() -> None:
     assert {"place", "altitude"} <= unknown(telemetry)
 
 
-def test_a_gps_fix_in_our_units() -> None:
-    """Degrees, metres above the ellipsoid, or the sea where it does not say, metres of error."""
-    fix = told(gps()).gps
-    assert fix is not None
-    assert (fix.latitude, fix.longitude) == (47.5, -8.25)
-    assert fix.altitude == 535.123
-    assert (fix.horizontal_sigma, fix.vertical_sigma) == (1.5, 2.5)
-    assert fix.satellites == 9
-    unsaid = told(gps(satellites=255, ellipsoid=0)).gps
-    assert unsaid is not None
-    assert (unsaid.altitude, unsaid.satellites) == (488.0, 0)
-    most = told(gps(satellites=254)).gps
-    assert most is not None
-    assert most.satellites == 254
-
-
 @pytest.mark.parametrize(
     ("state", "on_ground"),
     [

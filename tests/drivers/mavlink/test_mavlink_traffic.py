@@ -137,20 +137,6 @@ def test_a_height_that_is_not_known_is_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("flags", "velocity"),
-    [
-        (ALL & ~4, [0.0, 0.0, -2.0]),
-        (ALL & ~8, [0.0, 0.0, -2.0]),
-        (ALL & ~128, [50.0, 0.0, 0.0]),
-    ],
-)
-def test_a_velocity_that_is_not_told_is_none(flags: int, velocity: list[float]) -> None:
-    """Course and speed belong together."""
-    (one,) = heard(flags=flags)
-    assert one.velocity.tolist() == pytest.approx(velocity)
-
-
-@pytest.mark.parametrize(
     ("callsign", "flags", "shown"),
     [
         (b"SWR12A", ALL, "SWR12A"),

@@ -22,16 +22,10 @@ EVERYTHING = bytes(range(256))
 """Each byte once: what a terminal would take for a line's end, an interrupt or a pause as well."""
 
 
-class Clock:
-    """A clock that the test moves."""
-
-    now = 50.0
-
-
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """The transports' clock."""
-    moved = Clock()
+    moved = SimpleNamespace(now=50.0)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: moved.now))
     return moved
 
@@ -100,7 +94,7 @@ def test_a_peer_that_was_away_is_heard_again() -> None:
     sender.close()
 
 
-def test_a_tcp_line_is_tried_again_each_second(clock: Clock) -> None:
+def test_a_tcp_line_is_tried_again_each_second(clock: SimpleNamespace) -> None:
     """While it is cut nothing is sent, nothing raises, and the server is left alone meanwhile."""
     with socket.create_server((HOST, 0)) as server:
         server.settimeout(5.0)
@@ -197,7 +191,9 @@ def test_a_full_tcp_line_gets_whole_packets() -> None:
         client.close()
 
 
-def test_a_serial_device_that_is_pulled_out_is_opened_again(clock: Clock, tmp_path: Path) -> None:
+def test_a_serial_device_that_is_pulled_out_is_opened_again(
+    clock: SimpleNamespace, tmp_path: Path
+) -> None:
     """A second after the cut and each second from then on; colons in its name are its own."""
     device = tmp_path / "pci-0000:00:14.0-usb-0:1.2"
     master, slave = os.openpty()
@@ -273,3 +269,38 @@ def test_a_port_that_there_is_not_is_no_other_port(kind: str) -> None:
     """65536 and more is refused: the system would take it for one less by so much."""
     with pytest.raises(ConfigError, match="99999 is too large, 65535 is the largest"):
         open_transport(f"{kind}:{HOST}:99999", "a")
+
+
+def test_a_tcp_line_that_is_reset_is_a_cut(clock: SimpleNamespace) -> None:
+    """A peer that ends the hard way raises nothing here."""
+    with socket.create_server((HOST, 0)) as server:
+        server.settimeout(5.0)
+        wire = open_transport(f"tcp:{HOST}:{server.getsockname()[1]}", "a")
+        client = server.accept()[0]
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
+        client.close()
+        assert heard(wire) == []
+        assert wire.fileno() == -1
+        clock.now += 2.0
+        wire.receive()
+        assert wire.fileno() != -1
+        wire.close()
+
+
+def test_a_full_serial_line_gets_whole_packets() -> None:
+    """What has no room is dropped whole: half a packet would take the next one with it."""
+    master, slave = os.openpty()
+    wire = open_transport(f"serial:{os.ttyname(slave)}:57600", "a")
+    packets, got = _numbered(3000), b""
+    os.set_blocking(master, False)
+    for number, packet in enumerate(packets):
+        wire.send(packet, ())
+        if number % 300 == 299:
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    got += os.read(master, 1000)
+    received = _whole(got)
+    assert 100 < len(received) < len(packets), "the line was never full"
+    wire.close()
+    for end in (master, slave):
+        os.close(end)
