@@ -54,7 +54,7 @@ def velocity_towards(
     It stops there, or passes it at `passing_speed` m/s. `speed` bounds it horizontally and `climb`
     vertically.
     """
-    x, y, z = (there - here for here, there in zip(position, target, strict=True))
+    x, y, z = target[0] - position[0], target[1] - position[1], target[2] - position[2]
     across = math.hypot(x, y)
     distance = math.hypot(across, z)
     if distance <= 0.0:

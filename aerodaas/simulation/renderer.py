@@ -77,7 +77,6 @@ class Renderer:
         self._scene = Scene(world, looks)
         self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
         self._pixels = self._open(self._eye, HAZE)
-        self._upside_down = np.empty((camera.height, camera.width, 3), np.uint8)
 
     def _open(self, eye: NodePath, clear: ArrayLike) -> Texture:
         """Open an offscreen buffer for the camera `eye`, and return its texture."""
@@ -123,11 +122,11 @@ class Renderer:
         self._eye.set_mat(LMatrix4f(*right, 0, *ahead, 0, *(-down), 0, x, y, z, 1))
         self._scene.update(time, (float(x), float(y), float(z)))
         self._engine.render_frame()
-        shape = (self._camera.height, self._camera.width, 4)
-        rendered = np.frombuffer(self._pixels.get_ram_image(), np.uint8).reshape(shape)
-        cv2.cvtColor(rendered, cv2.COLOR_BGRA2BGR, dst=self._upside_down)
-        picture = np.empty_like(self._upside_down) if into is None else into
-        cv2.flip(self._upside_down, 0, dst=picture)
+        height, width = self._camera.height, self._camera.width
+        rendered = np.frombuffer(self._pixels.get_ram_image(), np.uint8)
+        picture = np.empty((height, width, 3), np.uint8) if into is None else into
+        cv2.cvtColor(rendered.reshape(height, width, 4), cv2.COLOR_BGRA2BGR, dst=picture)
+        cv2.flip(picture, 0, dst=picture)
         return picture
 
     def depth(self) -> NDArray[np.uint16] | None:

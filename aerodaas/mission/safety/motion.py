@@ -53,7 +53,7 @@ class MotionWatch:
         self.carried_off = 0
         """How often the drone was found carried off, each time after the same patience."""
         self.drift = 0.0
-        """m/s along the ground that no command of the last seconds explains."""
+        """m/s along the ground that no command explained, when that was so last."""
         self._limits = limits
         self._setpoint: Setpoint | None = None
         self._commands: deque[tuple[int, float, float]] = deque()
@@ -116,10 +116,11 @@ class MotionWatch:
         return 0.0 if self._stands_since is None else seconds(self._now - self._stands_since)
 
     def _observe_drift(self, east: float, north: float) -> None:
-        self.drift = min(_beside(east, north, x, y) for _, x, y in self._commands)
-        if self.drift < _CARRIED:
+        # The newest first: nearly always it explains the motion.
+        if any(_beside(east, north, x, y) < _CARRIED for _, x, y in reversed(self._commands)):
             self._adrift_since = None
             return
+        self.drift = min(_beside(east, north, x, y) for _, x, y in self._commands)
         if self._adrift_since is None:
             self._adrift_since = self._now
             self._patience = _CARRIED_AFTER + self.drift / self._limits.max_acceleration
@@ -145,7 +146,7 @@ class MotionWatch:
 def _beside(east: float, north: float, x: float, y: float) -> float:
     """How far a velocity is from following the command (x, y) at up to `_FASTER` times its speed.
 
-    The setpoint loop asks it of each command of the last seconds, so it calculates with floats.
+    It calculates with floats, as the setpoint loop may ask it of each command of the last seconds.
     """
     squared = x * x + y * y
     share = min(max((east * x + north * y) / squared, 0.0), _FASTER) if squared else 0.0

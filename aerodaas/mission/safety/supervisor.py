@@ -107,14 +107,15 @@ class Supervisor:
 
     def assess(self, state: VehicleState, now: int) -> Assessment:
         """Assess `state`, read at `now` (mission clock, nanoseconds)."""
+        lost, located = self._is_lost(state, now), has_position(state)
         checks = (
             self._mode(state),
-            self._link(state, now),
-            self._position(state, now),
-            self._battery(state),
-            self._place(state, now),
-            self._ground(state),
-            *self._motion(state, now),
+            self._link(now, lost=lost),
+            self._position(state, now, lost=lost, located=located),
+            self._battery(state, located=located),
+            self._place(state, now, located=located),
+            self._ground(state, located=located),
+            *self._motion(state, now, known=located and not lost),
         )
         self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
@@ -167,8 +168,8 @@ class Supervisor:
             return Fault(FailsafeAction.RELEASE, "failsafe", text)
         return None
 
-    def _link(self, state: VehicleState, now: int) -> Fault | None:
-        if not self._is_lost(state, now):
+    def _link(self, now: int, *, lost: bool) -> Fault | None:
+        if not lost:
             self._lost_since = None
             return None
         if self._lost_since is None:
@@ -179,11 +180,13 @@ class Supervisor:
             return Fault(FailsafeAction.HOLD, "link_lost", what)
         return Fault(FailsafeAction.RETURN, "link_lost", f"{what} for {duration:.0f} s")
 
-    def _position(self, state: VehicleState, now: int) -> Fault | None:
+    def _position(
+        self, state: VehicleState, now: int, *, lost: bool, located: bool
+    ) -> Fault | None:
         """Judge by the time in touch alone: a silent vehicle may know its position."""
-        if self._is_lost(state, now):
+        if lost:
             return None
-        if has_position(state):
+        if located:
             self._blind_for = 0
             return None
         if self._assessed_at is not None and self._lost_since is None:
@@ -197,7 +200,7 @@ class Supervisor:
     def _is_lost(self, state: VehicleState, now: int) -> bool:
         return state.mode is VehicleMode.LOST or seconds(now - state.stamp) > self._STALE
 
-    def _battery(self, state: VehicleState) -> Fault | None:
+    def _battery(self, state: VehicleState, *, located: bool) -> Fault | None:
         limits, charge = self._limits, state.battery.fraction
         if not math.isfinite(charge):
             return Fault(
@@ -210,7 +213,7 @@ class Supervisor:
             return Fault(
                 FailsafeAction.RETURN, "battery_low", f"the battery is low at {charge:.0%}"
             )
-        if not has_position(state):
+        if not located:
             return None
         position = state.odometry.position
         needed = self._meter.way_home(position, self._home, limits.cruise_speed)
@@ -219,9 +222,9 @@ class Supervisor:
             return Fault(FailsafeAction.RETURN, "battery_low", text)
         return None
 
-    def _place(self, state: VehicleState, now: int) -> Fault | None:
+    def _place(self, state: VehicleState, now: int, *, located: bool) -> Fault | None:
         """Judge where the drone is: outside its fence the guard brings it back while it holds."""
-        where = self._outside(state.odometry.position) if has_position(state) else ""
+        where = self._outside(state.odometry.position) if located else ""
         if not where:
             self._outside_since = None
             return None
@@ -240,13 +243,13 @@ class Supervisor:
             return f"the drone is out of its range (limits.max_range), at {_place(position)}"
         return ""
 
-    def _motion(self, state: VehicleState, now: int) -> list[Fault]:
+    def _motion(self, state: VehicleState, now: int, *, known: bool) -> list[Fault]:
         """Judge whether the drone moves as commanded.
 
         One that is carried off goes home; where it is carried off on the way, too, or while it
         takes off, it lands.
         """
-        if self._is_lost(state, now) or not has_position(state):
+        if not known:
             self.motion.forget()
             return []
         self.motion.observe(state, now)
@@ -279,11 +282,9 @@ class Supervisor:
         ground = math.nan if self._clearance is None else self._clearance.ground.height(east, north)
         return up - (float(self._home[2]) if math.isnan(ground) else ground)
 
-    def _ground(self, state: VehicleState) -> Fault | None:
+    def _ground(self, state: VehicleState, *, located: bool) -> Fault | None:
         """Tell of a drone that is nearer to the ground on its way than it may be."""
-        if self._clearance is None or state.mode not in _GUARDED:
-            return None
-        if not has_position(state):
+        if self._clearance is None or state.mode not in _GUARDED or not located:
             return None
         position = state.odometry.position
         slack = np.array([0.0, 0.0, _SLACK])
