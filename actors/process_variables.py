@@ -15,14 +15,13 @@ from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import MAVLINK_KEY, is_secret_name
 
 __all__ = [
-    "AT_START",
     "ProcessVariables",
     "private_variables",
     "ray_variables",
     "vehicle_variables",
 ]
 
-AT_START = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
+_AT_START = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
 """Prefixes of variables that loaders, interpreters and libraries read as a process starts."""
 
 
@@ -71,4 +70,4 @@ def vehicle_variables() -> ProcessVariables:
 
 
 def _at_start(name: str) -> bool:
-    return name.startswith(AT_START) and not is_secret_name(name)
+    return name.startswith(_AT_START) and not is_secret_name(name)

@@ -27,7 +27,6 @@ own=${AERODAAS_OWN_ADDRESS:-$(hostname -I | cut -d' ' -f1)}
 # As clusters/onprem.yaml has them, which says why.
 export RAY_AUTH_MODE=token RAY_USAGE_STATS_ENABLED=0
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor RAY_max_direct_call_object_size=4194304
-export RAY_timeout_ms_task_wait_for_death_info=100
 # A new folder: one of a known name may be another user's. Those of former starts are ours to remove.
 find /tmp -maxdepth 1 -type d -user "$(id -u)" -name 'ray-control.*' -print0 | xargs -0r rm -rf
 control=$(mktemp -d /tmp/ray-control.XXXXXXXX)

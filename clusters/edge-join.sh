@@ -41,8 +41,6 @@ export RAY_gcs_rpc_server_reconnect_timeout_s="${RAY_gcs_rpc_server_reconnect_ti
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
 # A frame goes to the cloud in the call that it is for, instead of by a reference.
 export RAY_max_direct_call_object_size=4194304
-# The death of an actor is told a second earlier than Ray would.
-export RAY_timeout_ms_task_wait_for_death_info=100
 # No other mode but by AERODAAS_UNAUTHENTICATED=1, of which the greeting below warns.
 export RAY_AUTH_MODE=token
 [ "${AERODAAS_UNAUTHENTICATED:-}" != 1 ] || export RAY_AUTH_MODE=disabled

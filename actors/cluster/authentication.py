@@ -11,18 +11,11 @@ import stat
 import warnings
 from pathlib import Path
 
-import ray
-
-from aerodaas.actors.cluster.ray_internals import reread_variables
+from aerodaas.actors.cluster.ray_variables import AUTH_MODE, UNAUTHENTICATED
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
-__all__ = ["UNAUTHENTICATED", "make_token", "refusal", "require_authentication", "require_token"]
+__all__ = ["make_token", "refusal", "require_authentication", "require_token"]
 
-UNAUTHENTICATED = "AERODAAS_UNAUTHENTICATED"
-"""Environment variable that, set to 1, allows clusters without tokens."""
-_MODE = "RAY_AUTH_MODE"
-_OLDEST = (2, 52)
-"""The first release of Ray that has token authentication."""
 _ADVICE = (
     "copy the head's (`aerodaas cluster token` there tells its file) to ~/.ray/auth_token here, "
     "with mode 0600, or set RAY_AUTH_TOKEN_PATH to its file"
@@ -30,38 +23,33 @@ _ADVICE = (
 
 
 def require_authentication() -> bool:
-    """Switch Ray's token authentication on, for this process and those that it starts.
+    """Return whether Ray's token authentication is on, in this process and those that it starts.
 
-    Returns:
-        Whether it is on: only `AERODAAS_UNAUTHENTICATED=1` switches it off, with a warning.
+    The package `aerodaas.actors` switches it on before it imports Ray. Only
+    `AERODAAS_UNAUTHENTICATED=1` switches it off, with a warning.
 
     Raises:
-        AeroDaaSError: This Ray is too old to have it.
-        ConfigError: RAY_AUTH_MODE asks for another mode.
+        ConfigError: RAY_AUTH_MODE asks for another mode, or Ray was imported without one.
     """
-    release = tuple(int(part) for part in ray.__version__.split(".")[:2])
-    if release < _OLDEST:
-        raise AeroDaaSError(
-            f"Ray {ray.__version__} has no token authentication: whoever reaches its ports runs "
-            "code here; pip install 'ray>=2.52'"
-        )
-    before = os.environ.get(_MODE)
-    on = os.environ.get(UNAUTHENTICATED) != "1"
-    if on and (before or "token").lower() != "token":
-        raise ConfigError(
-            f"{_MODE}={before} would let all who reach Ray's ports run code as this user: unset "
-            f"it, or set {UNAUTHENTICATED}=1 if that is wanted"
-        )
-    if not on:
+    mode = os.environ.get(AUTH_MODE, "")
+    if os.environ.get(UNAUTHENTICATED) == "1":
         warnings.warn(
             f"{UNAUTHENTICATED}=1: Ray asks for no token, and all who reach its ports can run "
             "code as this user",
             stacklevel=2,
         )
-    os.environ[_MODE] = mode = "token" if on else "disabled"
-    if mode != before:
-        reread_variables()
-    return on
+        return mode.lower() == "token"
+    if not mode:
+        raise ConfigError(
+            "ray was imported before aerodaas, which requires its token: import aerodaas first, or "
+            f"set {AUTH_MODE}=token"
+        )
+    if mode.lower() != "token":
+        raise ConfigError(
+            f"{AUTH_MODE}={mode} would let all who reach Ray's ports run code as this user: unset "
+            f"it, or set {UNAUTHENTICATED}=1 if that is wanted"
+        )
+    return True
 
 
 def make_token() -> Path | None:

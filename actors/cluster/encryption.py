@@ -15,19 +15,29 @@ _FILES = ("RAY_TLS_SERVER_CERT", "RAY_TLS_SERVER_KEY", "RAY_TLS_CA_CERT")
 _ADVICE = "clusters/certificates.sh makes certificates, docs/cluster.md says where they belong"
 
 
-def require_same_encryption(address: str, listener: tuple[str, int]) -> None:
+def require_same_encryption(address: str, listener: tuple[str, int]) -> bool:
     """Check that both or neither of the cluster at `address` and this process use TLS.
 
-    `listener` is the cluster's host and port. Raises AeroDaaSError if only one uses TLS or does
-    not trust the other; ConfigError if this process's certificate files cannot be used.
+    Args:
+        address: The cluster's address as the user gave it.
+        listener: Its host and port.
+
+    Returns:
+        Whether both use TLS.
+
+    Raises:
+        AeroDaaSError: Only one uses TLS, or one does not trust the other.
+        ConfigError: This process's certificate files cannot be used.
     """
     if os.environ.get("RAY_USE_TLS", "0").lower() in {"1", "true"}:
         _shake_hands(address, listener, _our_context())
-    elif _speaks_tls(listener):
+        return True
+    if _speaks_tls(listener):
         raise AeroDaaSError(
             f"the cluster at {address} speaks TLS only: set RAY_USE_TLS=1 and {', '.join(_FILES)} "
             f"here; {_ADVICE}"
         )
+    return False
 
 
 def _our_context() -> ssl.SSLContext:

@@ -1,20 +1,16 @@
-"""Handshake with a cluster's head before Ray joins it: reachability, token and versions.
+"""Handshake with a cluster's head before Ray joins it: reachability, encryption and token.
 
-Ray reports a wrong token only after half a minute of repeated log lines, and other versions of
-itself with a traceback; a query of its head reports both at once.
+Ray tries for minutes to join a head that cannot be reached, and reports no wrong token.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import platform
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
-from typing import Any
-
-import ray
-from ray.exceptions import RayError, RpcError
 
 from aerodaas.actors.cluster.authentication import (
     refusal,
@@ -22,18 +18,23 @@ from aerodaas.actors.cluster.authentication import (
     require_token,
 )
 from aerodaas.actors.cluster.encryption import require_same_encryption
-from aerodaas.actors.cluster.ray_internals import cluster_metadata
+from aerodaas.actors.cluster.ray_process import RAY
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["greet", "hushed", "listener_of"]
+__all__ = ["HTTP2_PREFACE", "greet", "hushed", "listener_of", "reach"]
 
 _PROBE_SECONDS = 5.0
+_REFUSED = "InvalidAuthToken"
+"""Ray's name, on standard error, of the answer to a wrong token."""
+HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
+"""First bytes of an HTTP/2 client, with empty settings (RFC 9113, section 3.4)."""
+_SETTINGS_FRAME = 4
 
 
-def greet(address: str) -> None:
-    """Check that a cluster at `address` is reachable, accepts our token and runs our versions.
+def reach(address: str) -> None:
+    """Check that the head of a cluster at `address` is reachable and speaks as we do.
 
-    Also checks that both ends use TLS and trust each other, or neither does. Raises
+    Both ends use TLS and trust each other, or neither does; this user has a token. Raises
     AeroDaaSError with the remedy.
     """
     authenticated = require_authentication()
@@ -49,10 +50,34 @@ def greet(address: str) -> None:
         ) from None
     if address.startswith("ray://"):
         return
-    require_same_encryption(address, listener)
+    if not require_same_encryption(address, listener) and not _speaks_http2(listener):
+        raise AeroDaaSError(f"what listens at {address} is not the head of a Ray cluster")
     if authenticated:
         require_token(address)
-    _compare(address, _metadata(address))
+
+
+def greet(address: str) -> None:
+    """Check also, by `ray status`, that the cluster at `address` accepts our token.
+
+    Raises AeroDaaSError with the remedy.
+    """
+    reach(address)
+    with subprocess.Popen(  # noqa: S603 - fixed program, and an address that has answered
+        [sys.executable, "-c", RAY, "status", f"--address={address}"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as asking:
+        assert asking.stderr is not None  # noqa: S101 - asked for
+        last = ""
+        for line in asking.stderr:
+            if _REFUSED in line:
+                asking.kill()
+                raise refusal(address)
+            last = line.strip() or last
+    if asking.returncode:
+        raise AeroDaaSError(f"the head of the cluster at {address} does not answer: {last}")
 
 
 def listener_of(address: str) -> tuple[str, int] | None:
@@ -61,42 +86,13 @@ def listener_of(address: str) -> tuple[str, int] | None:
     return (host.strip("[]"), int(port)) if host and port.isdigit() else None
 
 
-def _metadata(address: str) -> dict[str, Any]:
-    """Cluster metadata from the head; raises AeroDaaSError if refused or not a Ray head."""
-    try:
-        with hushed():
-            return cluster_metadata(address, _PROBE_SECONDS)
-    except (RayError, RpcError) as error:
-        reason = str(error).strip().splitlines()[0]
-        if "token" in reason.lower():
-            raise refusal(address) from None
-        raise AeroDaaSError(
-            f"what listens at {address} is not the head of a Ray cluster: {reason}"
-        ) from None
-
-
-def _compare(address: str, head: dict[str, Any]) -> None:
-    """Raise AeroDaaSError if the head's Ray release or Python minor version differs from ours.
-
-    Ray's wire protocol changes with each release, Python's pickles with each minor one.
-    """
-    ours = {"ray_version": ray.__version__, "python_version": platform.python_version()}
-    names = {"ray_version": "Ray", "python_version": "Python"}
-    for key, mine in ours.items():
-        theirs = str(head.get(key, mine))
-        if theirs != mine and (key == "ray_version" or _minor(theirs) != _minor(mine)):
-            raise AeroDaaSError(
-                f"the head at {address} runs {names[key]} {theirs}, this machine {mine}; "
-                + (
-                    f"install the same on both: pip install 'ray=={theirs}'"
-                    if key == "ray_version"
-                    else f"use Python {_minor(theirs)} here"
-                )
-            )
-
-
-def _minor(version: str) -> str:
-    return ".".join(version.split(".")[:2])
+def _speaks_http2(listener: tuple[str, int]) -> bool:
+    """Whether a server of HTTP/2, as the head is, listens at this host and port without TLS."""
+    with contextlib.suppress(OSError), socket.create_connection(listener, _PROBE_SECONDS) as link:
+        link.sendall(HTTP2_PREFACE)
+        frame = link.recv(9, socket.MSG_WAITALL)
+        return len(frame) == 9 and frame[3] == _SETTINGS_FRAME  # noqa: PLR2004 - its header
+    return False
 
 
 @contextlib.contextmanager

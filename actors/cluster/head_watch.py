@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from aerodaas.actors.cluster.handshake import listener_of
+from aerodaas.actors.cluster.handshake import HTTP2_PREFACE, listener_of
 
 __all__ = ["HeadWatch", "answers"]
 
@@ -16,8 +16,6 @@ _PATIENCE = 2.0
 """Timeout of an answer in seconds: enough for a packet that is lost once."""
 _LOST_AFTER = 4.0
 """Seconds without an answer before the alert, which is told within five."""
-_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
-"""First bytes of an HTTP/2 client, which a gRPC server answers."""
 
 
 class HeadWatch:
@@ -66,7 +64,7 @@ def answers(listener: tuple[str, int]) -> bool:
     """
     try:
         with socket.create_connection(listener, timeout=_PATIENCE) as link:
-            link.sendall(_PREFACE)
+            link.sendall(HTTP2_PREFACE)
             link.recv(1)
     except ConnectionResetError:
         return True  # a server that expects TLS hangs up

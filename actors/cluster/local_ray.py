@@ -12,34 +12,27 @@ import os
 import subprocess
 import sys
 import threading
-import warnings
-from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from queue import Empty, Queue
 
 from aerodaas.actors.cluster.authentication import make_token, require_authentication
+from aerodaas.actors.cluster.ray_variables import LOOPBACK_ONLY
 from aerodaas.actors.private_folder import private_folder
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["LocalRay"]
+__all__ = ["LOOPBACK", "LocalRay"]
 
 _STORE_BYTES = 128 * 2**20
 """Bytes of Ray's object store; streams use shared memory of their own."""
-_ADDRESS = "127.0.0.1"
+LOOPBACK = "127.0.0.1"
 """Loopback address: no other machine reaches it, and a lost Wi-Fi breaks no connection."""
-_LOOPBACK = {
-    # Ray's processes then take 127.0.0.1 for the address of the machine, and listen there only.
-    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
-}
 _START_SECONDS = 400.0
 _END_SECONDS = 20.0
 _KEEPER = Path(__file__).with_name("ray_process.py")
 _OPTIONS = (
-    *("--head", "--port=0", f"--node-ip-address={_ADDRESS}"),
-    *("--include-dashboard=false", "--include-log-monitor=false", "--no-monitor"),
-    "--disable-usage-stats",
+    *("--head", f"--node-ip-address={LOOPBACK}"),
+    *("--include-dashboard=false", "--include-log-monitor=false", "--disable-usage-stats"),
     *(f"--object-store-memory={_STORE_BYTES}", '--resources={"edge": 1, "cloud": 1}'),
 )
 
@@ -47,8 +40,8 @@ _OPTIONS = (
 class LocalRay:
     """Local Ray that starts in the background; `address` waits until it is ready."""
 
-    def __init__(self, variables: Mapping[str, str]) -> None:
-        """Start Ray with `variables` as defaults of the environment; returns at once."""
+    def __init__(self) -> None:
+        """Start Ray; returns at once."""
         if require_authentication():
             make_token()
         command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), _streams()]
@@ -58,7 +51,7 @@ class LocalRay:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**variables, **_inherited(), **_LOOPBACK},
+            env={**_inherited(), **LOOPBACK_ONLY},
             start_new_session=True,
         )
         self._lines: Queue[str] = Queue()
@@ -73,14 +66,7 @@ class LocalRay:
             if told is None or "address" not in told:
                 self.end()
                 raise AeroDaaSError(_failure(told))
-            host, _, port = str(told["address"]).rpartition(":")
-            if host != _ADDRESS:
-                warnings.warn(
-                    f"Ray {version('ray')} listens on all interfaces of this machine, at {host}: "
-                    "it does not take the loopback address; its token keeps others out",
-                    stacklevel=2,
-                )
-            self._address = f"{host}:{port}"
+            self._address = str(told["address"])
         return self._address
 
     def end(self) -> None:
@@ -119,11 +105,11 @@ def _inherited() -> dict[str, str]:
 
 
 def _failure(told: dict[str, object] | None) -> str:
-    reason = None if told is None else str(told.get("error", "its supervisor was killed"))
-    if reason is not None and "timed out" not in reason:
-        return f"Ray does not start on this machine: {reason}"
-    load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
-    return (
-        "Ray did not start within half a minute, twice: this machine is too busy "
-        f"(load {load}); end other work and try again"
-    )
+    if told is None:
+        load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+        return (
+            f"Ray did not start within {_START_SECONDS:.0f} s: this machine is too busy "
+            f"(load {load}); end other work and try again"
+        )
+    reason = told.get("error", "its supervisor was killed")
+    return f"Ray does not start on this machine: {reason}"

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import logging
 import os
+import re
+import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import ray
+from ray.exceptions import RuntimeEnvSetupError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from aerodaas.actors.cluster.handshake import greet, hushed, listener_of
+from aerodaas.actors.cluster.handshake import greet, hushed, listener_of, reach
 from aerodaas.actors.cluster.head_watch import answers
-from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_internals import forbid_start, silence_nodes
-from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES, VARIABLES
+from aerodaas.actors.cluster.local_ray import LOOPBACK, LocalRay
 from aerodaas.config.model import ComputeConfig
 from aerodaas.runtime.placement import Placement
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 __all__ = [
     "begin",
+    "brings",
     "connect",
     "disconnect",
     "discover",
@@ -44,11 +46,16 @@ _SHARE = 0.001
 """Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
 _LOOPBACK = "[::ffff:127.0.0.1]"
 """127.0.0.1, written as an IPv6 address."""
+_VERSIONS = re.compile(r"Ray: (\S+)\s+Python: (\S+)")
+"""What Ray says of the head's and this machine's versions where they differ."""
+_PYTHON_MATCH = "RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL"
 _NAMESPACE = "aerodaas"
 """Ray namespace for the names of actors that outlive their application."""
 
 _local: LocalRay | None = None
 """Local Ray started by this process, if any."""
+_brought: dict[Path, tuple[int, ...]] = {}
+"""Files and folders of the modules of this process' job, as they were when it was joined."""
 
 
 def begin(address: str | None) -> None:
@@ -56,16 +63,21 @@ def begin(address: str | None) -> None:
     global _local  # noqa: PLW0603 - one Ray for each process
     if ray.is_initialized() or address or os.environ.get("RAY_ADDRESS") or _local is not None:
         return
-    _local = LocalRay(LOCAL_VARIABLES)
+    _local = LocalRay()
     atexit.register(disconnect)
 
 
-def connect(address: str | None, begin_step: Callable[[str], None] = lambda _: None) -> None:
+def connect(
+    address: str | None,
+    begin_step: Callable[[str], None] = lambda _: None,
+    modules: Sequence[Path] = (),
+) -> None:
     """Start a local Ray on this machine, or join a cluster; nothing where that was done before.
 
     Args:
         address: The cluster's `host:port`; None for that of `RAY_ADDRESS`, or for a local Ray.
         begin_step: Called with the name of the step that follows, which may take a minute.
+        modules: Files and folders of the modules that all processes of this one's job import.
 
     Raises:
         AeroDaaSError: If the cluster cannot be reached or Ray does not start.
@@ -76,42 +88,81 @@ def connect(address: str | None, begin_step: Callable[[str], None] = lambda _: N
     address = address or os.environ.get("RAY_ADDRESS")
     begin_step(f"joining the Ray cluster at {address}" if address else "starting Ray")
     if address:
-        join(address)
+        join(address, modules)
         _require_edge(address)
         return
     begin(None)
     assert _local is not None  # noqa: S101 - begun
-    _set_variables(LOCAL_VARIABLES)
-    _init(_local.address)
+    _init(_local.address, [one for one in modules if not _on_path(one)])
+    addresses = {node["NodeManagerAddress"] for node in ray.nodes()}
+    if addresses != {LOOPBACK}:
+        warnings.warn(
+            f"Ray {ray.__version__} listens on all interfaces of this machine, at "
+            f"{', '.join(addresses)}: it does not take the loopback address; its token keeps "
+            "others out",
+            stacklevel=2,
+        )
 
 
-def join(address: str) -> None:
-    """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError."""
+def join(address: str, modules: Sequence[Path] = ()) -> None:
+    """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError.
+
+    `modules` are those that `connect` takes.
+    """
     if ray.is_initialized():
         return
-    _set_variables(VARIABLES)
-    greet(address)
-    _init(address)
+    reach(address)
+    _init(address, modules)
 
 
-def _set_variables(variables: Mapping[str, str]) -> None:
-    """Set Ray's environment variables; before the first use of its C++ part, which reads them."""
-    for name, value in variables.items():
-        os.environ.setdefault(name, value)
-    # The first error is reported; Ray would print the tracebacks of subsequent ones.
-    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+def brings(name: str, path: Path) -> bool:
+    """Whether the actors of this process can import a module.
+
+    Args:
+        name: The module's name.
+        path: Its file or folder.
+
+    Returns:
+        False for a module that Ray cannot bring along, because its file has another name, or
+        because it is not as it was when this process joined Ray, or was not there then.
+    """
+    if path.name not in {name, f"{name}.py"}:
+        return False
+    if not ray.is_initialized() or (_local is not None and _on_path(path)):
+        return True
+    return _brought.get(path) == _state_of(path)
 
 
-def _init(address: str) -> None:
-    quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
+def _on_path(path: Path) -> bool:
+    """Whether processes that this one starts find the module at `path` by themselves."""
+    return str(path.parent) in os.environ.get("PYTHONPATH", "").split(os.pathsep)
+
+
+def _state_of(path: Path) -> tuple[int, ...]:
+    files = sorted(path.rglob("*.py")) if path.is_dir() else [path]
+    return tuple(number for file in files for number in (file.stat().st_mtime_ns,))
+
+
+def _init(address: str, modules: Sequence[Path]) -> None:
+    # Errors are raised where they belong to a call, and reported as alerts where they do not.
+    quiet: dict[str, Any] = {"logging_level": logging.CRITICAL, "log_to_driver": False}
     try:
-        with hushed(), _fatal_only():
-            ray.init(address=_as_it_is(address), namespace=_NAMESPACE, **quiet)
-    except (ConnectionError, RuntimeError, ValueError) as error:
-        reason = str(error).strip().splitlines()[0]
-        raise _unreachable(address, reason) from None
-    silence_nodes()
-    forbid_start()
+        with hushed():
+            ray.init(
+                address=_as_it_is(address),
+                namespace=_NAMESPACE,
+                runtime_env={"py_modules": [*map(str, modules)]} if modules else None,
+                **quiet,
+            )
+    except ConnectionError as error:
+        greet(address)
+        raise _unreachable(address, str(error).strip().splitlines()[0]) from None
+    except (RuntimeError, ValueError) as error:
+        raise _other_versions(address, str(error)) from None
+    except RuntimeEnvSetupError as error:
+        raise AeroDaaSError(f"the application's own modules cannot be sent: {error}") from None
+    _brought.clear()
+    _brought.update({path: _state_of(path) for path in modules})
 
 
 def _as_it_is(address: str) -> str:
@@ -124,18 +175,22 @@ def _as_it_is(address: str) -> str:
     return f"{_LOOPBACK}:{port}" if host in {"127.0.0.1", "localhost"} else address
 
 
-@contextlib.contextmanager
-def _fatal_only() -> Iterator[None]:
-    """Stop Ray's C++ part, which reads the variable once, from printing errors; we report them."""
-    name = "RAY_BACKEND_LOG_LEVEL"
-    if name in os.environ:
-        yield
-        return
-    os.environ[name] = "fatal"
-    try:
-        yield
-    finally:
-        del os.environ[name]
+def _other_versions(address: str, reason: str) -> AeroDaaSError:
+    """Error of a head that runs another Ray or Python, of which Ray tells by `reason`."""
+    found = _VERSIONS.findall(reason)
+    if len(found) != 2:  # noqa: PLR2004 - the head's and ours
+        return _unreachable(address, reason.strip().splitlines()[0])
+    head, here = found
+    if head[0] != here[0]:
+        return AeroDaaSError(
+            f"the head at {address} runs Ray {head[0]}, this machine {here[0]}; install the same "
+            f"on both: pip install 'ray=={head[0]}'"
+        )
+    theirs, ours = (".".join(version.split(".")[:2]) for version in (head[1], here[1]))
+    remedy = f"{theirs} here" if theirs != ours else f"{head[1]} here, or set {_PYTHON_MATCH}=minor"
+    return AeroDaaSError(
+        f"the head at {address} runs Python {head[1]}, this machine {here[1]}; use Python {remedy}"
+    )
 
 
 def _unreachable(address: str, reason: str) -> AeroDaaSError:
@@ -261,6 +316,8 @@ def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
         "num_cpus": 0,
         "resources": {place.kind: _SHARE},
         "max_restarts": restarts,
+        # The head would keep the history of each call, 3 kB of memory a call, for a dashboard.
+        "enable_task_events": False,
     }
     if place.node is not None:
         address = nodes[0]["NodeManagerAddress"]

@@ -1,11 +1,12 @@
-"""Supervisor process of a local Ray: starts it, ends it when unused, and cleans up.
+"""Supervisor process of a local Ray: runs `ray start`, ends Ray when unused, and cleans up.
 
 It is run as a script, needs the standard library only (10 MB), and is in a session of its own, so
-that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. Ray is ended once the
-application has ended and no run is active: each run holds a lock (`run_lock.py`) for as long as
-its drones may fly and its actors have work. On standard output it sends the application one line
-of JSON per message: `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` if it has to
-stay after the application has closed its standard input.
+that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. The supervisor ends Ray
+once the application has ended and no run is active: each run holds a lock (`run_lock.py`) for as
+long as its drones may fly and its actors have work. `ray stop` would end all of the user's Rays,
+so the supervisor ends its own child processes instead. On standard output it sends the application
+one line of JSON per message: `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` if it
+has to stay after the application has closed its standard input.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["LOCKS", "PREFIX", "VARIABLE", "main"]
+__all__ = ["LOCKS", "PREFIX", "RAY", "VARIABLE", "main"]
 
 VARIABLE = "AERODAAS_LOCAL_RAY"
 """Environment variable of all processes of a local Ray, set to its folder."""
@@ -38,9 +39,6 @@ LOCKS = "runs"
 _RAYS_OWN = "ray"
 """Ray's folder, below our own because Ray opens it to all users of the machine."""
 _OWN_LOCK = "supervisor.lock"
-_TRIES = 2
-_TOO_SLOW = "timed out during startup"
-"""Text of Ray's error when its node does not start within half a minute, on a busy machine."""
 _START_SECONDS = 180.0
 _LAST_LINES = 5
 """Of what Ray said before it ended. A Python that breaks has its reason some lines above."""
@@ -52,18 +50,17 @@ _SETTING_UP_SECONDS = 60.0
 _LOOK_SECONDS = 0.2
 _LONGEST = 40
 """Most characters of a temporary folder; a socket's path below it may have 107."""
-_UNWANTED = ("dashboard/dashboard.py", "_private/monitor.py", "v2/monitor.py", "util.client.server")
-"""Processes useless on one machine (200 MB): web pages, autoscaler, proxy for remote drivers.
-
-`ray start` waits for the first, whose option only makes it smaller, or for its end.
-"""
 _SUBREAPER = 36
-_NAME_BYTES = 200
-_SERVER = Path(__file__).with_name("fork_server.py")
-_SOCKET = "workers.sock"
-FORK_SERVER = "AERODAAS_FORK_SERVER"
-"""Environment variable of Ray's processes that names the fork server's socket."""
-_RAY = Path(__file__).with_name("ray_start.py")
+_PORTS = ("--dashboard-port", "--ray-client-server-port")
+"""Options of `ray start` for ports that are fixed by default: two Rays would quarrel over them."""
+RAY = """
+import sys
+from importlib.metadata import entry_points
+sys.argv[0] = "ray"
+(command,) = entry_points(group="console_scripts", name="ray")
+sys.exit(command.load()())
+"""
+"""Program of the command `ray`, which a virtual environment may lack as a file."""
 
 
 def main(application: int, streams: str, words: list[str]) -> None:
@@ -108,7 +105,6 @@ def _keep(client: _Client, folder: Path, words: list[str]) -> None:
     if not address:
         client.tell(error=reason)
         return
-    _end_all(_unwanted)
     client.tell(address=address, folder=str(folder))
     while not client.gone(1.0):
         _reap()
@@ -145,49 +141,41 @@ class _Client:
 
 
 def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
-    """Start Ray; returns its address and "", or "" and the reason of the failure."""
-    server = str(folder / _SOCKET)
-    environment = {**os.environ, VARIABLE: str(folder), FORK_SERVER: server}
-    _start_fork_server(server, environment)
+    """Run `ray start`; returns Ray's address and "", or "" and the reason of the failure."""
     own = folder / _RAYS_OWN
-    command = [sys.executable, str(_RAY), "start", "--temp-dir", str(own), *words]
-    reason = ""
-    for _ in range(_TRIES):
-        with (folder / "start.log").open("w+") as log:
-            starting = subprocess.Popen(  # noqa: S603 - fixed arguments
-                command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log
-            )
-            until = time.monotonic() + _START_SECONDS
-            while starting.poll() is None and time.monotonic() < until:
-                if client.gone(_LOOK_SECONDS / 4):
-                    return "", "the application has gone"
-                _kill(_unwanted)
-            code = starting.poll()
-            log.seek(0)
-            said = log.read().strip()
-        if code == 0:
-            return (own / "ray_current_cluster").read_text().strip(), ""
-        _end_all(lambda line: str(_SERVER) not in line)
-        slow = code is None or _TOO_SLOW in said
-        silent = f"`ray start` ended with code {code} and said nothing"
-        reason = _TOO_SLOW if slow else "\n".join(said.splitlines()[-_LAST_LINES:]) or silent
-        if not slow:
-            break
-    return "", reason
+    port, *others = _free_ports(len(_PORTS) + 1)
+    words = [*words, f"--port={port}", *map("{}={}".format, _PORTS, others)]
+    command = [sys.executable, "-c", RAY, "start", f"--temp-dir={own}", *words]
+    with (folder / "start.log").open("w+") as log:
+        starting = subprocess.Popen(  # noqa: S603 - fixed arguments
+            command,
+            env={**os.environ, VARIABLE: str(folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+        )
+        until = time.monotonic() + _START_SECONDS
+        while starting.poll() is None and time.monotonic() < until:
+            if client.gone(_LOOK_SECONDS / 4):
+                return "", "the application has gone"
+        code = starting.poll()
+        log.seek(0)
+        said = log.read().strip()
+    if code == 0:
+        return f"127.0.0.1:{port}", ""
+    if code is None:
+        return "", f"`ray start` did not end within {_START_SECONDS:.0f} s"
+    silent = f"`ray start` ended with code {code} and said nothing"
+    return "", "\n".join(said.splitlines()[-_LAST_LINES:]) or silent
 
 
-def _start_fork_server(path: str, environment: dict[str, str]) -> None:
-    """Start what workers are forked from; without it they start Ray's own way."""
-    # Ray writes names into the process' words, which are the room that there is for them.
-    words = [sys.executable, str(_SERVER), path, "-" * _NAME_BYTES]
-    quiet = subprocess.DEVNULL
-    subprocess.Popen(  # noqa: S603 - our own file
-        words,
-        env={"OPENBLAS_NUM_THREADS": "1", **environment},
-        stdin=quiet,
-        stdout=quiet,
-        stderr=quiet,
-    )
+def _free_ports(count: int) -> list[int]:
+    """TCP ports of the loopback interface that nobody uses now."""
+    with contextlib.ExitStack() as stack:
+        made = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for one in made:
+            one.bind(("127.0.0.1", 0))
+        return [one.getsockname()[1] for one in made]
 
 
 def _under_way(folder: Path) -> bool:
@@ -207,25 +195,15 @@ def _held(path: Path) -> bool:
     return False
 
 
-def _end_all(matches: Callable[[str], bool] = lambda _: True) -> None:
-    """Kill all descendants whose command line `matches` and wait for their end."""
+def _end_all() -> None:
+    """Kill all descendants and wait for their end."""
     until = time.monotonic() + _DYING_SECONDS
-    while _kill(matches) and time.monotonic() < until:
+    while (found := _descendants()) and time.monotonic() < until:
+        for pid in found:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
         time.sleep(0.02)
         _reap()
-
-
-def _kill(matches: Callable[[str], bool]) -> bool:
-    """Kill all descendants whose command line `matches`; returns whether there were any."""
-    found = [pid for pid in _descendants() if matches(_command(pid))]
-    for pid in found:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-    return bool(found)
-
-
-def _unwanted(line: str) -> bool:
-    return any(part in line for part in _UNWANTED)
 
 
 def _reap() -> None:
@@ -252,12 +230,6 @@ def _processes() -> Iterator[tuple[int, int]]:
                 state, parent = (entry / "stat").read_bytes().rpartition(b")")[2].split()[:2]
                 if state != b"Z":
                     yield int(entry.name), int(parent)
-
-
-def _command(pid: int) -> str:
-    with contextlib.suppress(OSError):
-        return os.fsdecode(Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" "))
-    return ""
 
 
 def _prune(base: Path) -> None:

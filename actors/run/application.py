@@ -1,8 +1,9 @@
 """Definitions of the application's own files, as sent to every process of its run.
 
-The session carries them: modules as source text, and the classes of files that run as
-`__main__`, which other processes cannot import, as pickles. An actor gets its session first, so
-that later messages find their classes defined.
+Modules travel with Ray's job, by its `runtime_env`. The session carries as pickles the classes of
+files that other processes cannot import: those that run as `__main__`, and modules that the job
+lacks, because they were imported or changed after it was joined. An actor gets its session first,
+so that later messages find their classes defined.
 """
 
 from __future__ import annotations
@@ -12,19 +13,22 @@ import inspect
 import sys
 import types
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from aerodaas.actors.run.sources import Source, imported_names, own_sources, serve
+from ray import cloudpickle
+
+from aerodaas.actors.cluster import ray_cluster
+from aerodaas.actors.run.own_modules import imported_names, is_installed, own_modules
 from aerodaas.actors.streams import definitions as _definitions
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RuntimeEnvConfig
 from aerodaas.config.plugins import main_name
 from aerodaas.dataflow.graph import Graph
 
-__all__ = ["Application", "capture"]
+__all__ = ["Application", "capture", "main_modules"]
 
 _LARGEST = 1 << 20
 """Bytes of a class beyond which it is sent only with the items that need it."""
@@ -34,12 +38,12 @@ _LARGEST = 1 << 20
 class Application:
     """Modules and classes of an application; unpickling it makes them available."""
 
-    sources: Mapping[str, Source] = field(default_factory=dict)
-    """Modules by name."""
     definitions: Mapping[str, bytes] = field(default_factory=dict)
     """Pickled classes by `id/qualified name`."""
     plugins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """Names of definitions by attribute, by module name of the application's own file."""
+    files: tuple[Path, ...] = ()
+    """Files and folders of the modules that Ray's job brings along; they stay here."""
 
     def and_later(self, later: Application) -> Application:
         """Union of this and the `later` definitions, which have precedence."""
@@ -47,29 +51,24 @@ class Application:
         for name, attributes in later.plugins.items():
             plugins[name] = {**plugins.get(name, {}), **attributes}
         return Application(
-            {**self.sources, **later.sources},
             {**self.definitions, **later.definitions},
             plugins,
+            tuple(dict.fromkeys((*self.files, *later.files))),
         )
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         """Pickle it so that unpickling makes its modules and classes available."""
-        return _arrived, (dict(self.sources), dict(self.definitions), dict(self.plugins))
+        return _arrived, (dict(self.definitions), dict(self.plugins))
 
 
-def _arrived(
-    sources: dict[str, Source],
-    definitions: dict[str, bytes],
-    plugins: dict[str, dict[str, str]],
-) -> Application:
-    serve(sources)
+def _arrived(definitions: dict[str, bytes], plugins: dict[str, dict[str, str]]) -> Application:
     _definitions.define(definitions)
     for name, attributes in plugins.items():
         if name not in sys.modules:
             module = types.ModuleType(name, "The application's own file, by what it defines.")
             vars(module)["__getattr__"] = partial(_defined, name, attributes)
             sys.modules[name] = module
-    return Application(sources, definitions, plugins)
+    return Application(definitions, plugins)
 
 
 def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa: ANN401 - a class
@@ -78,32 +77,66 @@ def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa
     return _definitions.named(attributes[name])
 
 
-def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Application:
+def capture(
+    graph: Graph, config: EnvironmentConfig, *plugins: object, by_value: bool = False
+) -> Application:
     """Collect the definitions of the application and its guests, in their own process.
 
-    `plugins` are instances of its classes outside the graph, such as schedulers.
+    Args:
+        graph: The application's dataflow.
+        config: Its environment, whose plug-ins may be the application's own.
+        plugins: Instances of its classes outside the graph, such as schedulers.
+        by_value: Whether all own modules travel by value, to a process that is not of Ray's job.
     """
     used = [*_used(graph), *plugins]
     files = _main_files(used)
     named = [name.partition(":") for name in _plugin_names(config) if ":" in name]
+    names = [module for module, _, _ in named]
+    names += [one.__module__ for one in _mentioned(used)]
+    names += [one.__module__ for one in used if isinstance(one, types.FunctionType)]
+    folders: list[str] = []
+    for namespace in files:
+        names += _imports_of(namespace, folders)
+    own = own_modules(names, folders)
+    # Ray runs a container with nothing of its own in it.
+    by_value = by_value or any(env.image_uri for env in _environments(graph, config))
+    late = {name for name in own if by_value or not ray_cluster.brings(name, own[name])}
     definitions: dict[str, bytes] = {}
     attributes: dict[str, dict[str, str]] = {}
-    for number, namespace in enumerate(files):
+    for number, namespace in enumerate([*files, *_by_value(late)]):
         name = main_name(namespace)
         wanted = {attribute for module, _, attribute in named if module == name}
         prefix = f"{uuid.uuid4().hex[:12]}-{number}"
         defined = _define(prefix, [*_classes(namespace), *_functions(namespace, wanted)])
         definitions |= defined
-        if name is not None:
+        if name is not None and not is_installed(name):
             attributes.setdefault(name, {key.partition("/")[2]: key for key in defined})
     local = [one for one in _mentioned(used) if "<locals>" in one.__qualname__]
     definitions |= _define(f"{uuid.uuid4().hex[:12]}-local", local)
-    seeds: list[tuple[str, list[str]]] = [(module, []) for module, _, _ in named]
-    seeds += [(one.__module__, []) for one in _mentioned(used)]
-    seeds += [(one.__module__, []) for one in used if isinstance(one, types.FunctionType)]
-    for namespace in files:
-        seeds += _imports_of(namespace)
-    return Application(own_sources(seeds), definitions, attributes)
+    brought = tuple(path for name, path in own.items() if name not in late)
+    return Application(definitions, attributes, brought)
+
+
+def _by_value(names: Collection[str]) -> Iterator[dict[str, Any]]:
+    """Namespaces of the loaded modules of these top-level names, which travel by value now on."""
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] in names and isinstance(module, types.ModuleType):
+            cloudpickle.register_pickle_by_value(module)
+            yield vars(module)
+
+
+def main_modules() -> tuple[Path, ...]:
+    """Files and folders of the own modules that the application's file imports."""
+    names: list[str] = []
+    folders: list[str] = []
+    for namespace in _main_files(()):
+        names += _imports_of(namespace, folders)
+    return tuple(own_modules(names, folders).values())
+
+
+def _environments(graph: Graph, config: EnvironmentConfig) -> Iterator[RuntimeEnvConfig]:
+    yield from config.runtime_env.values()
+    yield from (node.runtime_env for node in graph.nodes.values() if node.runtime_env is not None)
 
 
 def _define(prefix: str, found: Iterable[Any]) -> dict[str, bytes]:
@@ -161,7 +194,7 @@ def _functions_of(one: object) -> Iterator[types.FunctionType]:
 
 def _classes(namespace: dict[str, Any]) -> Iterator[type]:
     for value in list(namespace.values()):
-        if isinstance(value, type) and value.__module__ == "__main__":
+        if isinstance(value, type) and value.__module__ == namespace.get("__name__"):
             yield from _with_nested(value)
 
 
@@ -204,12 +237,12 @@ def _plugin_names(config: EnvironmentConfig) -> list[str]:
     return [name for name in names if name]
 
 
-def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
-    """Modules that a file that runs as `__main__` imports, with its folder."""
+def _imports_of(namespace: dict[str, Any], folders: list[str]) -> list[str]:
+    """Names that a file that runs as `__main__` imports; adds its folder to `folders`."""
     try:
         file = Path(namespace["__file__"]).resolve()
         text = file.read_bytes()
     except (KeyError, TypeError, OSError):
         return []
-    package = namespace.get("__package__") or ""
-    return [(name, [str(file.parent)]) for name in imported_names(text, package)]
+    folders.append(str(file.parent))
+    return [namespace.get("__package__") or "", *imported_names(text)]

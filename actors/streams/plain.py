@@ -23,6 +23,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from ray import cloudpickle
 
 from aerodaas.types.records import record_of
 
@@ -93,7 +94,8 @@ def importable(definition: type) -> bool:
         found = attrgetter(definition.__qualname__)(sys.modules[module])
     except (AttributeError, KeyError):
         return False
-    return found is definition and module != "__main__"
+    by_value = module == "__main__" or module in cloudpickle.list_registry_pickle_by_value()
+    return found is definition and not by_value
 
 
 def _flat_array(array: NDArray[Any], arrays: list[NDArray[Any]]) -> Plain:

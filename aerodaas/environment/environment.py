@@ -519,11 +519,12 @@ class Environment(PaperNames, IEnvironment):
 def _connected_cluster() -> ModuleType:
     """Module `ray_cluster`, connected to the cluster that is asked for."""
     from aerodaas.actors.cluster import ray_cluster  # noqa: PLC0415 - ray only where it is needed
+    from aerodaas.actors.run.application import main_modules  # noqa: PLC0415
     from aerodaas.terminal.console import StartupView  # noqa: PLC0415 - slow to load
 
     options = current_options.get()
     with StartupView(options) as starting:
-        ray_cluster.connect(options.address, starting.begin)
+        ray_cluster.connect(options.address, starting.begin, main_modules())
     return ray_cluster
 
 

@@ -184,7 +184,7 @@ def _program(environment: Environment, namespace: dict[str, Any]) -> bytes:
     main = types.ModuleType("__main__")
     vars(main).update(namespace)
     sys.modules["__main__"] = main
-    application = pickle.dumps(capture(graph, environment.config))
+    application = pickle.dumps(capture(graph, environment.config, by_value=True))
     nodes = [one for one in graph.nodes.values() if one.kind != "sensor"]
     works = {one.id: one.work for one in nodes}
     conditions = {one.id: [trigger.when for trigger in one.triggers] for one in nodes}

@@ -131,7 +131,7 @@ class Run:
             )
         console = self._console_server()
         with StartupView(self.options) as starting:
-            make_flight = self._runtime(starting.begin)
+            make_flight = self._runtime(plan, starting.begin)
             raise_on_signals()
             provenance = Provenance.collect(
                 app=self.options.application,
@@ -175,10 +175,10 @@ class Run:
             self._open_console(console)
         atexit.register(self.abandon)
 
-    def _runtime(self, begin_step: Callable[[str], None]) -> MakeFlight:
+    def _runtime(self, plan: FlightPlan, begin_step: Callable[[str], None]) -> MakeFlight:
         """The class of the flight: in this process, or on Ray, which is then started."""
         if self._uses_ray:
-            self._connect(begin_step)
+            self._connect(plan, begin_step)
         if not self.lockstep:
             from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads ray
 
@@ -191,13 +191,17 @@ class Run:
 
         return partial(InlineFlight, proxies=Proxies(everything=self._everything_on_ray))
 
-    def _connect(self, begin_step: Callable[[str], None]) -> None:
+    def _connect(self, plan: FlightPlan, begin_step: Callable[[str], None]) -> None:
         from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
             ray_cluster as cluster,
         )
 
         cluster.begin(self.options.address)
-        cluster.connect(self.options.address, begin_step)
+        import aerodaas.actors.run.flight  # noqa: F401, PLC0415 - loads while Ray starts
+
+        application = plan.session.application
+        modules = application.files if application is not None else ()
+        cluster.connect(self.options.address, begin_step, modules)
 
     def _check_served(self) -> None:
         """Raise ConfigError for what cannot be served to others while flying."""

@@ -18,7 +18,6 @@ from flying import FLAT
 
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
-from aerodaas.actors.cluster.ray_variables import LOCAL_VARIABLES
 from aerodaas.actors.private_folder import private_folder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -214,7 +213,7 @@ def test_what_a_killed_keeper_left_is_pruned(tmp_path: Path) -> None:
         assert recording.complete
         assert RecordedFlight.read(recording).robots["drone"].visited == ("there",)
     assert any(one.is_running() for one in left)
-    ray = LocalRay(LOCAL_VARIABLES)
+    ray = LocalRay()
     try:
         assert ray.address
         assert gone(left)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
+import types
 import warnings
 from pathlib import Path
 
 import pytest
-import ray
 from required import needs_root
 
 from aerodaas.actors.cluster.authentication import (
-    UNAUTHENTICATED,
     make_token,
     require_authentication,
     require_token,
 )
+from aerodaas.actors.cluster.ray_variables import UNAUTHENTICATED, set_variables
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 NAMES = ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH", UNAUTHENTICATED)
@@ -29,8 +30,7 @@ def token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in NAMES:
         monkeypatch.setenv(name, "")  # so that it is put back
         monkeypatch.delenv(name)
-    # What follows is about variables and files, not about this process' own Ray.
-    monkeypatch.setattr("aerodaas.actors.cluster.authentication.reread_variables", lambda: None)
+    monkeypatch.delitem(sys.modules, "ray", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
     return tmp_path / ".ray" / "auth_token"
 
@@ -44,6 +44,7 @@ def test_a_fresh_user_gets_a_token(token: Path) -> None:
     """For this user alone, whatever the umask; and it stays the same."""
     before = os.umask(0)
     try:
+        set_variables()
         assert require_authentication()
         assert make_token() == token
     finally:
@@ -124,6 +125,7 @@ def test_joining_makes_no_token(token: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_no_other_mode(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A variable that somebody left set switches nothing off; an empty one is none."""
     monkeypatch.setenv("RAY_AUTH_MODE", asked)
+    set_variables()
     if asked:
         with pytest.raises(ConfigError, match=f"RAY_AUTH_MODE={asked} would let all"):
             require_authentication()
@@ -134,20 +136,16 @@ def test_no_other_mode(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_off_by_an_explicit_flag_with_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each time."""
     monkeypatch.setenv(UNAUTHENTICATED, "1")
+    set_variables()
     for _ in range(2):
         with pytest.warns(UserWarning, match="Ray asks for no token"):
             assert not require_authentication()
     assert os.environ["RAY_AUTH_MODE"] == "disabled"
 
 
-@pytest.mark.parametrize(("version", "fits"), [("2.51.1", False), ("2.52.0", True), ("3.0", True)])
-def test_an_old_ray_is_refused(
-    version: str, *, fits: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It would ignore the token."""
-    monkeypatch.setattr(ray, "__version__", version)
-    if fits:
-        assert require_authentication()
-    else:
-        with pytest.raises(AeroDaaSError, match=r"pip install 'ray>=2.52'"):
-            require_authentication()
+def test_ray_imported_first_has_no_token(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ray reads the mode as it is imported, so a mode that is set later would mean nothing."""
+    monkeypatch.setitem(sys.modules, "ray", types.ModuleType("ray"))
+    set_variables()
+    with pytest.raises(ConfigError, match="import aerodaas first"):
+        require_authentication()

@@ -18,9 +18,10 @@ from aerodaas.types.errors import AeroDaaSError
 
 
 @pytest.mark.slow
-def test_what_ray_said_last_is_told() -> None:
+def test_what_ray_said_last_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Here its Python finds no library of its own."""
-    ray = LocalRay({"PYTHONHOME": "/nowhere"})
+    monkeypatch.setenv("PYTHONHOME", "/nowhere")
+    ray = LocalRay()
     with pytest.raises(AeroDaaSError, match=r"does not start on this machine:(?s:.*)encodings"):
         _ = ray.address
 
@@ -42,7 +43,7 @@ def test_what_stopped_the_supervisor_is_told() -> None:
 def test_a_start_that_takes_too_long_is_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """The remedy is another one."""
     monkeypatch.setattr(local_ray, "_START_SECONDS", 0.01)
-    ray = LocalRay({})
+    ray = LocalRay()
     with pytest.raises(AeroDaaSError, match="this machine is too busy"):
         _ = ray.address
 

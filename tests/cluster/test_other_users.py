@@ -35,8 +35,8 @@ if not shared_memory_obstacle():
 _RUN = """
 import os, stat
 from pathlib import Path
-import ray
 from aerodaas.actors.cluster import ray_cluster
+import ray
 ray_cluster.connect(None)
 print(ray.get(ray.remote(lambda: os.getuid()).remote()))
 print(oct(stat.S_IMODE((Path.home() / ".ray/auth_token").stat().st_mode)))

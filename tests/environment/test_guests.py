@@ -15,6 +15,7 @@ import pytest
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import Analytics, Environment, Odometry
+from aerodaas.actors.cluster.ray_variables import AUTH_MODE, VARIABLES
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import parse_words
@@ -436,7 +437,8 @@ def test_a_guest_is_not_handed_secrets(
         records = recording.records(topics={"/drone/theirs_prying/value"})
         found = [one.value["value"] for one in records]
     given = {"PATH", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "HOME", "TMPDIR", "OMP_NUM_THREADS"}
-    own = {"PYTHONDONTWRITEBYTECODE", "RAY_CLIENT_MODE"}  # the last is set by `import ray`
+    # The last of these are set by imports, of Ray and of what imports it.
+    own = {"PYTHONDONTWRITEBYTECODE", "RAY_CLIENT_MODE", AUTH_MODE, *VARIABLES}
     assert not set(found[0]["names"]) & set(os.environ) - given - own
     assert found[0]["nice"] >= 15
     # In namespaces of its own the parent's id is 0: the owner's processes cannot be named.

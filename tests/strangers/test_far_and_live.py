@@ -139,6 +139,7 @@ def test_real_time_with_a_driver_of_ones_own(tmp_path: Path) -> None:
 FAR = """
 from pathlib import Path
 
+import ray
 from helpers import results
 from helpers.results import Level
 
@@ -152,7 +153,7 @@ class Near(Analytics[Mine]):
     def __getstate__(self):
         # Sent: from here on the package is no longer where it was.
         here = Path(__file__).parent
-        if (here / "helpers").exists():
+        if ray.is_initialized() and (here / "helpers").exists():
             (here / "helpers").rename(here / "gone")
         return super().__getstate__()
 
@@ -203,7 +204,7 @@ cluster = Cluster()
 try:
     cluster.add_node(resources={"edge": 1}, node_name="edge", include_dashboard=False, **small)
     cluster.add_node(resources={"cloud": 1}, node_name="cloud", **small)
-    command = [sys.argv[1], "run", "app.py", "--address", cluster.address]
+    command = [sys.argv[1], "run", "app.py", "--speed", "1", "--address", cluster.address]
     sys.exit(subprocess.run(command, cwd=sys.argv[2]).returncode)
 finally:
     cluster.shutdown()

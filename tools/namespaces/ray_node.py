@@ -12,6 +12,7 @@ import psutil
 
 import aerodaas
 from aerodaas.actors.cluster.authentication import make_token, require_authentication
+from aerodaas.actors.cluster.ray_process import RAY
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.types.errors import AeroDaaSError
 from tools.namespaces.machine import Machine
@@ -22,11 +23,11 @@ _RETRIES = 2
 _TOO_SLOW = "timed out during startup"
 """Ray gives a node half a minute to start, which a busy machine may not have to give."""
 STORE_BYTES = 128 * 2**20
-_SLIM = {
+_VARIABLES = {
     **VARIABLES,
-    # Workers started in advance take 80 MB each.
-    "RAY_enable_worker_prestart": "0",
-    "RAY_prestart_worker_first_driver": "0",
+    # A frame is sent within its call: a reference costs round trips.
+    # https://docs.ray.io/en/latest/data/data-internals.html
+    "RAY_max_direct_call_object_size": "4194304",
 }
 
 
@@ -40,7 +41,7 @@ def environment(**more: str) -> dict[str, str]:
     root = str(Path(aerodaas.__file__).parents[1])
     paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
     own = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
-    return {**_SLIM, **os.environ, **own, **more}
+    return {**_VARIABLES, **os.environ, **own, **more}
 
 
 def start_head(
@@ -61,8 +62,7 @@ def start_head(
         **variables,
     )
     words = ["--head", "--port", str(port), "--temp-dir", str(folder), "--include-dashboard=false"]
-    _start(machine, address, resources, env, *words, "--include-log-monitor=false")
-    _trim(machine)
+    _start(machine, address, resources, env, *words)
 
 
 def start_worker(
@@ -74,7 +74,6 @@ def start_worker(
 ) -> None:
     """Join the cluster at `head` as the node `address`."""
     _start(machine, address, resources, environment(**variables), "--address", head)
-    _trim(machine)
 
 
 def restart_control_service(machine: Machine) -> psutil.Process:
@@ -98,9 +97,10 @@ def _start(
     *words: str,
 ) -> None:
     command = [
-        *(sys.executable, "-m", "ray.scripts.scripts", "start", "--node-ip-address", address),
+        *(sys.executable, "-c", RAY, "start", "--node-ip-address", address),
         *("--num-cpus", "1", "--object-store-memory", str(STORE_BYTES)),
-        *("--resources", json.dumps(resources), "--disable-usage-stats", *words),
+        *("--resources", json.dumps(resources), "--disable-usage-stats"),
+        *("--include-log-monitor=false", *words),
     ]
     _attempt(machine, command, env, _RETRIES)
 
@@ -115,11 +115,3 @@ def _attempt(
             raise AeroDaaSError(f"Ray does not start on {machine.name}: {error}") from None
         machine.clear()
         _attempt(machine, command, env, retries - 1)
-
-
-def _trim(machine: Machine) -> None:
-    """Stop what such a node has no use for: autoscaler, log monitor and Ray's client server."""
-    unwanted = ("_private/monitor.py", "v2/monitor.py", "log_monitor.py", "ray.util.client.server")
-    for process in machine.processes():
-        if any(mark in word for mark in unwanted for word in process.cmdline()):
-            process.kill()

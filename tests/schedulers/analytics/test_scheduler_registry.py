@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import pickle
+import sys
 from pathlib import Path
 
 import pytest
 
 from aerodaas.actors.run.application import capture
+from aerodaas.actors.streams.definitions import pickled_class
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import Graph
@@ -54,7 +56,7 @@ def test_a_file_a_module_a_class_and_an_instance_load(tmp_path: Path) -> None:
 
 
 def test_a_file_travels_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Found beside the application, wherever that is started; its source reaches the actors."""
+    """Found beside the application, wherever that is started; it reaches the actors by value."""
     (tmp_path / "travelling.py").write_text(
         "from aerodaas.schedulers.analytics import AnalyticsScheduler\n"
         "class Mine(AnalyticsScheduler): ...\n"
@@ -66,8 +68,11 @@ def test_a_file_travels_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
         found = load_scheduler("travelling.py:Mine")
     finally:
         current_options.reset(token)
-    sources = capture(Graph(), config, found).sources
-    assert sources[type(found).__module__].text == (tmp_path / "travelling.py").read_bytes()
+    name = type(found).__module__
+    assert "Mine" in capture(Graph(), config, found).plugins[name]
+    del sys.modules[name]  # as in an actor: nobody finds the class there
+    again = pickle.loads(pickled_class(found))  # noqa: S301 - our own
+    assert type(again).__name__ == "Mine"
 
 
 @pytest.mark.parametrize(
