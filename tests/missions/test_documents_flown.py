@@ -23,7 +23,6 @@ APPS = Path(__file__).resolve().parents[2] / "apps"
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.usefixtures("runtime")
 @pytest.mark.parametrize(
     "name", ["farm_survey", pytest.param("vehicle_tracking", marks=pytest.mark.slow)]
 )
