@@ -83,7 +83,6 @@ class Commands:
 
 @pytest.fixture
 def aerodaas(
-    runtime: None,  # noqa: ARG001 - none of these runs starts a Ray of its own
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,

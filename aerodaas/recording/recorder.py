@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
-from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
+from queue import SimpleQueue
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeAlias
 
 from foxglove import Schema
 from foxglove.messages import LogLevel
@@ -122,13 +123,13 @@ class FlightRecorder:
         """Held to add to the batch, and to pass it on; taken before the other lock."""
         self._passed_on: deque[Future[None]] = deque()
         """Batches of which it is not known yet that they are written."""
-        self._thread = ThreadPoolExecutor(1, "recorder")
         self._closing = threading.Event()
         try:
             self._begin(provenance, fences or {})
         except OSError as error:
             self._output.close()
             raise RecordingError(f"cannot write {self.path}: {error.strerror}") from None
+        self._thread = _WritingThread(self._write_batch)
         self._flusher = threading.Thread(target=self._flush_regularly, daemon=True)
         self._flusher.start()
 
@@ -172,8 +173,8 @@ class FlightRecorder:
         self._flusher.join()
         with self._batching:
             if self._summary is None:
-                self._thread.submit(self._write_batch, self._batch)
-                self._thread.shutdown()
+                self._thread.submit(self._batch)
+                self._thread.finish()
                 with self._lock:
                     self._summary = self._finish()
             return self._summary
@@ -203,7 +204,7 @@ class FlightRecorder:
         if len(self._passed_on) >= _AHEAD:
             self._passed_on.popleft().result()
         batch, self._batch = self._batch, []
-        self._passed_on.append(self._thread.submit(self._write_batch, batch))
+        self._passed_on.append(self._thread.submit(batch))
         return self._passed_on[-1]
 
     def _write_batch(self, batch: list[Message[Any]]) -> None:
@@ -338,6 +339,44 @@ class FlightRecorder:
                 with self._lock:
                     self._fail(error)
                 return
+
+
+_Batch: TypeAlias = "list[Message[Any]]"
+
+
+class _WritingThread:
+    """Thread that writes batches in order.
+
+    It also works in exit handlers, which land the drones of an application that ends without
+    waiting for them; the threads of `concurrent.futures` end before those.
+    """
+
+    def __init__(self, write: Callable[[_Batch], None]) -> None:
+        self._write = write
+        self._queue: SimpleQueue[tuple[_Batch, Future[None]] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
+
+    def submit(self, batch: _Batch) -> Future[None]:
+        """Have `batch` written; the result is there once that is done."""
+        written: Future[None] = Future()
+        self._queue.put((batch, written))
+        return written
+
+    def finish(self) -> None:
+        """Wait until everything submitted is written, and end the thread."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while (entry := self._queue.get()) is not None:
+            batch, written = entry
+            try:
+                self._write(batch)
+            except BaseException as error:  # noqa: BLE001 - raised again where the result is read
+                written.set_exception(error)
+            else:
+                written.set_result(None)
 
 
 def _latency(message: Message[Any]) -> Entry:

@@ -48,7 +48,7 @@ def refusal(tmp_path: Path) -> Callable[..., str]:
         *waypoints: Waypoint,
     ) -> str:
         with (
-            flyer.options(),
+            flyer.options(speed=1.0),
             patch("aerodaas.actors.cluster.ray_cluster.begin"),
             patch("aerodaas.actors.cluster.ray_cluster.connect", side_effect=ReachedError),
         ):
