@@ -65,7 +65,8 @@ class Part:
 
     def report(self) -> ActorReport:
         """Phase, counters, alerts and figures."""
-        outlets = [outlet for node in self.nodes for outlet in tuple(node.outlets.values())]
+        outlets = [self.alerts.outlet]
+        outlets += [outlet for node in self.nodes for outlet in tuple(node.outlets.values())]
         return ActorReport(
             phase=self.phase,
             error=self.error,
@@ -154,7 +155,8 @@ class InlineExecutor:
     def order(self, nodes: Sequence[Node]) -> None:
         """Set the order in which ready nodes are stepped, once nodes were added in flight."""
         places = {id(node): place for place, node in enumerate(nodes)}
-        self._entries.sort(key=lambda entry: places[id(entry.node)])
+        # A new list: another thread may look for a part's entries meanwhile.
+        self._entries = sorted(self._entries, key=lambda entry: places[id(entry.node)])
 
     def remove(self, nodes: Iterable[Node]) -> None:
         """Remove nodes, which have not been started."""
@@ -187,13 +189,18 @@ class InlineExecutor:
             part.phase = "ready"
 
     def start(self, nodes: Iterable[Node]) -> None:
-        """Start opened nodes at the present mission time."""
+        """Start opened nodes at the present mission time; one that raises ends."""
         for node in nodes:
             entry = self._entry(node)
             entry.part.phase = "running"
             self._part_at_work = entry.part
-            self._deliver(node.start(self.clock))
+            try:
+                published = node.start(self.clock)
+            except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+                self._fail(entry, error, ())
+                continue
             entry.due = node.due
+            self._deliver(published)
 
     @property
     def next_moment(self) -> int:
@@ -300,14 +307,20 @@ class InlineExecutor:
             entry.ended = True
             try:
                 entry.node.close()
-            except AeroDaaSError as error:
-                entry.part.error = entry.part.error or error
+            except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+                entry.part.error = entry.part.error or _as_project_error(entry.node, error)
             if entry.part.phase in {"ready", "running"}:
                 entry.part.phase = "done"
 
     def log_handler(self, level: int) -> logging.Handler:
         """A handler that publishes log records as alerts of the part at work."""
         return _AlertHandler(level, lambda: self._part_at_work)
+
+
+def _as_project_error(node: Node, error: Exception) -> AeroDaaSError:
+    if isinstance(error, AeroDaaSError):
+        return error
+    return AeroDaaSError(f"{node.name}: {failure_line(error)}")
 
 
 class _AlertHandler(logging.Handler):
