@@ -6,16 +6,15 @@ import uuid
 from pathlib import Path
 from typing import Any
 
+from drone_nodes import robot_spec
 from flying import robot
 
 from aerodaas.actors.drone.actor import DroneActor
-from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import Command
-from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.session import Session
-from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
-__all__ = ["DroneByHand", "drone_by_hand", "spec_by_hand"]
+__all__ = ["DroneByHand", "drone_by_hand"]
 
 
 class DroneByHand(DroneActor):
@@ -31,28 +30,6 @@ class DroneByHand(DroneActor):
         self.publisher(self.alerts.outlet.stream)
         self._open(())
         self._phase = "ready"
-
-
-class _InThisProcess(NearestNeighborScheduler):
-    isolated = False
-
-
-def spec_by_hand(
-    robot: RobotConfig,
-    *initial: Command,
-    navigation: tuple[str, ...] = (),
-    requesters: tuple[str, ...] = (),
-) -> RobotSpec:
-    """A robot without sensors, whose plans need no process of their own."""
-    return RobotSpec(
-        robot=robot,
-        sensors=(),
-        navigation=navigation,
-        commands=(),
-        requesters=requesters,
-        initial=tuple(initial),
-        scheduler=_InThisProcess(),
-    )
 
 
 def drone_by_hand(
@@ -71,7 +48,7 @@ def drone_by_hand(
     }
     environment = EnvironmentConfig.model_validate(content)
     (only,) = environment.robots
-    spec = spec_by_hand(only, *initial, navigation=navigation, requesters=requesters)
+    spec = robot_spec(only, *initial, navigation=navigation, requesters=requesters)
     session, name = Session(environment, speed, locks=locks), "drone/drone"
     actor = DroneByHand(session, name, (spec,))
     actor.open_here()

@@ -1,4 +1,4 @@
-"""What a drone's actor says of its robots while its loop flies them and commands come in."""
+"""The drone's actor by the clock: what its threads do while commands and reads come in."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import itertools
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from drone_by_hand import DroneByHand, drone_by_hand, spec_by_hand
+from drone_by_hand import DroneByHand, drone_by_hand
+from drone_nodes import UnreadableVehicle, robot_spec
 from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
-from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
-from aerodaas.runtime.reports import LATENCIES_KEPT, Latencies
 from aerodaas.runtime.session import Session
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
@@ -83,18 +83,6 @@ def test_reading_never_meets_a_mission_that_changes() -> None:
     _land(actor)
 
 
-def test_a_report_says_what_a_command_did_as_soon_as_it_is_answered() -> None:
-    """Who commands and then reads sees its own command's effect."""
-    actor = drone_by_hand(AddNavigation(hop((5, 0), hover=900)), speed=1.0, mission=_HOLD)
-    assert actor.robots()["drone"].status.state is MissionState.IDLE
-    actor.start(host_time_ns())
-    assert actor.command("drone", AddNavigation(_square("more"))).accepted
-    assert len(actor.robots()["drone"].status.pending) == 5
-    assert actor.command("drone", ClearNavigation()).accepted
-    assert actor.robots()["drone"].status.pending == ()
-    _land(actor)
-
-
 def test_commands_after_the_end_are_refused_at_once() -> None:
     """The loop turns no more, and the answer says how the mission ended."""
     actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
@@ -109,73 +97,6 @@ def test_commands_after_the_end_are_refused_at_once() -> None:
     assert answer.text == "the mission is over: landed"
     actor.stop()
     assert actor.robots()["drone"] == before
-
-
-def test_a_command_that_raises_is_its_senders_failure() -> None:
-    """What the loop carries out for somebody raises there, and the loop goes on."""
-    calls = LoopCalls(lambda: None)
-    loop = threading.Thread(target=lambda: _serve_until(calls, 3))
-    loop.start()
-    with pytest.raises(ZeroDivisionError):
-        calls.ask(lambda: 1 // 0, 5.0)
-    assert calls.ask(lambda: 7, 5.0) == 7
-    assert calls.ask(threading.get_ident, 5.0) == loop.ident
-    loop.join()
-    calls.close("the mission is over")
-    with pytest.raises(LoopOverError, match="the mission is over"):
-        calls.ask(lambda: 8, 5.0)
-
-
-def test_what_a_call_changed_is_published_before_it_is_answered() -> None:
-    """A caller that reads afterwards reads its own call's effect, in a loop however slow."""
-    value, published = [0], [0]
-
-    def publish() -> None:
-        time.sleep(0.05)
-        published[0] = value[0]
-
-    def add() -> None:
-        value[0] += 1
-
-    calls = LoopCalls(lambda: None, publish)
-    loop = threading.Thread(target=lambda: _serve_until(calls, 3))
-    loop.start()
-    for count in range(1, 4):
-        calls.ask(add, 5.0)
-        assert published == [count]
-    loop.join()
-
-
-def test_a_command_that_nobody_came_to_is_not_obeyed_later() -> None:
-    """Its sender was told that it was withdrawn."""
-    made: list[int] = []
-    calls = LoopCalls(lambda: None)
-    with pytest.raises(MissionError, match="withdrawn"):
-        calls.ask(lambda: made.append(1), 0.01)
-    assert calls.serve() == 0
-    assert made == []
-
-
-def test_the_newest_latencies_are_given_in_their_order() -> None:
-    """As many as asked for, or all there are."""
-    known = Latencies()
-    assert known.newest(3) == ()
-    for value in (1.0, 2.0, 3.0):
-        known.append(value)
-    assert known.newest(2) == (2.0, 3.0)
-    assert known.newest(9) == (1.0, 2.0, 3.0)
-    assert known.newest(0) == ()
-
-
-def test_latencies_kept_do_not_grow_with_the_flight() -> None:
-    """The newest are kept, however many there were."""
-    known = Latencies()
-    for value in range(5 * LATENCIES_KEPT):
-        known.append(float(value))
-    kept = known.newest(10 * LATENCIES_KEPT)
-    assert LATENCIES_KEPT <= len(kept) <= 2 * LATENCIES_KEPT
-    assert kept[-1] == 5 * LATENCIES_KEPT - 1
-    assert kept == tuple(float(value) for value in range(int(kept[0]), 5 * LATENCIES_KEPT))
 
 
 def test_a_change_is_told_to_a_call_that_waits() -> None:
@@ -213,22 +134,9 @@ def test_a_call_that_waits_for_a_change_returns_without_one() -> None:
     assert signal.wait(3, 60.0) == 3
 
 
-def test_an_alert_in_the_same_words_is_told_again_only_after_a_while() -> None:
-    """Others are told at once; what is told goes by mission time."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
-    second = 1_000_000_000
-    for stamp in range(12):
-        actor.publish_alert("kind", "the same", stamp * second, {})
-        actor.publish_alert("kind", f"another {stamp}", stamp * second, {})
-    told = [one for one in actor.report().alerts if one.text == "the same"]
-    assert [one.header.stamp // second for one in told] == [0, 5, 10]
-    assert len(actor.report().alerts) == 15
-    actor.stop()
-
-
 def test_what_is_told_while_connecting_has_the_missions_time() -> None:
     """Mission time stands at zero before the start, however long that takes."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0)
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=20.0)
     actor.alert("kind", "before")
     actor.start(host_time_ns())
     actor.alert("kind", "after")
@@ -248,43 +156,73 @@ def test_what_joins_in_flight_has_the_missions_time_before_it_starts() -> None:
     actor.stop()
 
 
-def _serve_until(calls: LoopCalls, count: int) -> None:
-    while count > 0:
-        count -= calls.serve()
+def _until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60.0
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def _until_over(actor: DroneByHand) -> None:
-    end = time.monotonic() + 60.0
-    while actor.report().phase == "running":
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    _until(lambda: actor.report().phase != "running")
 
 
 def _land(actor: DroneByHand) -> None:
-    end = time.monotonic() + 60.0
-    while actor.robots()["drone"].status.state in _ON_GROUND:
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    _until(lambda: actor.robots()["drone"].status.state not in _ON_GROUND)
     assert actor.command("drone", End()).accepted
     _until_over(actor)
     assert actor.robots()["drone"].status.state is MissionState.LANDED
     actor.stop()
 
 
-def test_alerts_of_drones_on_one_link_say_whose_they_are() -> None:
-    """Both tell the same at once; neither is lost, and each names its own drone."""
-    robots = [robot(id=name, sensors=[], settings={"battery": 0.1}) for name in ("west", "east")]
+@pytest.fixture
+def vehicle() -> Iterator[type[UnreadableVehicle]]:
+    """The class of vehicles that a test can spoil."""
+    yield UnreadableVehicle
+    UnreadableVehicle.unreadable.clear()
+    UnreadableVehicle.landings.clear()
+
+
+def test_an_actor_whose_loop_fails_leaves_its_vehicle_to_itself(
+    vehicle: type[UnreadableVehicle],
+) -> None:
+    """The vehicle is told to land, and the report names the error."""
+    actor = drone_by_hand(
+        AddNavigation(hop((2, 0), hover=900)), speed=20.0, driver="drone_nodes:UnreadableVehicle"
+    )
+    actor.start(host_time_ns())
+    _until(lambda: actor.robots()["drone"].status.state is MissionState.LOITERING)
+    vehicle.unreadable.add("drone")
+    _until(lambda: actor.report().phase == "failed")
+    assert "TypeError" in str(actor.report().error)
+    assert vehicle.landings[-1] == "drone"
+    actor.stop()
+
+
+def test_an_actor_flies_on_when_one_of_its_drones_fails(vehicle: type[UnreadableVehicle]) -> None:
+    """It ends once the others have landed, as failed, with the error of that drone."""
+    names = ("west", "north")
+    robots = [
+        robot(name, start=[0, 60 * place, 0], sensors=[], driver="drone_nodes:UnreadableVehicle")
+        for place, name in enumerate(names)
+    ]
     environment = EnvironmentConfig.model_validate(
         {"name": "shared", "robots": robots, "simulation": {"world": "empty"}}
     )
-    specs = tuple(spec_by_hand(one, AddNavigation(hop((1, 0)))) for one in environment.robots)
-    actor = DroneByHand(Session(environment, 20.0), "drone/west+east", specs)
+    hover = AddNavigation(hop((2, 0), hover=900))
+    specs = tuple(robot_spec(one, hover) for one in environment.robots)
+    actor = DroneByHand(Session(environment, 20.0), "drone/west+north", specs)
     actor.open_here()
     actor.start(host_time_ns())
-    _until_over(actor)
-    told = [one for one in actor.report().alerts if one.kind == "takeoff_refused"]
+    _until(lambda: all(one.status.state not in _ON_GROUND for one in actor.robots().values()))
+    vehicle.unreadable.add("west")
+    _until(lambda: any(one.kind == "drone_failed" for one in actor.report().alerts))
+    assert actor.report().phase == "running"
+    assert actor.command("north", End()).accepted
+    _until(lambda: actor.report().phase == "failed")
+    assert actor.robots()["north"].status.state is MissionState.LANDED
+    assert str(actor.report().error).startswith("west: TypeError")
     actor.stop()
-    assert {one.header.source for one in told} == {"drone/west", "drone/east"}
 
 
 def test_a_drone_is_held_by_the_actor_that_brings_it_home(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from drone_by_hand import spec_by_hand
+from drone_nodes import robot_spec
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.runtime.hosting import MOST_ALONE, by_actor
@@ -31,7 +31,7 @@ def _groups(
     robots: list[RobotConfig], edges: list[Placement] | None = None
 ) -> tuple[tuple[str, ...], ...]:
     session = Session(EnvironmentConfig(robots=robots), 1.0)
-    specs = [spec_by_hand(one) for one in robots]
+    specs = [robot_spec(one) for one in robots]
     groups = by_actor(specs, edges or [Placement()] * len(robots), session)
     return tuple(tuple(spec.robot.id for spec in group) for group in groups)
 

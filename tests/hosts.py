@@ -1,0 +1,49 @@
+"""A host for a node that a test steps by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from aerodaas.runtime.node import Outlet
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.status import Message
+
+__all__ = ["Hand", "published"]
+
+
+class Hand:
+    """Keeps the alerts of a node; mission time is what the test sets."""
+
+    def __init__(self) -> None:
+        """Start at mission time zero."""
+        self.time = 0
+        self.alerts: list[Alert] = []
+        self.wakes = 0
+
+    def now(self) -> int:
+        """Mission time, nanoseconds."""
+        return self.time
+
+    def alert(
+        self,
+        kind: str,
+        text: str,
+        stamp: int | None = None,
+        values: Mapping[str, Any] | None = None,
+        source: str = "",
+    ) -> None:
+        """Keep an alert."""
+        header = Header(len(self.alerts), self.time if stamp is None else stamp, source)
+        self.alerts.append(Alert(header, kind, text, dict(values or {})))
+
+    def wake(self) -> None:
+        """Count the calls."""
+        self.wakes += 1
+
+
+def published(stream: str, item: Any, stamp: int, seq: int = 0) -> Message[Any]:  # noqa: ANN401
+    """A message of a measurement at mission time `stamp`."""
+    outlet = Outlet(stream)
+    outlet.sent = seq
+    return outlet.measure(item, Header(seq, stamp, stream), 0)
