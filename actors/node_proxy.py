@@ -24,7 +24,7 @@ from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras
 from aerodaas.runtime.session import Session
-from aerodaas.types.clock import Clock, LockstepClock
+from aerodaas.types.clock import Clock, SimulatedClock
 from aerodaas.types.status import Message
 
 __all__ = ["NodeProxy", "Proxies"]
@@ -74,7 +74,7 @@ class _NodeHostActor:
     def start(self, now: int) -> _Stepped:
         """Begin the mission at mission time `now`."""
         self._now = now
-        clock = LockstepClock()
+        clock = SimulatedClock()
         clock.advance_to(now)
         return self._answer(self._made.start(clock))
 

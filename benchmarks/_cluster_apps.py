@@ -129,7 +129,7 @@ def flying(
     """An environment whose drones land when it is left; to be given a graph and launched inside."""
     path = folder / f"environment-{time.monotonic_ns()}.json"
     path.write_text(json.dumps(content), encoding="utf-8")
-    options = RunOptions(speed=1.0, lockstep=False, view=False, address=address, **words)
+    options = RunOptions(speed=1.0, simulated_time=False, view=False, address=address, **words)
     current_options.set(options)
     env = Environment(path)
     try:

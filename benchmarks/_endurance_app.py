@@ -67,17 +67,21 @@ def environment() -> dict[str, Any]:
 
 
 def main() -> None:
-    """Fly for the given time, in real time or in lockstep."""
+    """Fly for the given time, in real time or in simulated time."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seconds", type=float, required=True)
-    parser.add_argument("--lockstep", action="store_true")
+    parser.add_argument("--simulated", action="store_true")
     words = parser.parse_args()
     path = words.folder / "environment.json"
     path.write_text(json.dumps(environment()), encoding="utf-8")
-    speed = None if words.lockstep else 1.0
+    speed = None if words.simulated else 1.0
     options = RunOptions(
-        speed=speed, lockstep=words.lockstep, view=False, record=words.folder / "flight", seed=1
+        speed=speed,
+        simulated_time=words.simulated,
+        view=False,
+        record=words.folder / "flight",
+        seed=1,
     )
     current_options.set(options)
     env = Environment(path)

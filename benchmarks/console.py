@@ -94,7 +94,11 @@ def _fly(
     path = folder / "environment.json"
     path.write_text(json_format.dumps(content))
     options = RunOptions(
-        record=folder / "recorded", view=False, speed=1.0, lockstep=False, console="127.0.0.1:0"
+        record=folder / "recorded",
+        view=False,
+        speed=1.0,
+        simulated_time=False,
+        console="127.0.0.1:0",
     )
     token = current_options.set(options)
     try:

@@ -1,10 +1,10 @@
 """Situation Awareness over an edge and a cloud: what an analytics scheduler does to a flight.
 
-In lockstep, on an edge of a quarter of this machine's speed: its two networks take 100 and 140 ms
-there, and five frames a second leave 200 ms for both. In the cloud they take the 25 and 35 ms that
-they take here, 70 ms for the way there and back, and 42 ms for 53 kB of JPEG at 10 Mbit/s. These
-times are assumed; those of one execution are drawn around them. Benefits and deadlines are the
-application's. Results come as late as they would, and the drone flies by them.
+In simulated time, on an edge of a quarter of this machine's speed: its two networks take 100 and
+140 ms there, and five frames a second leave 200 ms for both. In the cloud they take the 25 and
+35 ms that they take here, 70 ms for the way there and back, and 42 ms for 53 kB of JPEG at
+10 Mbit/s. These times are assumed; those of one execution are drawn around them. Benefits and
+deadlines are the application's. Results come as late as they would, and the drone flies by them.
 
 python benchmarks/edge_and_cloud.py
 python benchmarks/edge_and_cloud.py --scheduler dems --network outage --seeds 5

@@ -140,13 +140,13 @@ class Watch:
                 process.wait(max(0.0, began + number * every - time.monotonic()))
 
 
-def fly(folder: Path, seconds: float, every: float, limit: float, *, lockstep: bool) -> Watch:
+def fly(folder: Path, seconds: float, every: float, limit: float, *, simulated_time: bool) -> Watch:
     """Fly for `seconds` of mission time and return what was seen, by wall seconds.
 
     Ctrl-C ends it early, with what was seen until then.
     """
     command = [sys.executable, str(APPLICATION), str(folder), "--seconds", str(seconds)]
-    command += ["--lockstep"] if lockstep else []
+    command += ["--simulated"] if simulated_time else []
     with (
         (folder / "log").open("w") as log,
         subprocess.Popen(command, stdout=log, stderr=log) as process,  # noqa: S603 - ours
@@ -156,7 +156,7 @@ def fly(folder: Path, seconds: float, every: float, limit: float, *, lockstep: b
         try:
             # Ctrl-C reaches the flight, too, which then ends by itself.
             with contextlib.suppress(KeyboardInterrupt):
-                watch.until_it_ends(process, recording, every, limit if lockstep else seconds)
+                watch.until_it_ends(process, recording, every, limit if simulated_time else seconds)
         finally:
             if process.poll() is None:
                 process.terminate()
@@ -193,11 +193,11 @@ def show(watch: Watch, warm_up: float, report: Report) -> None:
 def main(
     minutes: Annotated[float, typer.Option(help="Length of a flight in real time.")] = 15.0,
     simulated_hours: Annotated[
-        float | None, typer.Option(help="Fly this long in lockstep instead.")
+        float | None, typer.Option(help="Fly this long in simulated time instead.")
     ] = None,
     warm_up: Annotated[float, typer.Option(help="Wall seconds that do not count.")] = 120.0,
     every: Annotated[float, typer.Option(help="Seconds between two samples.")] = 5.0,
-    limit: Annotated[float, typer.Option(help="Most wall minutes in lockstep.")] = 600.0,
+    limit: Annotated[float, typer.Option(help="Most wall minutes in simulated time.")] = 600.0,
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
     """Fly one drone for long and print what grows, process by process.
@@ -205,14 +205,14 @@ def main(
     "slope" is a robust fit, "change" compares the medians of the first and the last quarter, both
     after the warm-up.
     """
-    lockstep = simulated_hours is not None
+    simulated_time = simulated_hours is not None
     seconds = 3600.0 * simulated_hours if simulated_hours is not None else 60.0 * minutes
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        watch = fly(folder, seconds, every, 60.0 * limit, lockstep=lockstep)
+        watch = fly(folder, seconds, every, 60.0 * limit, simulated_time=simulated_time)
         size = (folder / "flight" / "flight.mcap").stat().st_size / 1e6
         said = (folder / "log").read_text(encoding="utf-8")
-    title = f"{seconds / 3600.0:g} simulated hours" if lockstep else f"{minutes:g} minutes"
+    title = f"{seconds / 3600.0:g} simulated hours" if simulated_time else f"{minutes:g} minutes"
     report = Report("endurance", UNITS, packages=["ray", "mcap"])
     show(watch, warm_up, report)
     last = watch.shared[-1][0] if watch.shared else 0.0

@@ -98,7 +98,9 @@ def fly(
 ) -> Path:
     """Run live for `seconds` in `folder`; returns the recording."""
     folder.mkdir()
-    current_options.set(RunOptions(speed=1.0, lockstep=False, view=False, record=folder / "run"))
+    current_options.set(
+        RunOptions(speed=1.0, simulated_time=False, view=False, record=folder / "run")
+    )
     env = Environment(_environment(folder, drones, profiles, scheduler))
     edge = env.get_compute_resource_by_id("edge")
     drone = env.get_robot_by_id("drone")

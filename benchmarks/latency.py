@@ -95,7 +95,7 @@ def measure_ours(
     far: bool = False,
 ) -> Round:
     """Fly the four actors for `seconds`; `far` puts the analysis on another Ray node."""
-    current_options.set(RunOptions(speed=1.0, lockstep=False, view=False))
+    current_options.set(RunOptions(speed=1.0, simulated_time=False, view=False))
     env = Environment(_environment(folder, camera, far=far))
     drone = env.get_robot_by_id("drone")
     frames = drone.get_sensor_by_id("camera").get_data_stream()

@@ -62,7 +62,7 @@ def main(
     first: Annotated[int, typer.Option(help="The first seed.", min=0)] = 0,
     only: Annotated[list[str] | None, typer.Option(help="An application; repeat it.")] = None,
     speed: Annotated[
-        str, typer.Option(help='"max": lockstep; 1: real time, which the latencies need.')
+        str, typer.Option(help='"max": simulated time; 1: real time, which the latencies need.')
     ] = "max",
     jobs: Annotated[int, typer.Option(help="Flights at once, at most one a core.", min=1)] = 1,
     keep: Annotated[Path | None, typer.Option(help="Keep recordings and reports here.")] = None,

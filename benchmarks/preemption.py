@@ -84,7 +84,7 @@ def fly(events: int, folder: Path) -> Delays:
     }
     path = folder / "preemption.json"
     path.write_text(json.dumps(content), encoding="utf-8")
-    current_options.set(RunOptions(speed=1.0, lockstep=False, view=False))
+    current_options.set(RunOptions(speed=1.0, simulated_time=False, view=False))
     env = Environment(path)
     drone = env.get_robot_by_id("drone")
     frames = drone.get_sensor_by_id("camera").get_data_stream()

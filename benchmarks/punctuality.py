@@ -81,7 +81,9 @@ def _environment(folder: Path) -> Path:
 def measure(seconds: float, busy: int, folder: Path, settings: dict[str, str]) -> list[float]:
     """Milliseconds between the setpoints of a flight of `seconds`, from its start to its end."""
     os.environ.update(settings)
-    current_options.set(RunOptions(speed=1.0, lockstep=False, view=False, record=folder / "flight"))
+    current_options.set(
+        RunOptions(speed=1.0, simulated_time=False, view=False, record=folder / "flight")
+    )
     env = Environment(_environment(folder))
     drone = env.get_robot_by_id("drone")
     drone.get_sensor_by_id("odometry").get_data_stream()

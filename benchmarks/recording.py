@@ -78,7 +78,7 @@ def _measure(
     latencies = {}
     for recorded in (False, True):
         content = environment(drones, pictures, recorded=recorded, images=images)
-        run, _ = _fly(folder, content, _application(seconds), speed=1.0, lockstep=False)
+        run, _ = _fly(folder, content, _application(seconds), speed=1.0, simulated_time=False)
         assert run.state is not None  # noqa: S101 - it has flown
         seen = [
             sent.median_ms

@@ -1,6 +1,6 @@
 """Simulated seconds per wall second, and the processor's time that each of them takes.
 
-Farm Survey flies whole, in lockstep: physics, a camera of 640 x 360 at 15 a second, streams,
+Farm Survey flies whole, in simulated time: physics, a camera of 640 x 360 at 15 a second, streams,
 recording with JPEG pictures. The processor's time is that of the actors in flight, as the recording
 has it; Ray's threads cost some of it for each second of the wall, so it wants a quiet machine, too.
 "parts, in one process" (`_parts.py`) wants less of one: drone, camera and recorder by themselves.

@@ -31,7 +31,7 @@ from aerodaas.mission.commands import OpenStream
 from aerodaas.runtime.controller import RobotSpec, VehicleController
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS, LockstepClock, host_time_ns
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock, host_time_ns
 from aerodaas.types.data import Alert, Frame, Header
 from aerodaas.types.vehicle import VehicleState
 
@@ -110,7 +110,7 @@ def main() -> None:
     frames, boxes, navigation = (
         _Stream(scope, name) for name in ("tello/cam1", "tello/vests", _NAVIGATION)
     )
-    controller.start(LockstepClock())
+    controller.start(SimulatedClock())
     for turn in range(1, 600):
         now = turn * _TURN
         controller.advance_to(now)

@@ -58,7 +58,7 @@ class Flyer:
     @contextmanager
     def options(self, **words: Any) -> Iterator[None]:  # noqa: ANN401
         """Options of the runs made inside, as `aerodaas run` would set them; without plots."""
-        if words.get("speed") is not None or words.get("lockstep") is False:
+        if words.get("speed") is not None or words.get("simulated_time") is False:
             self._begin_ray()
         record = self.folder / "flight"
         token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))

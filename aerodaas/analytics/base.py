@@ -95,7 +95,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses declare the types they accept and produce, and implement `process`.
 
     Life cycle in the actor: `open` once, `process` for one item at a time (the newest one; in
-    lockstep, every one in order), `close` once.
+    simulated time, every one in order), `close` once.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (object,)

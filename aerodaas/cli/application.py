@@ -79,7 +79,7 @@ def runtime_option(text: str | None) -> Literal["inline", "ray"] | None:
 
 
 def speed_option(text: str | None) -> tuple[float | None, bool | None]:
-    """Read `--speed`: the factor, and whether lockstep is wanted; raises ConfigError."""
+    """Read `--speed`: the factor, and whether time is simulated; raises ConfigError."""
     if text is None:
         return None, None
     if text == "max":

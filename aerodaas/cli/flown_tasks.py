@@ -93,11 +93,13 @@ class Flown:
                     '"schedulers": {"analytics": "dems"} in the environment file'
                 )
             content = merged(allowed_content(recorded_content(recording)), {})
-            lockstep = recording.provenance.get("speed") == "max"
+            simulated_time = recording.provenance.get("speed") == "max"
         environment = validated(content, f"the environment in {path}")
         told = environment.schedulers
         models = {name: told_profile(name, told) for name in sorted({t.model for t in tasks})}
-        return cls(Path(path).stem, tasks, models, Resources(_cloud_slots(environment, lockstep)))
+        return cls(
+            Path(path).stem, tasks, models, Resources(_cloud_slots(environment, simulated_time))
+        )
 
 
 def _tasks(decisions: Iterable[dict[str, Any]]) -> list[FlownTask]:
@@ -118,9 +120,9 @@ def _tasks(decisions: Iterable[dict[str, Any]]) -> list[FlownTask]:
     return sorted(found.values(), key=lambda task: (task.arrival, task.number))
 
 
-def _cloud_slots(environment: EnvironmentConfig, lockstep: bool) -> int:  # noqa: FBT001
+def _cloud_slots(environment: EnvironmentConfig, simulated_time: bool) -> int:  # noqa: FBT001
     if environment.compute == "auto":
         return Resources().cloud_slots
     clouds = [one for one in environment.compute if one.kind == "cloud"]
-    # A simulated cloud was there in lockstep alone.
-    return sum(one.executors for one in clouds if lockstep or not one.simulated)
+    # A simulated cloud was there in simulated time alone.
+    return sum(one.executors for one in clouds if simulated_time or not one.simulated)

@@ -75,14 +75,14 @@ def replay(
         )
     app = find_application(app)
     folder = out or recording_folder(f"replay-{app.stem}")
-    factor, lockstep = speed_option(speed)
+    factor, simulated_time = speed_option(speed)
     options = RunOptions(
         environment=env,
         replay=recording.resolve(),
         scheduler=scheduler,
         model=model.resolve() if model else None,
         speed=factor,
-        lockstep=lockstep,
+        simulated_time=simulated_time,
         record=folder,
         address=address,
         view=view,

@@ -133,11 +133,11 @@ def run(
 
     application = find_application(application)
     # Who looks on and commands has the clock's time, unless another speed is asked for.
-    factor, lockstep = speed_option("1" if console and speed is None else speed)
+    factor, simulated_time = speed_option("1" if console and speed is None else speed)
     options = RunOptions(
         environment=env,
         speed=factor,
-        lockstep=lockstep,
+        simulated_time=simulated_time,
         runtime=runtime_option(runtime),
         seed=seed,
         scheduler=scheduler,

@@ -107,7 +107,7 @@ def serve(
     from aerodaas.service.serve import serve as run  # noqa: PLC0415 - slow to load
     from aerodaas.service.settings import ServiceSettings  # noqa: PLC0415
 
-    factor, lockstep = speed_option(speed)
+    factor, simulated_time = speed_option(speed)
     config = located(EnvironmentConfig.load(fleet), fleet.absolute().parent)
     settings = ServiceSettings(
         fleet=fleet.absolute(),
@@ -116,7 +116,7 @@ def serve(
         rehearse=rehearse,
         monitor=monitor,
         approval=approval,
-        speed="max" if lockstep else factor or 1.0,
+        speed="max" if simulated_time else factor or 1.0,
         most_attached=most_attached,
         edge_slots=edge_slots,
         actuators=_actuators(actuator or (), config),

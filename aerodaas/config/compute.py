@@ -93,8 +93,8 @@ class ComputeConfig(Strict):
     node: str | None = None
     """A named node's address, where the kind alone does not say."""
     simulated: bool = False
-    """Of the kind `cloud`: it is there in lockstep alone, if `simulation.execution_times` says how
-    long executions take, and left out in real time."""
+    """Of the kind `cloud`: there in simulated time alone, if `simulation.execution_times` says
+    how long executions take, and left out in real time."""
     executors: Annotated[int, Field(ge=1, le=256)] = 1
     """Inferences that may run at once."""
     compression: Literal["jpeg", "png", "none"] = "jpeg"

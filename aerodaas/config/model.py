@@ -173,10 +173,11 @@ class SimulationConfig(Strict):
     sensor_noise: NotNegative = 1.0
     """Scales the noise of the simulated odometry and GPS; 0 for none."""
     execution_times: str | None = None
-    """How long tasks of an analytics scheduler take in lockstep, around the times that it is told:
-    `nominal`, `lognormal:0.15` or `gamma:0.15`. None: no time at all, and without a cloud."""
+    """How long tasks of an analytics scheduler take in simulated time, around the times that it is
+    told: `nominal`, `lognormal:0.15` or `gamma:0.15`. None: no time at all, and without a cloud."""
     network: str = "steady"
-    """Link to the cloud in lockstep: `steady`, `trapezium:400`, `outage:30-45`, `trace:FILE`."""
+    """Link to the cloud in simulated time: `steady`, `trapezium:400`, `outage:30-45` or
+    `trace:FILE`."""
     network_period: Positive = 300.0
     """Seconds over which a network spreads that names no times of its own."""
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["LiveViews", "ProviderOptions", "RunOptions", "Speed", "current_options"]
 
 Speed: TypeAlias = "float | Literal['max']"
-"""Mission seconds per wall second; `max`: as fast as the machine goes, in lockstep."""
+"""Mission seconds per wall second; `max`: as fast as the machine goes, in simulated time."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class RunOptions:
     """Environment itself, in the place of the file's content; relative paths are the file's."""
     speed: float | None = None
     """Mission seconds per wall second."""
-    lockstep: bool | None = None
+    simulated_time: bool | None = None
     """Simulated time as fast as the machine goes; None: where all robots are simulated."""
     runtime: Literal["inline", "ray"] | None = None
     """Where cameras and analyses run in simulated time: in the application's process, or in actors
@@ -126,17 +126,17 @@ class RunOptions:
 
         Raises ConfigError for a speed that is none.
         """
-        if speed is None or self.speed is not None or self.lockstep is not None:
+        if speed is None or self.speed is not None or self.simulated_time is not None:
             return self
         if speed == "max":
-            return replace(self, lockstep=True)
+            return replace(self, simulated_time=True)
         try:
             factor = float(speed)
         except (TypeError, ValueError):
             factor = 0.0
         if not 0.0 < factor < float("inf"):
             raise ConfigError(f'speed is a positive number or "max", not {speed!r}')
-        return replace(self, speed=factor, lockstep=False)
+        return replace(self, speed=factor, simulated_time=False)
 
     def beside_application(self, path: Path) -> Path:
         """A relative path beside the application's file, else in the working directory."""

@@ -92,10 +92,10 @@ class Run:
         self._looked = 0.0
 
     @property
-    def lockstep(self) -> bool:
+    def in_simulated_time(self) -> bool:
         """Whether mission time advances as fast as the machine can process it."""
         simulated = all(_is_stepped(robot.driver) for robot in self.config.robots)
-        wanted = self.options.lockstep
+        wanted = self.options.simulated_time
         if wanted and not simulated:
             raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
         return simulated and self.options.speed is None if wanted is None else wanted
@@ -104,7 +104,7 @@ class Run:
     def _everything_on_ray(self) -> bool:
         """Whether every camera and analysis of a flight runs in an actor."""
         options = self.options
-        return not self.lockstep or options.runtime == "ray" or options.address is not None
+        return not self.in_simulated_time or options.runtime == "ray" or options.address is not None
 
     @property
     def _uses_ray(self) -> bool:
@@ -179,7 +179,7 @@ class Run:
         """The class of the flight: in this process, or on Ray, which is then started."""
         if self._uses_ray:
             self._connect(plan, begin_step)
-        if not self.lockstep:
+        if not self.in_simulated_time:
             from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads ray
 
             return Flight
@@ -372,7 +372,7 @@ class Run:
 
         self._check_world()
         self._take_tasks()
-        speed = None if self.lockstep else (self.options.speed or 1.0)
+        speed = None if self.in_simulated_time else (self.options.speed or 1.0)
         scheduler = self._environment.trajectory_scheduler()
         dispatch_with = self._environment.analytics_scheduler()
         self._change_models()
@@ -381,7 +381,7 @@ class Run:
             self.config,
             speed,
             timetables=self._timetables(),
-            edge=None if self.lockstep else self.options.edge,
+            edge=None if self.in_simulated_time else self.options.edge,
             locks=self.options.locks,
             application=application,
         )
@@ -469,7 +469,7 @@ class Run:
             return ""
 
     def _speed_text(self) -> str:
-        return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"
+        return "max" if self.in_simulated_time else f"{self.options.speed or 1.0:g}"
 
     def _watch(self, until: float) -> None:
         assert self._flight is not None  # noqa: S101 - launched

@@ -1,7 +1,7 @@
 """Planning beside the setpoint loop, so that a slow plan never delays a setpoint.
 
 The mission submits requests and polls for plans. `InlinePlanner` answers at once, so that runs in
-lockstep are deterministic; `BackgroundPlanner` plans on an executor while the drone flies on.
+simulated time are deterministic; `BackgroundPlanner` plans on an executor while the drone flies on.
 """
 
 from __future__ import annotations

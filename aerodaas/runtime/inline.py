@@ -19,7 +19,7 @@ from typing import Any
 from aerodaas.runtime.alerts import AlertLog
 from aerodaas.runtime.node import NEVER, Node
 from aerodaas.runtime.reports import ActorReport, Phase, SentCount, merged_values
-from aerodaas.types.clock import LockstepClock, seconds
+from aerodaas.types.clock import SimulatedClock, seconds
 from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.status import Message
 
@@ -124,7 +124,7 @@ class InlineExecutor:
 
     def __init__(self) -> None:
         """Start without nodes, at mission time zero."""
-        self.clock = LockstepClock()
+        self.clock = SimulatedClock()
         self.parts: dict[str, Part] = {}
         self._entries: list[_Entry] = []
         self._first: list[_Entry] = []

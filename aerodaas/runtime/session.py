@@ -12,7 +12,7 @@ from typing import Any
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
 from aerodaas.runtime.node import NEVER
-from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, LockstepClock, ScaledClock
+from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, ScaledClock, SimulatedClock
 
 __all__ = [
     "CONTROL_PERIOD_NS",
@@ -90,7 +90,7 @@ class Session:
     def clock(self) -> Clock:
         """New mission clock for a process of this run."""
         if self.speed is None or self.origin_ns is None:
-            return LockstepClock()
+            return SimulatedClock()
         return ScaledClock(self.speed, self.origin_ns)
 
     def host_seconds(self, mission_ns: int) -> float:

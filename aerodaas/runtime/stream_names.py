@@ -5,10 +5,7 @@ from __future__ import annotations
 from aerodaas.types.identifiers import INTERNAL, internal
 
 __all__ = [
-    "ACKS",
-    "ADVANCE",
     "DECISIONS",
-    "PROGRESS",
     "alert_stream",
     "done_stream",
     "end_stream",
@@ -26,14 +23,8 @@ __all__ = [
     "whereabouts_stream",
 ]
 
-ACKS = f"{INTERNAL}acks"
-"""Prefix of the streams on which the last readers of a path acknowledge processed items."""
 DECISIONS = f"{INTERNAL}decisions"
 """Stream of the analytics scheduler's decisions and their outcomes."""
-ADVANCE = f"{INTERNAL}advance"
-"""Stream on which the drone's actor, in lockstep, says how far mission time will go."""
-PROGRESS = f"{ACKS}/dispatcher"
-"""Stream on which a dispatcher with simulated executions says how far it has gone."""
 _GUESTS = "guest/"
 
 

@@ -151,7 +151,7 @@ class FlightView:
         before, earlier = self._before
         if counts == earlier or now <= before:
             return
-        # Over the whole flight so far: in lockstep short intervals of wall time vary much.
+        # Over the whole flight so far: in simulated time short intervals of wall time vary much.
         self._rates = {stream: count / now for stream, count in counts.items()}
         self._before = now, counts
 

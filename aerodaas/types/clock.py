@@ -1,4 +1,4 @@
-"""The mission clock: wall time, scaled time, or lockstep, behind one protocol.
+"""The mission clock: wall time, scaled time or simulated time, behind one protocol.
 
 Every stamp in this project is an integer of nanoseconds on the mission clock, which reads zero
 when the mission's actors start. Latencies are taken on `host_time_ns`, because simulated time
@@ -24,8 +24,8 @@ __all__ = [
     "NANOSECONDS",
     "Clock",
     "HostEpoch",
-    "LockstepClock",
     "ScaledClock",
+    "SimulatedClock",
     "WallOffset",
     "host_time_ns",
     "seconds",
@@ -149,12 +149,12 @@ class ScaledClock:
             time.sleep(remaining)
 
 
-class LockstepClock:
-    """Mission time that moves only when `advance_to` is called, as fast as the machine goes.
+class SimulatedClock:
+    """Mission time that stands still until `advance_to` moves it.
 
-    The conductor (the simulated drone's actor) advances it; everyone else follows the stamps of
-    the messages that they receive. Nothing here depends on the host's speed, so the same seed
-    gives the same run to the last digit.
+    The executor of a simulated flight advances it to the next moment at which a node is due.
+    Mission time so depends on the flight alone, not on the host: the same seed gives the same
+    flight to the last digit.
     """
 
     def __init__(self) -> None:

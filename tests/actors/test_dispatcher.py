@@ -133,11 +133,11 @@ def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patien
     assert actor._patience_with(profile) == patience * MILLISECOND
 
 
-@pytest.mark.parametrize("speed", [None, 1.0], ids=["lockstep", "real time"])
+@pytest.mark.parametrize("speed", [None, 1.0], ids=["simulated time", "real time"])
 def test_tasks_name_their_frames(flyer: Flyer, speed: float | None) -> None:
     """Each analysis works on the frame that its task is about, and no frame is published again.
 
-    In lockstep what an execution takes of the host's time counts for nothing: no task waits.
+    In simulated time what an execution takes of the host's time counts for nothing: no task waits.
     """
 
     def build(env: Environment) -> None:

@@ -59,7 +59,7 @@ def state_of(env: Environment) -> MissionState:
 def test_a_flight_in_scaled_time(flyer: Flyer) -> None:
     """At five times the wall's speed the drone visits its waypoint, returns and lands."""
     run = flyer.fly(short, speed=SPEED)
-    assert not run.lockstep
+    assert not run.in_simulated_time
     flight = recorded(run)
     assert flight.robots["drone"].outcome.startswith("landed")
     assert flight.robots["drone"].visited == ("wp0",)
@@ -204,7 +204,7 @@ def test_an_analysis_that_cannot_be_closed_is_told_of(flyer: Flyer) -> None:
         Unwritten().analyse(odometry_of(env))
 
     with pytest.raises(MissionError, match=r"drone/unwritten: OSError: the disk is full at analys"):
-        flyer.fly(build, lockstep=True)
+        flyer.fly(build, simulated_time=True)
 
 
 def test_a_trigger_ends_the_mission_and_wakes_an_analysis(flyer: Flyer) -> None:

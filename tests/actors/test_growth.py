@@ -30,7 +30,7 @@ pytestmark = pytest.mark.wall_clock
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
 BOTH = pytest.mark.parametrize(
-    "speed", [pytest.param(5.0, marks=pytest.mark.slow), None], ids=["real time", "lockstep"]
+    "speed", [pytest.param(5.0, marks=pytest.mark.slow), None], ids=["real time", "simulated time"]
 )
 
 
@@ -107,7 +107,7 @@ def places(*waypoints: Waypoint, unordered: bool = False) -> AeroNavigation:
 @BOTH
 def test_an_analysis_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
     """It gets what is measured from then on, is recorded, triggers, and stops with the mission."""
-    with flyer.flying(stay, speed=speed, lockstep=speed is None) as env:
+    with flyer.flying(stay, speed=speed, simulated_time=speed is None) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         with in_another_thread_meanwhile(env):
             heights = Jitter().analyse(odometry_of(env))
@@ -123,7 +123,7 @@ def test_an_analysis_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
 @BOTH
 def test_navigation_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
     """Waypoints are flown, then a stream of commands, both given in flight."""
-    with flyer.flying(stay, speed=speed, lockstep=speed is None) as env:
+    with flyer.flying(stay, speed=speed, simulated_time=speed is None) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         drone_of(env).navigate(places(Waypoint("urgent", 2.0, 2.0, 2.0, priority=0)))
         until(env, lambda: "urgent" in env.launch().look().robots["drone"].status.visited)
@@ -144,7 +144,7 @@ def test_a_scheduler_is_replaced_in_flight(flyer: Flyer, speed: float | None) ->
         waypoints += [Waypoint(f"w{number}", number, 1.0, 2.0) for number in range(1, 4)]
         drone_of(env).navigate(places(*waypoints, unordered=True))
 
-    with flyer.flying(build, speed=speed, lockstep=speed is None) as env:
+    with flyer.flying(build, speed=speed, simulated_time=speed is None) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         assert pending(env) == ["w1", "w2", "w3"]
         env.set_trajectory_scheduler(Backwards(env))
@@ -159,7 +159,7 @@ def test_a_camera_is_started_in_flight(flyer: Flyer) -> None:
         "robots": [robot(sensors=[CAMERA])],
         "recording": {"enabled": False},
     }
-    with flyer.flying(stay, content, lockstep=True) as env:
+    with flyer.flying(stay, content, simulated_time=True) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         frame = drone_of(env).get_sensor_by_id("cam").poll(20.0)
         assert frame.image.shape == (36, 64, 3)
@@ -167,8 +167,8 @@ def test_a_camera_is_started_in_flight(flyer: Flyer) -> None:
 
 
 def test_an_external_source_joins_a_flight(flyer: Flyer) -> None:
-    """In lockstep it ticks with mission time from then on."""
-    with flyer.flying(stay, lockstep=True) as env:
+    """In simulated time it ticks with mission time from then on."""
+    with flyer.flying(stay, simulated_time=True) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         ticks = Ticker().deploy(env.get_compute_resource_by_id("edge")).instantiate()
         first, second = ticks.get_data(10.0), ticks.get_data(10.0)
@@ -210,7 +210,7 @@ def test_what_cannot_join_is_refused_at_the_call(flyer: Flyer) -> None:
 def test_one_environment_flies_twice(flyer: Flyer) -> None:
     """The second start flies what was given since, into a recording of its own."""
     path = flyer.write(FLAT)
-    with flyer.options(lockstep=True):
+    with flyer.options(simulated_time=True):
         env = Environment(path)
         drone = drone_of(env)
         above = Above(0.5).analyse(odometry_of(env))

@@ -136,7 +136,7 @@ def kill_in_flight(
             assert written.complete
 
 
-def test_killed_in_lockstep(tmp_path: Path) -> None:
+def test_killed_in_simulated_time(tmp_path: Path) -> None:
     """Nothing falls down, so all of it ends at once, its recording closed."""
     write(tmp_path, hover=100_000)
     words = ("app.py", "--no-view", "--record", "out")

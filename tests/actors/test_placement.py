@@ -62,7 +62,7 @@ def test_the_drone_its_sensors_and_its_recorder_share_one_edge(told: dict[str, A
     }
 
 
-def test_in_lockstep_every_frame_reaches_every_node(told: dict[str, Any]) -> None:
+def test_in_simulated_time_every_frame_reaches_every_node(told: dict[str, Any]) -> None:
     """Nothing is lost on the way, wherever an analysis runs."""
     sent = {stream: count for stream, count in told["sent"].items() if "alerts" not in stream}
     assert set(sent) == {"drone/cam", *(f"drone/at_{name}" for name in told["expected"])}

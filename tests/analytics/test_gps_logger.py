@@ -218,7 +218,7 @@ def test_a_feed_tells_its_newest_row() -> None:
     assert [alert.kind for alert in alerts] == ["gps_feed_lost"]
 
 
-def test_a_logger_flies_along_in_lockstep(flyer: Flyer) -> None:
+def test_a_logger_flies_along_in_simulated_time(flyer: Flyer) -> None:
     """`instantiate()` puts the file's fixes into the recording at their mission times."""
     path = flyer.folder / "vip.gpx"
     path.write_text(GPX)

@@ -72,7 +72,7 @@ class Watched:
     @contextmanager
     def flying(self, settle: float = 4.0) -> Iterator[Watched]:
         """Be in the air, with analyses going on here and there; land when left."""
-        options = {"speed": 1.0, "lockstep": False, "address": self.cluster.address}
+        options = {"speed": 1.0, "simulated_time": False, "address": self.cluster.address}
         with self.flyer.flying(self._build, self.content, **options) as env:
             self.run = env.launch()
             eventually(lambda: self.done() > 0 and self.height() > 1.5)

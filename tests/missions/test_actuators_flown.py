@@ -44,7 +44,7 @@ def moved(recording: Recording) -> list[dict[str, str]]:
 @pytest.mark.slow
 def test_a_delivery_is_in_its_recording(flyer: Flyer) -> None:
     """Each position from the moment at which it was taken; a replay flies the same."""
-    run = flyer.fly(deliver, content(), lockstep=True)
+    run = flyer.fly(deliver, content(), simulated_time=True)
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
         assert moved(recording) == [

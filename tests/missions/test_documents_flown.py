@@ -27,7 +27,7 @@ APPS = Path(__file__).resolve().parents[2] / "apps"
     "name", ["farm_survey", pytest.param("vehicle_tracking", marks=pytest.mark.slow)]
 )
 def test_a_document_flies_as_its_application(flyer: Flyer, name: str) -> None:
-    """In lockstep, with one seed: the same trajectory, to the last digit."""
+    """In simulated time, with one seed: the same trajectory, to the last digit."""
     application = APPS / f"{name}.py"
     document = compile_application(application, [])
     path = flyer.folder / f"{name}.json"
@@ -41,7 +41,7 @@ def test_a_document_flies_as_its_application(flyer: Flyer, name: str) -> None:
     for number in range(2):
         record = flyer.folder / f"flight{number}"
         with flyer.options(
-            lockstep=True, seed=3, record=record, environment=place, application=application
+            simulated_time=True, seed=3, record=record, environment=place, application=application
         ):
             if number == 0:
                 runpy.run_path(str(application), run_name="__main__")

@@ -159,7 +159,7 @@ def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
     camera = {"id": "cam", "type": "camera", "rate": 5}
     content = environment()
     content["robots"][0]["sensors"].append(camera)
-    with flyer.options(speed=1.0, lockstep=False):
+    with flyer.options(speed=1.0, simulated_time=False):
         env = Environment(flyer.write(content))
         drone = env.get_robot_by_id("drone")
         frames = drone.get_sensor_by_id("cam")
@@ -215,7 +215,7 @@ def test_a_drone_that_hangs_is_told_though_nobody_waits(
         told.append(capsys.readouterr().err)
         return words in "".join(told)
 
-    with flyer.options(speed=2.0, lockstep=False):
+    with flyer.options(speed=2.0, simulated_time=False):
         env = Environment(flyer.write(environment()))
         drone = env.get_robot_by_id("drone")
         drone.navigate(hop((300, 0)))
@@ -240,7 +240,7 @@ def test_a_drone_that_hangs_is_told_though_nobody_waits(
 @pytest.mark.slow
 def test_a_recorder_that_is_killed_and_then_hangs(flyer: Flyer) -> None:
     """Each is told, what was recorded is named, and a recording that is cut is a failed run."""
-    with flyer.options(speed=2.0, lockstep=False):
+    with flyer.options(speed=2.0, simulated_time=False):
         env = Environment(flyer.write(environment()))
         drone = env.get_robot_by_id("drone")
         drone.navigate(hop((300, 0)))
@@ -275,7 +275,7 @@ def test_a_drone_whose_actor_died_keeps_no_other_in_the_air(flyer: Flyer) -> Non
     """The run has failed: every drone that can still be told lands."""
     limits = {"cruise_speed": 3.0, "takeoff_height": 2.0}
     robots = [robot(name, limits=limits) for name in ("first", "second")]
-    with flyer.options(speed=2.0, lockstep=False):
+    with flyer.options(speed=2.0, simulated_time=False):
         env = Environment(flyer.write({**environment(), "robots": robots}))
         for drone in env.get_env_robots():
             drone.navigate(hop((300, 0)))

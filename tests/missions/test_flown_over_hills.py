@@ -63,7 +63,7 @@ def test_a_flight_over_hills_keeps_its_clearance(flyer: Flyer) -> None:
         ]
         environment.get_robot_by_id("drone").navigate(AeroNavigation(data=asked))
 
-    run = flyer.fly(build, _hilly(flyer), lockstep=True)
+    run = flyer.fly(build, _hilly(flyer), simulated_time=True)
     drone = recorded(run).robots["drone"]
     assert drone.visited == ("edge", "across", "low", "sea")
     assert drone.plan["sea"][2] == pytest.approx(600.0 - 541.0)

@@ -41,7 +41,7 @@ def _flown_over_the_hall(
         "robots": [{**robot(), "limits": limits, "mission": mission}],
         "simulation": {"world": str(world)},
     }
-    return flyer.fly(build, content, lockstep=True)
+    return flyer.fly(build, content, simulated_time=True)
 
 
 @pytest.mark.wall_clock

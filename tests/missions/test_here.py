@@ -134,7 +134,7 @@ def fly(flyer: Flyer, how: str = "", said: str = "") -> tuple[RecordedFlight, He
     user = User(flyer.folder, application, how)
     with (
         user.joined(flyer.folder) as relay,
-        flyer.options(record=flyer.folder / "provider", lockstep=True, seed=5),
+        flyer.options(record=flyer.folder / "provider", simulated_time=True, seed=5),
     ):
         environment = Environment(flyer.folder / "environment.json")
         build_mission(user.document, environment, flyer.folder, HereSite(relay.path))
@@ -146,10 +146,12 @@ def fly(flyer: Flyer, how: str = "", said: str = "") -> tuple[RecordedFlight, He
 
 
 def test_it_flies_as_the_application_does(flyer: Flyer) -> None:
-    """In lockstep, with one seed: the same trajectory, to the last digit."""
+    """In simulated time, with one seed: the same trajectory, to the last digit."""
     theirs, relay = fly(flyer)
     application = flyer.folder / "application.py"
-    with flyer.options(record=flyer.folder / "own", lockstep=True, seed=5, application=application):
+    with flyer.options(
+        record=flyer.folder / "own", simulated_time=True, seed=5, application=application
+    ):
         runpy.run_path(str(application), run_name="__main__")
     with Recording.open(flyer.folder / "own" / "flight.mcap") as recording:
         own = RecordedFlight.read(recording)

@@ -36,7 +36,7 @@ def survey(env: Environment) -> None:
 @pytest.mark.slow
 def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None:
     """Each has a row, a file with a place in it, and a message on the robot's topic."""
-    run = flyer.fly(survey, content(), lockstep=True)
+    run = flyer.fly(survey, content(), simulated_time=True)
     assert run.recording is not None
     folder = run.recording.with_name("flight-photos")
     with (folder / "photos.csv").open(newline="") as file:
@@ -69,7 +69,7 @@ def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None
 @pytest.mark.slow
 def test_a_bolted_camera_loses_pictures_that_need_a_gimbal(flyer: Flyer) -> None:
     """The survey is flown, and the loss is told."""
-    run = flyer.fly(survey, content(settings={"width": 64, "height": 48}), lockstep=True)
+    run = flyer.fly(survey, content(settings={"width": 64, "height": 48}), simulated_time=True)
     assert run.recording is not None
     assert not run.recording.with_name("flight-photos").exists()
     with Recording.open(run.recording) as recording:

@@ -90,24 +90,24 @@ def test_boxes_and_tables(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "asked", "factor", "lockstep"),
+    ("given", "asked", "factor", "simulated_time"),
     [
         (RunOptions(), None, None, None),
         (RunOptions(), 3, 3.0, False),
         (RunOptions(), "max", None, True),
-        (RunOptions(speed=2.0, lockstep=False), 3, 2.0, False),
-        (RunOptions(lockstep=True), 3, None, True),
+        (RunOptions(speed=2.0, simulated_time=False), 3, 2.0, False),
+        (RunOptions(simulated_time=True), 3, None, True),
     ],
 )
 def test_the_command_lines_speed_goes_first(
     given: RunOptions,
     asked: Any,  # noqa: ANN401
     factor: float | None,
-    lockstep: bool | None,  # noqa: FBT001
+    simulated_time: bool | None,  # noqa: FBT001
 ) -> None:
     """What `start_mission(speed=…)` asks for holds where the command line says nothing."""
     options = given.at_speed(asked)
-    assert (options.speed, options.lockstep) == (factor, lockstep)
+    assert (options.speed, options.simulated_time) == (factor, simulated_time)
 
 
 @pytest.mark.parametrize("speed", [0, -1, float("nan"), float("inf"), "fast"])
@@ -122,7 +122,9 @@ def test_an_applications_speed_reaches_the_flight(
 ) -> None:
     """By the robot's method as by the environment's, once for this flight."""
     flown: list[tuple[float | None, bool]] = []
-    monkeypatch.setattr(Run, "start", lambda run: flown.append((run.options.speed, run.lockstep)))
+    monkeypatch.setattr(
+        Run, "start", lambda run: flown.append((run.options.speed, run.in_simulated_time))
+    )
     monkeypatch.setattr(Run, "over", True)
     monkeypatch.setattr(Run, "wait", lambda _: None)
     environment = Environment(Flyer(tmp_path).write(FLAT))

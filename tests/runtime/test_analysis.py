@@ -20,7 +20,7 @@ from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.runtime.triggers import TriggerSpec
-from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
 from aerodaas.types.data import Alert, Battery, Header, Odometry
 from aerodaas.types.status import Message, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
@@ -109,7 +109,7 @@ def node_of(work: Analytics[Any], host: Hand, **changes: Any) -> AnalysisNode:  
     """An opened and started node."""
     node = spec_of(work, **changes).make(_SESSION)
     node.open(host)
-    node.start(LockstepClock())
+    node.start(SimulatedClock())
     return node
 
 

@@ -15,7 +15,7 @@ from aerodaas.mission.commands import End
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import end_stream
-from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
 from aerodaas.types.data import Battery, Frame, Odometry
 from aerodaas.types.errors import SourceError
 from aerodaas.types.status import Message
@@ -91,7 +91,7 @@ def started(**words: Any) -> CameraNode:  # noqa: ANN401
     """The same, opened and started."""
     node = made(**words)
     node.open(Hand())
-    node.start(LockstepClock())
+    node.start(SimulatedClock())
     return node
 
 

@@ -1,4 +1,4 @@
-"""Lockstep: the same seed gives the same flight to the last bit, whatever the host is doing."""
+"""Simulated time: the same seed gives the same flight to the last bit, on a busy host too."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def fly(
     """Fly once more, into a folder of its own."""
     count = len(list(flyer.folder.glob("flight-*")))
     run = flyer.fly(build, content, seed=seed, record=flyer.folder / f"flight-{count}")
-    assert run.lockstep
+    assert run.in_simulated_time
     return recorded(run)
 
 

@@ -129,7 +129,7 @@ def survey(env: Environment, first: float = 3.0) -> None:
     stop.instantiate()
 
 
-def test_a_flight_in_lockstep_repeats_every_decision(surveyed: Run, flyer: Flyer) -> None:
+def test_a_flight_in_simulated_time_repeats_every_decision(surveyed: Run, flyer: Flyer) -> None:
     """Waypoints, wind, analytics in the loop, two drones: nothing differs."""
     assert surveyed.recording is not None
     second = again(flyer, surveyed, survey)
@@ -170,7 +170,9 @@ def test_a_flight_by_the_clock_is_seen_again(flyer: Flyer) -> None:
         Tardy().analyse(drone.get_sensor_by_id("cam").get_data_stream())
         end_after(env, 24)
 
-    first = flyer.fly(build, with_camera("png"), record=flyer.folder / "first", lockstep=False)
+    first = flyer.fly(
+        build, with_camera("png"), record=flyer.folder / "first", simulated_time=False
+    )
     assert first.recording is not None
     found = difference(first.recording, again(flyer, first, build))
     seen = {one.what: one for one in found.streams}["drone/tardy detections"]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session, next_due
-from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
+from aerodaas.types.clock import NANOSECONDS, ScaledClock, SimulatedClock
 
 rates = st.floats(0.1, 240.0) | st.integers(1, 240).map(float)
 stamps = st.integers(-1, 10_000 * NANOSECONDS)
@@ -72,9 +72,9 @@ def test_the_control_loop_runs_at_20_hz() -> None:
 
 
 def test_the_session_tells_its_clock() -> None:
-    """No speed is lockstep; a speed scales the wall's time."""
+    """Without a speed time is simulated; a speed scales the wall's time."""
     environment = EnvironmentConfig.model_validate({"robots": [{"id": "d"}]})
-    assert isinstance(Session(environment, None).clock(), LockstepClock)
+    assert isinstance(Session(environment, None).clock(), SimulatedClock)
     assert Session(environment, None).simulated
     quick = Session(environment, 5.0).starting_at(3)
     assert quick.clock() == ScaledClock(5.0, 3)

@@ -94,7 +94,7 @@ def _fly(flyer: Flyer, content: dict[str, Any], scheduler: str, seed: int = 5) -
 
     count = len(list(flyer.folder.glob("flight-*")))
     run = flyer.fly(watch, content, seed=seed, record=flyer.folder / f"flight-{count}")
-    assert run.lockstep
+    assert run.in_simulated_time
     assert recorded(run).robots["drone"].outcome.startswith("landed")
     return run
 

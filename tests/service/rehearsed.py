@@ -1,4 +1,4 @@
-"""Rehearsals flown in lockstep, for tests of their verdicts."""
+"""Rehearsals flown in simulated time, for tests of their verdicts."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ FLIGHT_SECONDS = 280
 
 @pytest.fixture(scope="module")
 def farm() -> Iterator[Served]:
-    """The Farm Survey's environment, in lockstep."""
+    """The Farm Survey's environment, in simulated time."""
     with Served(quick(FARM), "--speed", "max") as served:
         yield served
 
@@ -54,7 +54,7 @@ def states(path: Path) -> np.ndarray[Any, Any]:
 
 @pytest.mark.timeout(600)
 def test_the_farm_survey_flies_by_url_as_it_flies_at_home(farm: Served, tmp_path: Path) -> None:
-    """With one seed in lockstep, the same trajectory to the last digit, and its recording."""
+    """With one seed in simulated time, the same trajectory to the last digit, and its recording."""
     app = str(APPS / "farm_survey.py")
     token = farm.user("asha", "growers")
     words = ("submit", app, "--to", farm.url, "--seed", "11", "--record", str(tmp_path / "url"))

@@ -1,4 +1,4 @@
-"""Missions flown in the rehearsal's environment, in lockstep, and judged by their recordings."""
+"""Missions flown in the rehearsal's environment, in simulated time, and judged by recordings."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_an_application_flies_by_url_as_on_ones_own_drone(
     with Served(content, "--no-rehearse", "--speed", "max") as service:
         monkeypatch.setenv("AERODAAS_TOKEN", service.token)
         for name, changes in (
-            ("own", {"lockstep": True, "environment": environment}),
+            ("own", {"simulated_time": True, "environment": environment}),
             ("provided", {"provider": ProviderOptions(url=service.url)}),
         ):
             record = flyer.folder / name

@@ -77,7 +77,7 @@ class Tone:
 
 
 @pytest.mark.parametrize(
-    "speed", ["max", pytest.param("2", marks=pytest.mark.slow)], ids=["lockstep", "real time"]
+    "speed", ["max", pytest.param("2", marks=pytest.mark.slow)], ids=["simulated time", "real time"]
 )
 def test_classes_made_in_flight_reach_all_that_starts_and_all_that_runs(
     tmp_path: Path, speed: str

@@ -146,7 +146,7 @@ def environment(**camera: Any) -> dict[str, Any]:  # noqa: ANN401
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    """One flight in lockstep with plug-ins of every kind that lockstep has, and a guest."""
+    """One flight in simulated time with plug-ins of every kind that it has, and a guest."""
     folder = tmp_path_factory.mktemp("plugins")
     guests = folder / "elsewhere"
     write(

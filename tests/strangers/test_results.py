@@ -147,7 +147,7 @@ def turned(oblong):
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    """One flight in lockstep with results of every kind, read in two more processes."""
+    """One flight in simulated time with results of every kind, read in two more processes."""
     folder = tmp_path_factory.mktemp("kinds")
     graph = """
 judges = [Judge(), Judge()]

@@ -67,7 +67,7 @@ class Told(Analytics[float]):
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    """One flight in lockstep in which most results cannot be sent or read."""
+    """One flight in simulated time in which most results cannot be sent or read."""
     folder = tmp_path_factory.mktemp("bad")
     graph = """
 for kind in (Lock, Stream, Whole, Told):

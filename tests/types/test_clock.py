@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.types import clock
-from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
+from aerodaas.types.clock import NANOSECONDS, ScaledClock, SimulatedClock
 from aerodaas.types.errors import ClockError, ConfigError
 
 
@@ -51,37 +51,37 @@ def test_speeds_are_positive_and_finite(speed: float) -> None:
 
 
 @given(st.lists(st.integers(0, 10 * NANOSECONDS), min_size=1))
-def test_lockstep_time_goes_only_forward(stamps: list[int]) -> None:
+def test_simulated_time_goes_only_forward(stamps: list[int]) -> None:
     """It starts at zero, reads what it was last advanced to, and keeps that when told less."""
-    lockstep = LockstepClock()
-    assert lockstep.now() == 0
+    simulated = SimulatedClock()
+    assert simulated.now() == 0
     reached = 0
     for stamp in stamps:
         if stamp < reached:
             with pytest.raises(ClockError, match="backwards"):
-                lockstep.advance_to(stamp)
+                simulated.advance_to(stamp)
         else:
-            lockstep.advance_to(stamp)
+            simulated.advance_to(stamp)
             reached = stamp
-        assert lockstep.now() == reached
-        lockstep.sleep_until(reached)
+        assert simulated.now() == reached
+        simulated.sleep_until(reached)
 
 
-def test_a_lockstep_sleeper_wakes_at_its_stamp_and_no_sooner() -> None:
+def test_a_sleeper_wakes_at_its_stamp_and_no_sooner() -> None:
     """Woken at 9 it sleeps on; at 10 it goes on."""
-    lockstep = LockstepClock()
+    simulated = SimulatedClock()
     woke: list[int] = []
 
     def sleep() -> None:
-        lockstep.sleep_until(10)
-        woke.append(lockstep.now())
+        simulated.sleep_until(10)
+        woke.append(simulated.now())
 
     sleeper = threading.Thread(target=sleep, daemon=True)
     sleeper.start()
-    lockstep.advance_to(9)
+    simulated.advance_to(9)
     sleeper.join(0.05)
     assert woke == []
-    lockstep.advance_to(10)
+    simulated.advance_to(10)
     sleeper.join(10)
     assert woke == [10]
 

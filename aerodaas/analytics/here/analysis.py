@@ -35,7 +35,7 @@ class HereSite:
     path: Path
     """The relay's Unix socket, on the machine of the flight's process."""
     lossless: bool = False
-    """Send frames as PNG rather than JPEG: what a flight in lockstep needs to be repeatable."""
+    """Send frames as PNG rather than JPEG; a flight in simulated time is repeatable only so."""
 
 
 class HereAnalysis(Analytics[Any]):

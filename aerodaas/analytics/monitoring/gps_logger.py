@@ -33,7 +33,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
     or the `http://` address of a feed that answers with its newest row (JSON, CSV or GPX).
 
     The first timestamp of a file is mission time zero, plus `offset` seconds: a row written 10 s
-    after the first one is current 10 s into the mission, at any speed and in lockstep. Rows
+    after the first one is current 10 s into the mission, at any speed and in simulated time. Rows
     without timestamps follow each other at `rate`. Each fix is published once. A feed is polled
     at `rate` by the wall clock, and its rows are stamped on arrival.
     """

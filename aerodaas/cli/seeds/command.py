@@ -70,7 +70,7 @@ def run_seeds(
 
 def _shared_options(run: ApplicationRun) -> RunOptions:
     options = run.options
-    if options.lockstep is False:
+    if options.simulated_time is False:
         raise ConfigError("--seeds flies as fast as the machine goes: leave --speed out")
     shown = {"--live": options.live, "--console": options.console, "--ros2": options.ros2}
     for name, given in shown.items():
@@ -79,7 +79,9 @@ def _shared_options(run: ApplicationRun) -> RunOptions:
     if options.record is not None and options.record.suffix == ".mcap":
         raise ConfigError("with --seeds, --record names a folder: each run gets one below it")
     record = options.record or recording_folder(run.application.stem)
-    return replace(options, lockstep=True, record=record.absolute(), view=False, report="figures")
+    return replace(
+        options, simulated_time=True, record=record.absolute(), view=False, report="figures"
+    )
 
 
 def _tell(runs: list[SeededRun], title: str, json_path: Path | None, csv_path: Path | None) -> None:

@@ -55,7 +55,7 @@ _OWN = (
     "console",
     "replay",
     "speed",
-    "lockstep",
+    "simulated_time",
     "scheduler",
     "model",
     "guests",

@@ -158,7 +158,7 @@ class StreamLatency:
     total: list[float] = field(default_factory=list)
     """From capture to publishing."""
     age: list[float] = field(default_factory=list)
-    """The same in mission time, of results: in lockstep 0, or what simulated executions took."""
+    """The same in mission time, of results; 0 in simulated time without simulated executions."""
     overhead: list[float] = field(default_factory=list)
     """The part of `total` without computation: transport between actors and queueing."""
     wait: dict[str, list[float]] = field(default_factory=lambda: _Table(list))

@@ -27,7 +27,7 @@ class LatencyFigures:
     overhead_ms: float
     """Median of the part without computation: transport between actors and queueing."""
     age_ms: float
-    """Median of results in mission time: in lockstep 0, or what simulated executions took."""
+    """Median of results in mission time: in simulated time 0, or what simulated executions took."""
     age_p99_ms: float
 
 
@@ -121,7 +121,7 @@ class FlightSummary:
 
     @property
     def simulates_executions(self) -> bool:
-        """Whether it flew in lockstep, with results as old as simulated executions made them."""
+        """Whether it flew in simulated time, with results as old as simulated executions say."""
         aged = any(latency.age_p99_ms > 0.0 for latency in self.latencies.values())
         return self.provenance.get("speed") == "max" and aged
 

@@ -72,7 +72,8 @@ class FlightOrder(_Record):
     silence: SilencePolicy = SilencePolicy.CONTINUE
     silence_seconds: float = 30.0
     speed: Literal["max"] | float = 1.0
-    """Mission seconds a wall second; `max` for lockstep, where all robots are simulated."""
+    """Mission seconds a wall second; `max`: as fast as the machine goes, in simulated time,
+    where all robots are simulated."""
     seed: int | None = None
     address: str | None = None
     """Ray cluster to join; None for one of its own."""

@@ -122,14 +122,14 @@ class Flying:
 
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
-        lockstep = order.speed == "max"
+        simulated_time = order.speed == "max"
         self.config = environment_of(order).model_copy(update={"remote": _closed_remote()})
         current_options.set(
             RunOptions(
                 environment=order.fleet,
                 config=self.config,
                 speed=None if order.speed == "max" else order.speed,
-                lockstep=lockstep,
+                simulated_time=simulated_time,
                 senses_only=order.attached is not None,
                 seed=order.seed,
                 record=self._folder.recording,
@@ -141,7 +141,7 @@ class Flying:
             )
         )
         environment = self._environment = Environment(order.fleet)
-        here = HereSite(self._relay.path, lossless=lockstep)
+        here = HereSite(self._relay.path, lossless=simulated_time)
         build_mission(document, environment, self._folder.models, here)
         server = ControlServer(self._folder, self, self._lease, self._relay)
         try:

@@ -18,7 +18,7 @@ from aerodaas.drivers.mavlink.microservices.camera_status import (
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.safety.checklist import Checklist
-from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.health import HealthItem, Verdict
 from aerodaas.types.payload import CameraStatus, LensCamera, LensTarget, Photo, PhotoFailure
@@ -124,7 +124,7 @@ def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) ->
     """Within seconds, at the time of the camera's word, and without its own place."""
     with ends:
         ready(ends)
-        clock = LockstepClock()
+        clock = SimulatedClock()
         ends.vehicle.payload.clock = clock
         payload(ends).mute = True
         asked = ends.now

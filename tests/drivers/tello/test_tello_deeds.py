@@ -16,7 +16,7 @@ from aerodaas.drivers.tello.commands import STILL, Command, Sticks
 from aerodaas.drivers.tello.link import LinkCounts
 from aerodaas.drivers.tello.state import TelloState
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
 from aerodaas.types.errors import InvalidWaypointError, VehicleError
 from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
 
@@ -143,9 +143,9 @@ def test_before_it_is_met_nothing_is_done(monkeypatch: pytest.MonkeyPatch) -> No
     assert world.greeted[0][-1] == 103.0
 
 
-def _standing(seconds: float) -> LockstepClock:
+def _standing(seconds: float) -> SimulatedClock:
     """A mission clock that shows `seconds`."""
-    clock = LockstepClock()
+    clock = SimulatedClock()
     clock.advance_to(round(seconds * NANOSECONDS))
     return clock
 
