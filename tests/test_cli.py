@@ -507,13 +507,13 @@ def test_a_survey_loads_no_model_and_no_codec(tmp_path: Path) -> None:
     code = (
         "import sys\n"
         "from aerodaas.actors.cluster import ray_cluster\n"
-        "def connect(address, starting):\n"
+        "def connect(*_):\n"
         "    import aerodaas.actors.run.flight\n"
         "    print('loaded:', *{'cv2', 'onnxruntime', 'matplotlib', 'mcap'} & set(sys.modules))\n"
         "    raise SystemExit\n"
         "ray_cluster.begin, ray_cluster.connect = print, connect\n"
         "from aerodaas.cli.app import app\n"
-        "app(['run', 'farm_survey'])"
+        "app(['run', 'farm_survey', '--speed', '1'])"
     )
     said = subprocess.run(
         [sys.executable, "-c", code],

@@ -15,6 +15,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
 _APP = """
+import sys
 import time
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 
@@ -36,14 +37,14 @@ print("in the air", flush=True)
         ("drone.wait()", signal.SIGINT, 130, "interrupted from the keyboard"),
         ("time.sleep(300)", signal.SIGTERM, 143, "received SIGTERM"),
         ("1 / 0", None, 1, "the application ended"),
-        ("", None, 0, "the application ended"),
+        ("assert 'ray' not in sys.modules", None, 0, "the application ended"),
     ],
     ids=["Ctrl-C", "terminated", "an error of its own", "without waiting"],
 )
 def test_the_drone_lands_and_its_recording_is_closed(
     tmp_path: Path, ending: str, sent: signal.Signals | None, code: int, reason: str
 ) -> None:
-    """However the application ends; its exit code says how."""
+    """However the application ends; its exit code says how, and no Ray is loaded."""
     (tmp_path / "environment.json").write_text(json.dumps(FLAT))
     (tmp_path / "app.py").write_text(_APP + ending)
     with subprocess.Popen(
