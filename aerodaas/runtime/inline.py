@@ -196,7 +196,7 @@ class InlineExecutor:
             self._part_at_work = entry.part
             try:
                 published = node.start(self.clock)
-            except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+            except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
                 self._fail(entry, error, ())
                 continue
             entry.due = node.due
@@ -244,7 +244,7 @@ class InlineExecutor:
         self._part_at_work = entry.part
         try:
             published = entry.node.step(now, inputs)
-        except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+        except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
             self._fail(entry, error, inputs)
             return
         entry.due = entry.node.due
@@ -265,7 +265,7 @@ class InlineExecutor:
         while not self._posted.empty():
             self._deliver((self._posted.get(),))
 
-    def _fail(self, entry: _Entry, error: Exception, inputs: Sequence[Message[Any]]) -> None:
+    def _fail(self, entry: _Entry, error: BaseException, inputs: Sequence[Message[Any]]) -> None:
         """End a node whose step raised, and tell where."""
         entry.ended = True
         part = entry.part
@@ -307,7 +307,7 @@ class InlineExecutor:
             entry.ended = True
             try:
                 entry.node.close()
-            except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+            except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
                 entry.part.error = entry.part.error or _as_project_error(entry.node, error)
             if entry.part.phase in {"ready", "running"}:
                 entry.part.phase = "done"
@@ -317,7 +317,7 @@ class InlineExecutor:
         return _AlertHandler(level, lambda: self._part_at_work)
 
 
-def _as_project_error(node: Node, error: Exception) -> AeroDaaSError:
+def _as_project_error(node: Node, error: BaseException) -> AeroDaaSError:
     if isinstance(error, AeroDaaSError):
         return error
     return AeroDaaSError(f"{node.name}: {failure_line(error)}")

@@ -7,12 +7,17 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
-from flying import FLAT
+from flying import FLAT, Flyer, hop
 
+from aerodaas import Analytics, Environment, Odometry
+from aerodaas.analytics.base import Context
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.data import Readings
+from aerodaas.types.errors import MissionError
 
 _APP = """
 import sys
@@ -66,3 +71,27 @@ def test_the_drone_lands_and_its_recording_is_closed(
         drone = RecordedFlight.read(recording).robots["drone"]
     assert [band.reason for band in drone.bands if band.state == "landing"] == [reason]
     assert drone.position[-1, 2] < 0.2
+
+
+class Exiting(Analytics[Readings]):
+    """Calls `sys.exit`."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Odometry,)
+
+    def process(self, item: Odometry, context: Context) -> Readings:  # noqa: ARG002
+        """End the program, as its author thought."""
+        sys.exit("not in the mood")
+
+
+def test_an_analysis_that_exits_ends_alone(flyer: Flyer) -> None:
+    """The mission goes on to its end, which says what the analysis did."""
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        Exiting().analyse(drone.get_sensor_by_id("odom_drone").get_data_stream())
+        drone.navigate(hop((4, 0)))
+
+    with pytest.raises(MissionError, match="drone/exiting: SystemExit: not in the mood"):
+        flyer.fly(build)
+    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        assert RecordedFlight.read(recording).robots["drone"].visited == ("wp0",)
