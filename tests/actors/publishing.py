@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -10,7 +12,7 @@ from aerodaas.runtime.node import Outlet
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message
 
-__all__ = ["send"]
+__all__ = ["child_variables", "send"]
 
 _OUTLETS: WeakKeyDictionary[Publisher, Outlet] = WeakKeyDictionary()
 
@@ -19,3 +21,9 @@ def send(publisher: Publisher, item: Any, header: Header, captured: int) -> Mess
     """Number a measurement, publish it, and return what was sent."""
     outlet = _OUTLETS.setdefault(publisher, Outlet(publisher.stream))
     return publisher.publish(outlet.measure(item, header, captured))
+
+
+def child_variables() -> dict[str, str]:
+    """Variables of a child process that imports this module and the project."""
+    here = Path(__file__).parent
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parents[1]), str(here)])}

@@ -60,7 +60,7 @@ def test_the_sensors_process_is_bounded_before_the_camera_opens(flyer: Flyer) ->
             drone.get_sensor_by_id(name).get_data_stream()
         drone.navigate(hop((1, 0)))
 
-    flyer.fly(build, {**FLAT, "robots": [robot(sensors=sensors)]}, simulated_time=True)
+    flyer.fly(build, {**FLAT, "robots": [robot(sensors=sensors)]}, speed=5.0)
     before = resource.getrlimit(resource.RLIMIT_DATA)[0]
     assert int(own.read_text()) == before
     assert _MOST < int(stream.read_text()) < 2 * _MOST

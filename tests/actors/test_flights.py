@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
 
 import pytest
-from analyses import Above, Broken, Jitter, ProcessId, Ticker, Unwritten
+from analyses import ProcessId
 from flying import FLAT, Flyer, hop, recorded, robot
 
-from aerodaas import AeroListData, Environment, Odometry, Robot, Waypoint
+from aerodaas import Environment, Odometry, Robot
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.types.errors import GraphError, MissionError
 from aerodaas.types.status import MissionState
@@ -59,7 +58,7 @@ def state_of(env: Environment) -> MissionState:
 def test_a_flight_in_scaled_time(flyer: Flyer) -> None:
     """At five times the wall's speed the drone visits its waypoint, returns and lands."""
     run = flyer.fly(short, speed=SPEED)
-    assert not run.in_simulated_time
+    assert not run.lockstep
     flight = recorded(run)
     assert flight.robots["drone"].outcome.startswith("landed")
     assert flight.robots["drone"].visited == ("wp0",)
@@ -138,97 +137,6 @@ def test_poll_gives_the_newest(flyer: Flyer) -> None:
         assert sensor.poll(0.0).height > 1.0
         assert sensor.poll(0.0).height > 1.0
         drone_of(env).end_mission()
-
-
-def test_pause_and_resume(flyer: Flyer) -> None:
-    """A paused drone hovers where it is; resumed, it goes on to its waypoint."""
-
-    def build(env: Environment) -> None:
-        drone_of(env).navigate(hop((30, 0)))
-
-    with flyer.flying(build, speed=SPEED) as env:
-        drone = drone_of(env)
-        eventually(lambda: state_of(env) is MissionState.ENROUTE)
-        drone.pauseMission()
-        eventually(lambda: state_of(env) is MissionState.PAUSED)
-        time.sleep(0.3)
-        assert state_of(env) is MissionState.PAUSED
-        drone.resumeMission()
-        eventually(lambda: state_of(env) is not MissionState.PAUSED)
-    flight = recorded(env.launch())
-    assert flight.robots["drone"].visited == ("wp0",)
-    assert "paused" in [band.state for band in flight.robots["drone"].bands]
-
-
-def test_waypoints_added_in_flight_are_flown(flyer: Flyer) -> None:
-    """`add_navigation` and `clear_navigation` work on a mission that runs."""
-    content = {**FLAT, "robots": [robot(mission={"on_complete": "hold"})]}
-    with flyer.flying(long, content, speed=SPEED) as env:
-        eventually(lambda: state_of(env) is MissionState.LOITERING)
-        scheduler = env.trajectory_scheduler()
-        scheduler.clearNavigation()
-        eventually(lambda: state_of(env) is MissionState.HOLDING)
-        scheduler.addNavigation(AeroListData([Waypoint("extra", 2, 2, 2)]))
-        eventually(lambda: "extra" in env.launch().look().robots["drone"].status.visited)
-        drone_of(env).end_mission()
-    assert recorded(env.launch()).robots["drone"].outcome.startswith("landed: ")
-
-
-def test_an_analysis_that_raises_does_not_end_the_mission(flyer: Flyer) -> None:
-    """The mission is flown to its end; then the run fails, naming the analysis and the line."""
-
-    def build(env: Environment) -> None:
-        short(env)
-        Broken().analyse(odometry_of(env))
-
-    with pytest.raises(MissionError) as error:
-        flyer.fly(build, speed=SPEED)
-    assert error.value.exit_code == 1
-    said = str(error.value)
-    assert "drone/broken: ZeroDivisionError: a bug of the user's own at analyses.py:" in said
-    from aerodaas.recording.reader import Recording  # noqa: PLC0415
-    from aerodaas.recording.report.flight import RecordedFlight  # noqa: PLC0415
-
-    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
-        assert recording.complete
-        flight = RecordedFlight.read(recording)
-    assert flight.robots["drone"].visited == ("wp0",)
-    assert [kind for _, kind, _ in flight.alerts] == ["analysis_failed"]
-
-
-def test_an_analysis_that_cannot_be_closed_is_told_of(flyer: Flyer) -> None:
-    """What it was to write then is lost, and nobody would know."""
-
-    def build(env: Environment) -> None:
-        short(env)
-        Unwritten().analyse(odometry_of(env))
-
-    with pytest.raises(MissionError, match=r"drone/unwritten: OSError: the disk is full at analys"):
-        flyer.fly(build, simulated_time=True)
-
-
-def test_a_trigger_ends_the_mission_and_wakes_an_analysis(flyer: Flyer) -> None:
-    """A result that satisfies `when` lands the drone; a target sleeps until it is woken."""
-    woken: list[float] = []
-
-    def build(env: Environment) -> None:
-        long(env)
-        sleeper, high, ticker = Jitter(), Above(1.0), Ticker()
-        jitter = sleeper.analyse(odometry_of(env))
-        high.analyse(odometry_of(env))
-        high.trigger(sleeper)
-        ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
-        ticker.trigger(drone_of(env).end_mission, when=lambda count: count == 24)
-
-        def listen() -> None:
-            woken.extend(jitter)
-
-        env.graph.on_launch.append(lambda: threading.Thread(target=listen, daemon=True).start())
-
-    flight = recorded(flyer.fly(build, speed=SPEED))
-    assert flight.robots["drone"].outcome == "landed: an analysis asked to land"
-    assert woken
-    assert woken[0] > 1.0
 
 
 @pytest.mark.slow

@@ -1,37 +1,19 @@
-"""Graphs that grow in flight: analyses, navigation and schedulers given to a mission that flies."""
+"""A graph that grows on Ray: an analysis, navigation and a scheduler join a flight by the clock."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 import pytest
-from analyses import Above, Jitter, Ticker, Weave
-from flying import FLAT, Flyer, hop, recorded, robot
+from analyses import Above, Jitter, Weave
+from flying import Flyer, hop, recorded
 
-from aerodaas import (
-    AeroNavigation,
-    Environment,
-    NavigationType,
-    Odometry,
-    Robot,
-    SchedulingType,
-    TrajectoryScheduler,
-    Waypoint,
-)
-from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas import Environment, TrajectoryScheduler, Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.errors import GraphError, MissionError
 from aerodaas.types.status import MissionState
 
-pytestmark = pytest.mark.wall_clock
-
-CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
-BOTH = pytest.mark.parametrize(
-    "speed", [pytest.param(5.0, marks=pytest.mark.slow), None], ids=["real time", "simulated time"]
-)
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 
 class Backwards(TrajectoryScheduler):
@@ -44,187 +26,34 @@ class Backwards(TrajectoryScheduler):
         return sorted(pending, key=lambda waypoint: waypoint.id, reverse=True)
 
 
-class Unopened(Above):
-    """Cannot be opened."""
+def test_a_graph_grows_in_flight(flyer: Flyer) -> None:
+    """Its additions are flown, read, recorded and planned by, and an analysis ends the mission."""
 
-    def open(self) -> None:
-        """Raise."""
-        raise MissionError("the model is not there")
+    def build(env: Environment) -> None:
+        env.get_robot_by_id("drone").navigate(hop((1, 0), hover=600))
 
+    with flyer.flying(build, speed=5.0) as env:
+        drone = env.get_robot_by_id("drone")
+        odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
 
-def drone_of(env: Environment) -> Robot:
-    """The only drone."""
-    return env.get_robot_by_id("drone")
+        def until(holds: Callable[[], bool]) -> None:
+            deadline = time.monotonic() + 60.0
+            while not holds():
+                assert time.monotonic() < deadline, "it never happened"
+                assert not env.launch().look().over, "the mission is over"
+                time.sleep(0.02)
 
+        def is_in(state: MissionState) -> bool:
+            return env.launch().look().robots["drone"].status.state is state
 
-def odometry_of(env: Environment) -> AeroStreamData[Odometry]:
-    """Its odometry."""
-    return drone_of(env).get_sensor_by_id("odom_drone").get_data_stream()
-
-
-def stay(env: Environment) -> None:
-    """Hover at a place until the mission is ended."""
-    drone_of(env).navigate(hop((1, 0), hover=600))
-
-
-def until(env: Environment, condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    """Wait until `condition` holds; the mission must go on meanwhile."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "it never happened"
-        assert not env.launch().look().over, "the mission is over"
-        time.sleep(0.02)
-
-
-def state_of(env: Environment) -> MissionState:
-    """The mission's state."""
-    return env.launch().look().robots["drone"].status.state
-
-
-def pending(env: Environment) -> list[str]:
-    """What is still to be visited after the present waypoint, in planned order."""
-    status = env.launch().look().robots["drone"].status
-    return [waypoint.id for waypoint in status.pending]
-
-
-@contextmanager
-def in_another_thread_meanwhile(env: Environment) -> Iterator[None]:
-    """Half of what a heartbeat does before the block, and the other half after it."""
-    flight = env.launch()._flight
-    assert flight is not None
-    members = iter(flight._members.values())
-    next(members)
-    yield
-    assert list(members)
-
-
-def places(*waypoints: Waypoint, unordered: bool = False) -> AeroNavigation:
-    """Waypoints as navigation."""
-    order = SchedulingType.UNORDERED if unordered else SchedulingType.ORDERED
-    return AeroNavigation(NavigationType.DISTANCE_DRIVEN, waypoints, order)
-
-
-@BOTH
-def test_an_analysis_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
-    """It gets what is measured from then on, is recorded, triggers, and stops with the mission."""
-    with flyer.flying(stay, speed=speed, simulated_time=speed is None) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        with in_another_thread_meanwhile(env):
-            heights = Jitter().analyse(odometry_of(env))
-        assert heights.get_data(timeout=10.0) > 1.0
-        again = Above(0.0, "again").trigger(drone_of(env).end_mission).analyse(odometry_of(env))
-        assert again.name == "drone/again"
+        until(lambda: is_in(MissionState.LOITERING))
+        assert Jitter().analyse(odometry).get_data(timeout=10.0) > 1.0
+        env.set_trajectory_scheduler(Backwards(env))
+        drone.navigate(Weave().analyse(odometry))
+        env.trajectory_scheduler().clear_navigation()
+        until(lambda: is_in(MissionState.FOLLOWING))
+        Above(0.0, "again").trigger(drone.end_mission).analyse(odometry)
         run = env.launch()
     flight = recorded(run)
     assert flight.robots["drone"].bands[-1].state == "landed"
-    assert {"drone/jitter", "drone/again"} <= set(flight.latencies)
-
-
-@BOTH
-def test_navigation_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
-    """Waypoints are flown, then a stream of commands, both given in flight."""
-    with flyer.flying(stay, speed=speed, simulated_time=speed is None) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        drone_of(env).navigate(places(Waypoint("urgent", 2.0, 2.0, 2.0, priority=0)))
-        until(env, lambda: "urgent" in env.launch().look().robots["drone"].status.visited)
-        drone_of(env).navigate(Weave().analyse(odometry_of(env)))
-        env.trajectory_scheduler().clear_navigation()
-        until(env, lambda: state_of(env) is MissionState.FOLLOWING)
-        drone_of(env).end_mission()
-        run = env.launch()
-    assert "following" in {band.state for band in recorded(run).robots["drone"].bands}
-
-
-@BOTH
-def test_a_scheduler_is_replaced_in_flight(flyer: Flyer, speed: float | None) -> None:
-    """What is queued is planned anew, beginning with what was queued before."""
-
-    def build(env: Environment) -> None:
-        waypoints = [Waypoint("a0", 0, 0, 2.0, hover_duration=600.0)]
-        waypoints += [Waypoint(f"w{number}", number, 1.0, 2.0) for number in range(1, 4)]
-        drone_of(env).navigate(places(*waypoints, unordered=True))
-
-    with flyer.flying(build, speed=speed, simulated_time=speed is None) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        assert pending(env) == ["w1", "w2", "w3"]
-        env.set_trajectory_scheduler(Backwards(env))
-        until(env, lambda: pending(env) == ["w3", "w2", "w1"])
-        drone_of(env).end_mission()
-
-
-def test_a_camera_is_started_in_flight(flyer: Flyer) -> None:
-    """One that is not recorded and that the application did not read when the mission began."""
-    content = {
-        **FLAT,
-        "robots": [robot(sensors=[CAMERA])],
-        "recording": {"enabled": False},
-    }
-    with flyer.flying(stay, content, simulated_time=True) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        frame = drone_of(env).get_sensor_by_id("cam").poll(20.0)
-        assert frame.image.shape == (36, 64, 3)
-        drone_of(env).end_mission()
-
-
-def test_an_external_source_joins_a_flight(flyer: Flyer) -> None:
-    """In simulated time it ticks with mission time from then on."""
-    with flyer.flying(stay, simulated_time=True) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        ticks = Ticker().deploy(env.get_compute_resource_by_id("edge")).instantiate()
-        first, second = ticks.get_data(10.0), ticks.get_data(10.0)
-        assert second != first
-        drone_of(env).end_mission()
-
-
-def test_what_cannot_join_is_refused_at_the_call(flyer: Flyer) -> None:
-    """The graph stays as it was, and the mission flies on."""
-    sensors = [*robot()["sensors"], CAMERA]
-    robots = [robot(sensors=sensors), robot("other")]
-    content = {**FLAT, "robots": robots, "schedulers": {"analytics": "fifo"}}
-    with flyer.flying(stay, content, speed=5.0) as env:
-        until(env, lambda: state_of(env) is MissionState.LOITERING)
-        nodes = set(env.graph.nodes)
-        with (
-            in_another_thread_meanwhile(env),
-            pytest.raises(MissionError, match="the model is not there"),
-        ):
-            Unopened(0.0).analyse(odometry_of(env))
-        with pytest.raises(GraphError, match="other cannot join a mission in flight"):
-            env.get_robot_by_id("other").navigate(hop((1, 1)))
-        camera = drone_of(env).get_sensor_by_id("cam").get_data_stream()
-        model = SyntheticAnalytics("model", 1, 1).deploy(env.get_compute_resource_by_id("edge"))
-        with pytest.raises(GraphError, match="drone/model would be a task of the analytics"):
-            model.analyse(camera)
-        with pytest.raises(GraphError, match="takes a stream of"):
-            Above(0.0).analyse(camera)
-        assert set(env.graph.nodes) == nodes
-        above = Above(0.0)
-        above.analyse(odometry_of(env))
-        with pytest.raises(GraphError, match=r"drone/above runs already.*\n.*test_growth\.py"):
-            above.trigger(drone_of(env).end_mission)
-        assert state_of(env) is MissionState.LOITERING
-        drone_of(env).end_mission()
-
-
-@pytest.mark.slow
-def test_one_environment_flies_twice(flyer: Flyer) -> None:
-    """The second start flies what was given since, into a recording of its own."""
-    path = flyer.write(FLAT)
-    with flyer.options(simulated_time=True):
-        env = Environment(path)
-        drone = drone_of(env)
-        above = Above(0.5).analyse(odometry_of(env))
-        drone.navigate(hop((2, 0)))
-        drone.start_mission(wait=False)
-        drone.start_mission()
-        first = env.launch()
-        drone.navigate(places(Waypoint("later", 0, 2, 2.0)))
-        drone.start_mission(wait=False)
-        assert above.get_data(20.0) > 0.5
-        drone.wait()
-        second = env.launch()
-        drone.start_mission()
-        third = env.launch()
-    visited = [recorded(run).robots["drone"].visited for run in (first, second, third)]
-    assert visited == [("wp0",), ("later",), ("later",)]
-    assert len({run.recording for run in (first, second, third)}) == 3
+    assert {"drone/jitter", "drone/again", "drone/weave"} <= set(flight.latencies)

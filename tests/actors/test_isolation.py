@@ -76,7 +76,7 @@ def test_two_versions_of_a_package_fly_side_by_side(flyer: Flyer) -> None:
         for name in ("old", "new", "plain"):
             env.graph.nodes[f"drone/{name}"].work.trigger(drone.end_mission, Is(flyer.folder, name))
 
-    flyer.fly(build, {**FLAT, "runtime_env": {"new": fresh}})
+    flyer.fly(build, {**FLAT, "runtime_env": {"new": fresh}}, speed=5.0)
     for name in ("old", "new", "plain"):
         said[name] = (flyer.folder / name).read_text()
     assert said == {"old": "1.0 -", "new": "2.0 second", "plain": "none -"}
@@ -106,7 +106,7 @@ def refused(
         edge = env.get_compute_resource_by_id("edge")
         Versions("old").deploy(edge, runtime_env=told).analyse(odometry)
 
-    flyer.fly(build, {**FLAT, "runtime_env": in_file or {}})
+    flyer.fly(build, {**FLAT, "runtime_env": in_file or {}}, speed=5.0)
 
 
 def test_what_cannot_be_provided_is_refused_before_take_off(

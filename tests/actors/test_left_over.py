@@ -136,10 +136,10 @@ def kill_in_flight(
             assert written.complete
 
 
-def test_killed_in_simulated_time(tmp_path: Path) -> None:
-    """Nothing falls down, so all of it ends at once, its recording closed."""
+def test_killed_in_flight(tmp_path: Path) -> None:
+    """The drone comes home by itself; then all of it ends, its recording closed."""
     write(tmp_path, hover=100_000)
-    words = ("app.py", "--no-view", "--record", "out")
+    words = ("app.py", "--no-view", "--speed", "5", "--record", "out")
     with started(tmp_path, "run", *words) as process:
         kill_in_flight(process, tmp_path / "out" / "flight.mcap")
 
@@ -147,7 +147,7 @@ def test_killed_in_simulated_time(tmp_path: Path) -> None:
 def test_killed_without_a_recording(tmp_path: Path) -> None:
     """The orphan reaper, which else lives in the recorder, has an actor of its own."""
     write(tmp_path, hover=100_000)
-    words = ("app.py", "--no-view", "--set", "recording.enabled=false")
+    words = ("app.py", "--no-view", "--speed", "5", "--set", "recording.enabled=false")
     with started(tmp_path, "run", *words) as process:
         kill_in_flight(process, None)
 
@@ -155,7 +155,7 @@ def test_killed_without_a_recording(tmp_path: Path) -> None:
 def test_killed_together_with_its_recorder(tmp_path: Path) -> None:
     """Ray restarts the recorder, and the orphan reaper in it, which has heard nobody."""
     write(tmp_path, hover=100_000)
-    words = ("app.py", "--no-view", "--record", "out")
+    words = ("app.py", "--no-view", "--speed", "5", "--record", "out")
     with started(tmp_path, "run", *words) as process:
         kill_in_flight(process, None, "RecorderActor")
 

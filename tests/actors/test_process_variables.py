@@ -72,9 +72,7 @@ def test_a_secret_is_in_the_environment_and_in_no_file(flyer: Flyer) -> None:
         curious.trigger(drone.end_mission, Noted(said))
 
     variables = {"HUB_KEY": SECRET, "PYTHON_LABEL": EARLY}
-    flyer.fly(
-        build, {**FLAT, "runtime_env": {"curious": {"env_vars": variables}}}, simulated_time=True
-    )
+    flyer.fly(build, {**FLAT, "runtime_env": {"curious": {"env_vars": variables}}}, speed=5.0)
     arrived, early, output = said.read_text().split(" ", 2)
     assert (arrived, early) == (SECRET, EARLY)
     session = Path(output).parents[1]

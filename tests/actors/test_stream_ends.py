@@ -21,7 +21,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
-from publishing import send
+from publishing import child_variables, send
 from required import needs, needs_root
 
 from aerodaas.actors.streams import (
@@ -74,7 +74,10 @@ def slots(publisher: Publisher) -> tuple[int, int]:
 def child(code: str, *words: str) -> subprocess.Popen[str]:
     """Run the code in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-c", code, *words], stdout=subprocess.PIPE, text=True, cwd=ROOT
+        [sys.executable, "-c", code, *words],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=child_variables(),
     )
 
 
@@ -199,6 +202,7 @@ def test_slots_of_a_killed_reader_return() -> None:
 _TALKER = """
 import sys
 import numpy as np
+from publishing import send
 from aerodaas.actors.streams import Publisher
 from aerodaas.types.data import Header
 publisher, number = Publisher(sys.argv[1], "s"), 0
@@ -235,6 +239,7 @@ def test_a_publisher_killed_while_it_sends_leaves_whole_messages() -> None:
 _STATE_FIRST = """
 import sys, time
 import numpy as np
+from publishing import send
 from aerodaas.actors.streams import Publisher
 from aerodaas.types.data import Header
 state, frames = Publisher(sys.argv[1], "state"), Publisher(sys.argv[1], "frames")
@@ -419,6 +424,7 @@ def test_a_reader_that_holds_its_fill_and_copies_one_more_gets_the_newest() -> N
 
 _STARVED = """
 import os, resource, sys
+from publishing import send
 from aerodaas.actors.streams import Publisher, Subscriber
 from aerodaas.types.data import Header
 publisher, old = Publisher(sys.argv[1], "s"), Subscriber(sys.argv[1], {"s": 1})

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ray
-from publishing import send
+from publishing import child_variables, send
 from required import needs
 from stream_reader import Reader, Seen, digest
 
@@ -289,6 +289,7 @@ def test_a_reader_that_is_killed_harms_nobody() -> None:
 
 _PUBLISHER = """
 import sys, time
+from publishing import send
 from aerodaas.actors.streams import Publisher
 from aerodaas.types.data import Header
 publisher = Publisher(sys.argv[1], "s")
@@ -304,11 +305,14 @@ def test_a_publisher_that_is_killed_and_returns_is_read_again() -> None:
     """A restarted actor's stream goes on for those who read the one that died."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
     subscriber = Subscriber(scope, {"s": 8})
-    root = Path(__file__).resolve().parents[2]
     for _ in range(2):
         command = [sys.executable, "-c", _PUBLISHER, scope]
         with subprocess.Popen(
-            command, text=True, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            command,
+            text=True,
+            env=child_variables(),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         ) as process:
             assert process.stdin is not None
             assert process.stdout is not None

@@ -21,6 +21,7 @@ from flying import FLAT, Flyer, hop, robot  # noqa: E402
 from ray.cluster_utils import Cluster  # noqa: E402
 
 from aerodaas import Analytics, Environment, Frame  # noqa: E402
+from aerodaas.actors.run.flight import Flight  # noqa: E402
 from aerodaas.analytics.base import Context  # noqa: E402
 from aerodaas.types.errors import AeroDaaSError  # noqa: E402
 
@@ -74,8 +75,8 @@ def main() -> None:
     cluster.add_node(resources=accelerated, num_gpus=2, node_name="cloud-b", **small)
     told: dict[str, Any] = {"expected": list(PLACES)}
     try:
-        run = flyer.fly(deployed, content(), address=cluster.address)
-        assert run._flight is not None
+        run = flyer.fly(deployed, content(), speed=1.0, address=cluster.address)
+        assert isinstance(run._flight, Flight)
         names = {node["NodeID"]: node["NodeName"] for node in ray.nodes()}
         told["places"] = {who: names[i.node_id] for who, i in run._flight.infos().items()}
         told["hardware"] = {
@@ -93,7 +94,7 @@ def main() -> None:
             PLACES["second"] = wrong
             (flyer.folder / "flight" / "flight.mcap").unlink(missing_ok=True)
             try:
-                flyer.fly(deployed, content(), address=cluster.address)
+                flyer.fly(deployed, content(), speed=1.0, address=cluster.address)
             except AeroDaaSError as error:
                 told["refusals"].append(str(error))
         told["left"] = ray.util.list_named_actors(all_namespaces=True)

@@ -16,6 +16,7 @@ from flying import FLAT, Flyer, hop, robot
 from glances import Glance
 
 from aerodaas import Environment
+from aerodaas.actors.run.flight import Flight
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -111,7 +112,7 @@ class Watched:
 
     def process(self, actor: str) -> psutil.Process:
         """The process of an actor on the edge."""
-        assert self.run._flight is not None
+        assert isinstance(self.run._flight, Flight)
         return self.cluster.edge.find(self.run._flight.infos()[actor].pid)
 
 

@@ -24,12 +24,13 @@ pytestmark = needs_root
 _STREAM = """
 import numpy as np
 from aerodaas.actors.streams import Publisher, Subscriber, shared_memory_obstacle
+from aerodaas.runtime.node import Outlet
 from aerodaas.types.data import Header
 print(shared_memory_obstacle() or "available")
 if not shared_memory_obstacle():
     subscriber = Subscriber("of-a-second-user", {"frames": 4})
     publisher = Publisher("of-a-second-user", "frames")
-    publisher.measure(np.zeros(100_000), Header(0, 0, "camera"), 0)
+    publisher.publish(Outlet("frames").measure(np.zeros(100_000), Header(0, 0, "camera"), 0))
     assert len(subscriber.receive(5.0)) == 1
 """
 _RUN = """

@@ -53,12 +53,12 @@ def content(*robots: dict[str, Any], **sections: Any) -> dict[str, Any]:  # noqa
 
 
 def launched(flyer: Flyer, env: Environment) -> None:
-    """Start, but for Ray, which must not have been reached."""
+    """Start, but for the flight, whose runtime must not have been reached."""
     with (
         flyer.options(),
         patch(
-            "aerodaas.actors.cluster.ray_cluster.connect",
-            side_effect=AssertionError("Ray was reached"),
+            "aerodaas.environment.run.Run._runtime",
+            side_effect=AssertionError("nothing was refused"),
         ),
     ):
         env.launch()
@@ -227,7 +227,7 @@ def test_a_shared_file_may_tell_of_analyses_that_ship(folder: Flyer) -> None:
     env = opened(folder, content(schedulers=schedulers))
     model = SyntheticAnalytics("model", 10, 20).deploy(env.get_compute_resource_by_id("edge"))
     model.analyse(env.get_robot_by_id("drone").get_sensor_by_id("cam1").get_data_stream())
-    with pytest.raises(AssertionError, match="Ray was reached"):
+    with pytest.raises(AssertionError, match="nothing was refused"):
         launched(folder, env)
 
 
@@ -283,7 +283,7 @@ def test_a_strangers_settings_are_checked_if_it_says_how(
             with pytest.raises(ConfigError, match=r"robot drone: .*did you mean baud\?"):
                 launched(folder, env)
         else:
-            with pytest.raises(AssertionError, match="Ray was reached"):
+            with pytest.raises(AssertionError, match="nothing was refused"):
                 launched(folder, env)
 
 

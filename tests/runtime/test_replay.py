@@ -112,7 +112,7 @@ def again(flyer: Flyer, run: Run, build: Callable[[Environment], object], **word
 
 
 @pytest.fixture(scope="module")
-def surveyed(runtime: None, tmp_path_factory: pytest.TempPathFactory) -> Run:  # noqa: ARG001
+def surveyed(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """A flight of two drones, one by waypoints, one by what an analysis makes of its odometry."""
     two = [robot("one"), robot("two", start=[0, 6, 0])]
     flyer = Flyer(tmp_path_factory.mktemp("surveyed"))
