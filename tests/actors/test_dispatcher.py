@@ -30,7 +30,7 @@ from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import task_stream
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
 from aerodaas.schedulers.analytics.published.dems import Dems
-from aerodaas.types.clock import NANOSECONDS, LockstepClock
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
 from aerodaas.types.data import Header
 
 pytestmark = pytest.mark.wall_clock
@@ -138,7 +138,7 @@ def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patien
     dispatcher = LiveDispatcher(Session(environment), Dems(), (managed,), Resources())
     host = Hand()
     dispatcher.open(host)
-    dispatcher.start(LockstepClock())
+    dispatcher.start(SimulatedClock())
     frame = Frame(Header(0, 0, "drone/camera"), np.zeros((2, 2, 3), np.uint8))
     tasks = dispatcher.step(0, [published("drone/camera", frame, 0)])
     assert task_stream("m") in {message.stream for message in tasks}

@@ -58,7 +58,7 @@ def state_of(env: Environment) -> MissionState:
 def test_a_flight_in_scaled_time(flyer: Flyer) -> None:
     """At five times the wall's speed the drone visits its waypoint, returns and lands."""
     run = flyer.fly(short, speed=SPEED)
-    assert not run.lockstep
+    assert not run.in_simulated_time
     flight = recorded(run)
     assert flight.robots["drone"].outcome.startswith("landed")
     assert flight.robots["drone"].visited == ("wp0",)

@@ -56,7 +56,7 @@ def test_a_flight_visits_its_waypoint_and_lands(flyer: Flyer) -> None:
     began = time.monotonic()
     run = flyer.fly(short)
     flight = recorded(run)
-    assert run.lockstep
+    assert run.in_simulated_time
     assert flight.robots["drone"].outcome.startswith("landed")
     assert flight.robots["drone"].visited == ("wp0",)
     assert flight.alerts == []
