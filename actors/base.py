@@ -41,7 +41,7 @@ from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.status import Message
 from aerodaas.types.vitals import read_vitals
 
-__all__ = ["ActorInfo", "NodeActor", "NodeMaker", "SensorActor"]
+__all__ = ["ActorInfo", "NodeActor", "NodeMaker"]
 
 _PROBLEMS_KEPT = 50
 _LISTENING = 5.0
@@ -54,6 +54,11 @@ _PARTING = 3.0
 
 class NodeMaker(Protocol):
     """Specification of a node, sent to the actor that runs it."""
+
+    @property
+    def niceness(self) -> int:
+        """Niceness of a process that runs the node."""
+        ...
 
     def make(self, session: Session) -> Node:
         """Make the node in the actor's process."""
@@ -87,8 +92,8 @@ class _AlertHandler(logging.Handler):
 class NodeActor:
     """Actor that runs the nodes of the specifications passed to `prepare`."""
 
-    niceness = 10
-    """Niceness of its process."""
+    niceness = 0
+    """Niceness of a process without such specifications."""
 
     def __init__(self, session: Session, name: str) -> None:
         """Create the actor `name` of `session`."""
@@ -114,7 +119,7 @@ class NodeActor:
         `variables` have been set in this process by their arrival.
         """
         del variables
-        be_nice(self.niceness)
+        be_nice(min((spec.niceness for spec in specs), default=self.niceness))
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.publisher(self.alerts.outlet.stream, f"{self.name}'s alert")
@@ -406,14 +411,9 @@ class NodeActor:
     def _close(self) -> None:
         """Close the nodes; what closing one raises becomes the actor's error."""
         for runner in self.runners:
+            runner.finish()
             error = runner.close()
             self._error = self._error or error
 
     def _values(self) -> dict[str, Any]:
         return merged_values(runner.node for runner in self.runners)
-
-
-class SensorActor(NodeActor):
-    """Actor of a camera, whose images must not wait for analyses."""
-
-    niceness = 5

@@ -22,7 +22,7 @@ from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.placement import Placement
-from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras
+from aerodaas.runtime.plan import ActorPlan, CameraSpec
 from aerodaas.runtime.session import Session
 from aerodaas.types.clock import Clock, SimulatedClock
 from aerodaas.types.status import Message
@@ -205,15 +205,13 @@ class Proxies:
         """Make proxies of every camera and analysis if `everything`."""
         self._everything = everything
 
-    def camera(self, session: Session, camera: Cameras) -> Node | None:
+    def camera(self, session: Session, camera: CameraSpec) -> Node | None:
         """Proxy of a camera; None if it runs in the application's process."""
         if not self._everything:
             return None
         return NodeProxy(session, camera, camera.stream, camera.place)
 
-    def analysis(
-        self, session: Session, actor: AnalyticsActorPlan, spec: AnalysisSpec
-    ) -> Node | None:
+    def analysis(self, session: Session, actor: ActorPlan, spec: AnalysisSpec) -> Node | None:
         """Proxy of an analysis of `actor`; None if it runs in the application's process."""
         if not self._everything and actor.runtime_env is None:
             return None

@@ -208,6 +208,9 @@ class NodeRunner:
         thread.start()
         return thread
 
+    def finish(self) -> None:
+        """Do what is left once all nodes before it are closed."""
+
     def close(self) -> AeroDaaSError | None:
         """Close the node and its subscriptions; returns the error of the node's `close`."""
         try:

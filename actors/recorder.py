@@ -36,6 +36,8 @@ class RecorderSpec:
     waits."""
     provenance: Provenance
     views: LiveViews | None
+    niceness: int = 10
+    """Of its process."""
 
     def make(self, session: Session) -> RecorderNode:
         """Make the node."""
@@ -60,9 +62,13 @@ class _RecorderRunner(NodeRunner):
         except Exception as error:  # noqa: BLE001 - a library of a live view may raise any
             self._actor.fail(error)
 
-    def record(self) -> bool:
+    def finish(self) -> None:
+        """Write what the others have told while they closed."""
+        self.record(0.0)
+
+    def record(self, wait: float = _WAIT) -> bool:
         """Write the messages that have arrived, and let others gather; False without any."""
-        messages = self.subscriber.receive(_WAIT)
+        messages = self.subscriber.receive(wait)
         counts = Counter(message.stream for message in messages)
         messages.reverse()
         while messages:

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.actors.base import NodeActor
 from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
 from aerodaas.actors.dispatch.edge_turns import EdgeTurns
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
@@ -37,7 +36,7 @@ from aerodaas.types.clock import NANOSECONDS, Clock
 from aerodaas.types.data import Frame
 from aerodaas.types.status import Message
 
-__all__ = ["DispatcherActor", "DispatcherSpec", "LiveDispatcher"]
+__all__ = ["DispatcherSpec", "LiveDispatcher"]
 
 _LAST_ANSWERS = 2.0
 """Seconds to wait for the cloud's answers at the end of a run."""
@@ -384,15 +383,11 @@ class DispatcherSpec:
     edge: Mapping[str, Any]
     """Actors of the analyses, by stream."""
     cloud: Sequence[Executor]
+    niceness: int = 5
+    """Of its process."""
 
     def make(self, session: Session) -> LiveDispatcher:
         """Make the node."""
         return LiveDispatcher(
             session, self.scheduler, self.managed, self.resources, self.edge, self.cloud
         )
-
-
-class DispatcherActor(NodeActor):
-    """Actor of the dispatcher."""
-
-    niceness = 5

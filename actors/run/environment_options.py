@@ -7,7 +7,7 @@ from typing import Any
 from aerodaas.actors.cluster.ray_cluster import nodes_at
 from aerodaas.actors.isolation import isolation_options
 from aerodaas.runtime.dispatch.offload import CloudProcess
-from aerodaas.runtime.plan import AnalyticsActorPlan, FlightPlan
+from aerodaas.runtime.plan import ActorPlan, FlightPlan
 
 __all__ = ["environment_options"]
 
@@ -18,9 +18,7 @@ def environment_options(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     Called before any actor exists, so that a failure leaves nothing behind. Raises ConfigError
     for an environment that a node cannot provide, and for a place without a node.
     """
-    processes: dict[str, AnalyticsActorPlan | CloudProcess] = {
-        one.name: one for one in plan.analyses
-    }
+    processes: dict[str, ActorPlan | CloudProcess] = {one.name: one for one in plan.actors}
     for number, process in enumerate(plan.dispatch.cloud if plan.dispatch else ()):
         processes[f"cloud/{number}/{process.site}"] = process
     for place in {*plan.edges, *(one.place for one in processes.values())}:

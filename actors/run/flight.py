@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future
 from concurrent.futures import wait as wait_for
 from dataclasses import replace
@@ -16,12 +16,12 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
-from aerodaas.actors.base import ActorInfo, NodeActor, SensorActor
+from aerodaas.actors.base import ActorInfo, NodeActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
 from aerodaas.actors.cluster.orphan_reaper import REAPER, OrphanReaperActor, ReaperHost, Watched
 from aerodaas.actors.cluster.ray_cluster import options_for
-from aerodaas.actors.dispatch.dispatcher import DispatcherActor, DispatcherSpec
+from aerodaas.actors.dispatch.dispatcher import DispatcherSpec
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
@@ -47,10 +47,9 @@ from aerodaas.runtime.dispatch.offload import CloudProcess
 from aerodaas.runtime.growth import Growth, growth
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.placement import Placement
-from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
+from aerodaas.runtime.plan import ActorPlan, CameraSpec, DispatchPlan, FlightPlan
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
-from aerodaas.runtime.session import MESSAGE_DEPTH
-from aerodaas.runtime.stream_names import alert_stream, done_stream
+from aerodaas.runtime.stream_names import done_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Alert, Header
@@ -103,25 +102,30 @@ class Flight:
         self._opening: list[Any] = []
         self._liveness_monitor: list[LivenessMonitor] = []
         self._head: HeadWatch | None = None
-        session, edge = plan.session, Placement()
+        session = plan.session
         environments = environment_options(plan)
         for name, specs, place in zip(plan.drone_actors, plan.drones, plan.edges, strict=True):
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             others = tuple(other for other in plan.drone_actors if other != name)
             args, setup = (session, name, specs, others), (vehicle_variables(),)
             self._create(name, DroneActor, place, args, setup=setup)
-        self._create_cameras(plan.cameras)
-        self._create_analyses(plan.analyses, environments)
+        records = self.recording is not None and provenance is not None
+        self._recorder = plan.recorder_actor if records else ""
+        """Name of the actor that records; empty for none."""
+        for actor in plan.actors:
+            if actor.name != self._recorder:
+                self._create_actor(actor, environments)
+        for actor in plan.actors:
+            if actor.name == self._recorder and self.recording and provenance is not None:
+                spec = RecorderSpec(self.recording, plan.recorded, provenance, live)
+                args, setup = (session, actor.name, self._watched()), (*_setup(actor), spec)
+                kind, place = RecorderActor, actor.place
+                self._create(actor.name, kind, place, args, restarts=_RESTARTS, setup=setup)
+        recorder = self._members.get(self._recorder)
+        self._reaper = recorder.handle if recorder is not None else self._create_reaper()
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
-        if self.recording is not None and provenance is not None:
-            streams = {**plan.recorded, alert_stream("recorder"): MESSAGE_DEPTH}
-            spec = RecorderSpec(self.recording, streams, provenance, live)
-            args, setup = (session, "recorder", self._watched()), (None, spec)
-            self._create("recorder", RecorderActor, edge, args, restarts=_RESTARTS, setup=setup)
-            self._reaper = self._members["recorder"].handle
-        else:
-            self._reaper = self._create_reaper()
+            self._inform_reaper()
         self._origin = 0
         self._notes: list[Alert] = []
         """Alerts of the application's process; appended to by any thread."""
@@ -206,8 +210,12 @@ class Flight:
         self._sensed = True
 
     def _cameras_finished(self) -> bool:
-        reports = [self._members[f"sensor/{one.stream}"].report for one in self.plan.cameras]
-        return all(one.phase == "failed" or one.values.get("finished") for one in reports)
+        return all(
+            report.phase == "failed" or report.values.get("finished", {}).get(camera.stream)
+            for actor in self.plan.actors
+            for camera in actor.cameras
+            for report in (self._members[actor.name].report,)
+        )
 
     def await_change(self, timeout: float) -> None:
         """Return once a mission has changed, or after `timeout` seconds; for one thread only.
@@ -308,25 +316,26 @@ class Flight:
 
     def _join(self, change: Growth) -> None:
         known = set(self._members)
-        environments = environment_options(replace(self.plan, analyses=change.analyses))
+        environments = environment_options(replace(self.plan, actors=change.actors))
         try:
-            self._create_cameras(change.cameras)
-            self._create_analyses(change.analyses, environments)
+            for actor in change.actors:
+                self._create_actor(actor, environments)
             fresh = [member for name, member in self._members.items() if name not in known]
             # Before they start: the application may be killed at any time.
             self._inform_reaper()
             self._prepare(fresh, lambda _: None)
             for actor in change.joining:
                 member = self._members[actor.name]
-                member.info = ask(member.handle.join.remote(*actor.nodes), _PREPARE_TIMEOUT)
-                member.setup += actor.nodes
+                specs = _setup(actor)[1:]
+                member.info = ask(member.handle.join.remote(*specs), _PREPARE_TIMEOUT)
+                member.setup += specs
         except BaseException:
             for name in set(self._members) - known:
                 ray.kill(self._members[name].handle)
             self._members = {name: one for name, one in self._members.items() if name in known}
             self._inform_reaper()
             raise
-        if (recorder := self._members.get("recorder")) is not None and change.recorded:
+        if (recorder := self._members.get(self._recorder)) is not None and change.recorded:
             recorder.further |= change.recorded
             recorder.info = ask(
                 recorder.handle.listen.remote("recorder", change.recorded), _GROWING
@@ -335,8 +344,17 @@ class Flight:
             drone = self._members[self._drones[robots[0].robot.id]]
             drone.info = ask(drone.handle.grow.remote(robots, _GROWING), 2 * _GROWING)
         for stream, ends in change.ending.items():
-            camera = self._members[f"sensor/{stream}"]
-            camera.setup = (None, *(replace(spec, ends=ends) for spec in camera.setup[1:]))
+            camera = next(
+                self._members[actor.name]
+                for actor in self.plan.actors
+                if any(spec.stream == stream for spec in actor.cameras)
+            )
+            camera.setup = tuple(
+                replace(spec, ends=ends)
+                if isinstance(spec, CameraSpec) and spec.stream == stream
+                else spec
+                for spec in camera.setup
+            )
             ask(camera.handle.end_mission_when_finished.remote(stream, ends))
         self._connect_all()
         self._start(fresh)
@@ -393,8 +411,8 @@ class Flight:
         last = end_actors([self._ended_first(), [self._reaper]], self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
-            self._note_file(member.name, member.report)
-        recorder = self._members.get("recorder")
+            self._note_file(member.report)
+        recorder = self._members.get(self._recorder)
         if recorder is not None and recorder.handle not in last and recorder.report.error is None:
             files = ", ".join(map(str, self._recordings))
             error = MissionError(
@@ -403,8 +421,8 @@ class Flight:
             recorder.report = replace(recorder.report, error=error)
         return self.reports()
 
-    def _note_file(self, name: str, report: ActorReport) -> None:
-        path = report.values.get("path") if name == "recorder" else None
+    def _note_file(self, report: ActorReport) -> None:
+        path = report.values.get("path")
         if path is not None and Path(path) not in self._recordings:
             self._recordings.append(Path(path))
 
@@ -421,7 +439,7 @@ class Flight:
 
     def _ended_first(self) -> list[Any]:
         """All actors with streams but the recorder, which records their end."""
-        return [member.handle for member in self._members.values() if member.name != "recorder"]
+        return [member.handle for member in self._members.values() if member.name != self._recorder]
 
     def _watched(self) -> Watched:
         application = ApplicationProcess(time_waits=False)
@@ -467,25 +485,14 @@ class Flight:
         outliving = {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
         return {**options_for(place, restarts=restarts), **outliving}
 
-    def _create_cameras(self, cameras: Iterable[Cameras]) -> None:
-        for camera in cameras:
-            name = f"sensor/{camera.stream}"
-            args, setup = (self.plan.session, name), (None, camera)
-            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, setup=setup)
-
-    def _create_analyses(
-        self, actors: Iterable[AnalyticsActorPlan], environments: Mapping[str, Mapping[str, Any]]
+    def _create_actor(
+        self, actor: ActorPlan, environments: Mapping[str, Mapping[str, Any]]
     ) -> None:
-        for actor in actors:
-            self._create(
-                actor.name,
-                NodeActor,
-                actor.place,
-                (self.plan.session, actor.name),
-                setup=(ProcessVariables(private_variables(actor.runtime_env)), *actor.nodes),
-                restarts=_RESTARTS,
-                options=environments[actor.name],
-            )
+        args, options = (self.plan.session, actor.name), environments[actor.name]
+        setup, place = _setup(actor), actor.place
+        self._create(
+            actor.name, NodeActor, place, args, restarts=_RESTARTS, setup=setup, options=options
+        )
 
     def _create_dispatcher(
         self, dispatch: DispatchPlan, environments: Mapping[str, Mapping[str, Any]]
@@ -495,9 +502,9 @@ class Flight:
             for number, process in enumerate(dispatch.cloud)
         ]
         hosts = {
-            node.stream: self._members[actor.name].handle
-            for actor in self.plan.analyses
-            for node in actor.nodes
+            spec.stream: self._members[actor.name].handle
+            for actor in self.plan.actors
+            for spec in actor.analyses
         }
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         spec = DispatcherSpec(
@@ -505,7 +512,7 @@ class Flight:
         )
         args, setup = (self.plan.session, "dispatcher"), (None, spec)
         place = Placement()
-        self._create("dispatcher", DispatcherActor, place, args, restarts=_RESTARTS, setup=setup)
+        self._create("dispatcher", NodeActor, place, args, restarts=_RESTARTS, setup=setup)
 
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
@@ -600,11 +607,11 @@ class Flight:
             absence = time.monotonic() - member.answered_at
             self.note("actor_back", f"{member.name} answers again after {absence:.1f} s")
         member.answered_at = time.monotonic()
-        self._note_file(member.name, member.report)
+        self._note_file(member.report)
 
     def _record_vitals(self) -> None:
         """Send the vitals of all processes to the recorder, which cannot query other nodes."""
-        recorder = self._members.get("recorder")
+        recorder = self._members.get(self._recorder)
         if recorder is None or recorder.report.phase != "running":
             return
         recorder.handle.vitals.remote(
@@ -672,7 +679,7 @@ class Flight:
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
                     # It may hang before its next report.
-                    self._note_file(member.name, ray.get(actor.report.remote()))
+                    self._note_file(ray.get(actor.report.remote()))
             except ActorUnavailableError:
                 pass  # it has not restarted yet, or died again
             except RayTaskError as error:
@@ -683,3 +690,9 @@ class Flight:
                     self._reaper = self._create_reaper()
                 return
             time.sleep(ASKED_AGAIN)
+
+
+def _setup(actor: ActorPlan) -> tuple[Any, ...]:
+    """Arguments of an actor's `prepare`: its variables, then what it runs."""
+    variables = ProcessVariables(private_variables(actor.runtime_env))
+    return (variables, *actor.cameras, *actor.analyses)

@@ -57,7 +57,7 @@ class SuspensionMonitor:
 def actor_silent(name: str, report: ActorReport, seconds: float) -> MissionError:
     """Error for the actor `name`, which has not answered for so many seconds, but has not died."""
     hence = "its work is not done meanwhile"
-    if name == "recorder":
+    if "path" in report.values:
         hence = "what happens meanwhile may be missing in the recording"
     elif ALONE in report.values:
         hence = f"it obeys no command, take over by other means; {_behaviour(report)}"

@@ -62,6 +62,8 @@ class AnalysisSpec:
     """Streams of the wake commands for a dormant analysis."""
     frames: tuple[str, ...] = ()
     """Streams of the frames that its tasks refer to."""
+    niceness: int = 10
+    """Of its process."""
 
     def make(self, session: Session) -> AnalysisNode:
         """Make the node."""

@@ -137,5 +137,10 @@ class CameraNode(Node):
             self.camera.close()
 
     def values(self) -> dict[str, Any]:
-        """Images that were skipped, and whether there are no more."""
-        return {"skipped": self.camera.skipped, "finished": self.finished} if self._opened else {}
+        """Images that were skipped, and whether there are no more, by camera."""
+        if not self._opened:
+            return {}
+        return {
+            "skipped": {self.name: self.camera.skipped},
+            "finished": {self.name: self.finished},
+        }

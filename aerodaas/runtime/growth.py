@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from aerodaas.runtime.controller import RobotSpec
-from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, FlightPlan
+from aerodaas.runtime.plan import ActorPlan, FlightPlan
 from aerodaas.types.errors import GraphError
 
 __all__ = ["Growth", "growth"]
@@ -15,14 +15,12 @@ __all__ = ["Growth", "growth"]
 class Growth:
     """Difference between two plans of one run."""
 
-    cameras: tuple[Cameras, ...]
-    """Cameras to be started."""
+    actors: tuple[ActorPlan, ...]
+    """Actors to be started, with cameras and analyses."""
+    joining: tuple[ActorPlan, ...]
+    """Cameras and analyses that join running actors of these names."""
     ending: dict[str, bool]
     """Running cameras whose last image now ends, or no longer ends, the mission, by stream."""
-    analyses: tuple[AnalyticsActorPlan, ...]
-    """Analytics actors to be started."""
-    joining: tuple[AnalyticsActorPlan, ...]
-    """Analyses that join running actors of these names."""
     drones: tuple[tuple[RobotSpec, ...], ...]
     """All robots of the new plan, by actor."""
     recorded: dict[str, int]
@@ -36,23 +34,26 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
     flight.
     """
     _require_same_tasks(old, new)
-    running = {node.stream for actor in old.analyses for node in actor.nodes}
-    known = {actor.name for actor in old.analyses}
+    running = {spec.stream for spec in (*old.cameras, *old.analyses)}
+    known = {actor.name for actor in old.actors}
     ended = {camera.stream: camera.ends for camera in old.cameras}
     added = [
-        replace(actor, nodes=tuple(node for node in actor.nodes if node.stream not in running))
-        for actor in new.analyses
+        replace(
+            actor,
+            cameras=tuple(spec for spec in actor.cameras if spec.stream not in running),
+            analyses=tuple(spec for spec in actor.analyses if spec.stream not in running),
+        )
+        for actor in new.actors
     ]
-    added = [actor for actor in added if actor.nodes]
+    added = [actor for actor in added if actor.cameras or actor.analyses]
     return Growth(
-        cameras=tuple(one for one in new.cameras if one.stream not in ended),
-        ending={
-            one.stream: one.ends
-            for one in new.cameras
-            if one.stream in ended and ended[one.stream] != one.ends
-        },
-        analyses=tuple(actor for actor in added if actor.name not in known),
+        actors=tuple(actor for actor in added if actor.name not in known),
         joining=tuple(actor for actor in added if actor.name in known),
+        ending={
+            camera.stream: camera.ends
+            for camera in new.cameras
+            if camera.stream in ended and ended[camera.stream] != camera.ends
+        },
         drones=new.drones,
         recorded={
             stream: depth for stream, depth in new.recorded.items() if stream not in old.recorded

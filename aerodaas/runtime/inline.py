@@ -215,6 +215,10 @@ class InlineExecutor:
                 self._step(entry, now)
         self.settle()
 
+    def has_ended(self, node: Node) -> bool:
+        """Whether a node is stepped no more."""
+        return self._entry(node).ended
+
     def retire(self, nodes: Iterable[Node]) -> None:
         """Step these nodes no more by themselves."""
         for node in nodes:

@@ -28,11 +28,10 @@ from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.node import NEVER, Node
-from aerodaas.runtime.plan import AnalyticsActorPlan, Cameras, FlightPlan
+from aerodaas.runtime.plan import ActorPlan, CameraSpec, FlightPlan
 from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
-from aerodaas.runtime.session import MESSAGE_DEPTH, Session
-from aerodaas.runtime.stream_names import alert_stream
+from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.vitals import read_vitals
@@ -51,13 +50,11 @@ _NOTES_KEPT = 50
 class Proxies(Protocol):
     """Maker of proxies for nodes that run in processes of their own."""
 
-    def camera(self, session: Session, camera: Cameras) -> Node | None:
+    def camera(self, session: Session, camera: CameraSpec) -> Node | None:
         """Proxy of a camera; None if it runs in this process."""
         ...
 
-    def analysis(
-        self, session: Session, actor: AnalyticsActorPlan, spec: AnalysisSpec
-    ) -> Node | None:
+    def analysis(self, session: Session, actor: ActorPlan, spec: AnalysisSpec) -> Node | None:
         """Proxy of an analysis of `actor`; None if it runs in this process."""
         ...
 
@@ -97,10 +94,8 @@ class InlineFlight:
         """By the stream of their results, in the order of the plan."""
         self._dispatcher: SimulatedDispatcher | None = None
         self._recorder: RecorderNode | None = None
-        for camera in plan.cameras:
-            self._add_camera(camera)
-        for actor in plan.analyses:
-            self._add_analyses(actor)
+        for actor in plan.actors:
+            self._add(actor)
         if plan.dispatch is not None:
             scheduler = copy.deepcopy(plan.dispatch.scheduler)
             managed, resources = plan.dispatch.managed, plan.dispatch.resources
@@ -112,9 +107,8 @@ class InlineFlight:
             )
             self._executor.add(name, [self._drone], first=True)
         if recording is not None and plan.recorded and provenance is not None:
-            streams = {**plan.recorded, alert_stream("recorder"): MESSAGE_DEPTH}
-            self._recorder = RecorderNode(plan.session, recording, streams, provenance, live)
-            self._executor.add("recorder", [self._recorder])
+            self._recorder = RecorderNode(plan.session, recording, plan.recorded, provenance, live)
+            self._executor.add(plan.recorder_actor, [self._recorder])
         self._executor.order(self._nodes())
         self._calls = LoopCalls(lambda: None, self._publish_reports)
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
@@ -128,24 +122,25 @@ class InlineFlight:
         """What of the robots the application is told at once."""
         self._notes: list[Alert] = []
 
-    def _add_camera(self, camera: Cameras) -> Node:
-        node = self._proxies.camera(self.plan.session, camera) if self._proxies else None
-        node = node or camera.make(self.plan.session)
-        self._cameras[camera.stream] = node
-        self._executor.add(f"sensor/{camera.stream}", [node])
-        return node
-
-    def _add_analyses(self, actor: AnalyticsActorPlan) -> list[Node]:
-        session, nodes = self.plan.session, {}
+    def _add(self, actor: ActorPlan) -> list[Node]:
+        """Add the cameras and analyses of an actor as one part."""
+        session, proxies = self.plan.session, self._proxies
+        cameras: dict[str, Node] = {}
+        for camera in actor.cameras:
+            proxy = proxies.camera(session, camera) if proxies else None
+            cameras[camera.stream] = proxy or camera.make(session)
+        analyses: dict[str, Node] = {}
         # A flight works with copies, as actors do: the application's own objects stay as they are.
         memo: dict[int, object] = {}
-        for spec in actor.nodes:
-            proxy = self._proxies.analysis(session, actor, spec) if self._proxies else None
+        for spec in actor.analyses:
+            proxy = proxies.analysis(session, actor, spec) if proxies else None
             own = replace(spec, work=copy.deepcopy(spec.work, memo))
-            nodes[spec.stream] = proxy or own.make(session)
-        self._analyses |= nodes
-        self._executor.add(actor.name, nodes.values())
-        return list(nodes.values())
+            analyses[spec.stream] = proxy or own.make(session)
+        self._cameras |= cameras
+        self._analyses |= analyses
+        nodes = [*cameras.values(), *analyses.values()]
+        self._executor.add(actor.name, nodes)
+        return nodes
 
     def _nodes(self) -> list[Node]:
         """All nodes in the order in which ready ones are stepped."""
@@ -212,13 +207,12 @@ class InlineFlight:
 
     def _ended(self) -> bool:
         if self._drone is not None:
-            failed = self._executor.parts[self._drone.name].phase == "failed"
-            return failed or self._drone.over
-        return self._sensed or all(
-            self._executor.parts[f"sensor/{stream}"].phase == "failed"
-            or camera.values().get("finished")
-            for stream, camera in self._cameras.items()
-        )
+            return self._executor.has_ended(self._drone) or self._drone.over
+        return self._sensed or all(map(self._has_ended, self._cameras.values()))
+
+    def _has_ended(self, camera: Node) -> bool:
+        """Whether a camera has no more images, or has failed."""
+        return self._executor.has_ended(camera) or any(camera.values().get("finished", {}).values())
 
     def _record_vitals(self) -> None:
         """Record the vitals of this process, which runs all nodes."""
@@ -307,9 +301,8 @@ class InlineFlight:
         change, executor = growth(self.plan, plan), self._executor
         fresh: list[Node] = []
         try:
-            fresh += map(self._add_camera, change.cameras)
-            for actor in (*change.analyses, *change.joining):
-                fresh += self._add_analyses(actor)
+            for actor in (*change.actors, *change.joining):
+                fresh += self._add(actor)
             executor.order(self._nodes())
             executor.open(fresh)
         except BaseException:

@@ -16,6 +16,7 @@ from aerodaas.config.model import (
     SensorConfig,
     TaskConfig,
 )
+from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, Node
 from aerodaas.dataflow.handles import SENSOR_ITEMS
 from aerodaas.mission.commands import TRIGGERED, initial_commands
@@ -53,18 +54,20 @@ from aerodaas.types.data import Frame
 from aerodaas.types.errors import GraphError
 from aerodaas.types.identifiers import told
 
-__all__ = ["AnalyticsActorPlan", "Cameras", "DispatchPlan", "FlightPlan", "make_plan"]
+__all__ = ["ActorPlan", "CameraSpec", "DispatchPlan", "FlightPlan", "make_plan"]
 
 
 @dataclass(frozen=True)
-class Cameras:
-    """Plan of one camera."""
+class CameraSpec:
+    """Specification of one camera for its node."""
 
     stream: str
     sensor: SensorConfig
     state: str
     ends: bool
     place: Placement
+    niceness: int = 5
+    """Of its process: images must not wait for analyses."""
 
     def make(self, session: Session) -> CameraNode:
         """Make the node."""
@@ -72,13 +75,19 @@ class Cameras:
 
 
 @dataclass(frozen=True)
-class AnalyticsActorPlan:
-    """Plan of one analytics actor."""
+class ActorPlan:
+    """Nodes that share a process, as in ROS 2's component containers.
+
+    A frame is looked at, and recorded, where it was captured.
+    """
 
     name: str
     place: Placement
-    nodes: tuple[AnalysisSpec, ...]
+    cameras: tuple[CameraSpec, ...] = ()
+    analyses: tuple[AnalysisSpec, ...] = ()
     runtime_env: RuntimeEnvConfig | None = None
+    records: bool = False
+    """Whether the recorder is one of them."""
 
 
 @dataclass(frozen=True)
@@ -100,13 +109,28 @@ class FlightPlan:
     """Robots by drone actor."""
     edges: tuple[Placement, ...]
     """Place of each drone actor."""
-    cameras: tuple[Cameras, ...]
-    analyses: tuple[AnalyticsActorPlan, ...]
+    actors: tuple[ActorPlan, ...]
+    """Cameras, analyses and recorder, by process."""
     dispatch: DispatchPlan | None
     observed: dict[str, float] | None
     """Rates in Hz of what measures a simulated vehicle, by source; None in real time."""
     recorded: dict[str, int]
     """Streams for the recorder and their queue depths; empty without a recorder."""
+
+    @property
+    def cameras(self) -> tuple[CameraSpec, ...]:
+        """The cameras of all actors."""
+        return tuple(camera for actor in self.actors for camera in actor.cameras)
+
+    @property
+    def analyses(self) -> tuple[AnalysisSpec, ...]:
+        """The analyses of all actors."""
+        return tuple(spec for actor in self.actors for spec in actor.analyses)
+
+    @property
+    def recorder_actor(self) -> str:
+        """Name of the actor that records; empty without one."""
+        return next((actor.name for actor in self.actors if actor.records), "")
 
     @property
     def drone_actors(self) -> tuple[str, ...]:
@@ -178,9 +202,9 @@ class _Planner:
             self.reaches_a_drone(one, asked | {stream}) for one in further - asked
         )
 
-    def cameras(self) -> tuple[Cameras, ...]:
+    def cameras(self) -> tuple[CameraSpec, ...]:
         return tuple(
-            Cameras(
+            CameraSpec(
                 node.id,
                 node.work,
                 self.state_of(node),
@@ -302,28 +326,56 @@ class _Planner:
         """Runtime environment of an analysis; the environment file's overrides its own."""
         return told(node.id, self.session.environment.runtime_env) or node.runtime_env
 
-    def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
-        shared: dict[Placement, list[AnalysisSpec]] = {}
-        guests: dict[str, list[Node]] = {}
-        actors = []
-        for node in self.analyses():
-            env = self.runtime_env_of(node)
-            if isinstance(node.work, GuestAnalysis):
-                guests.setdefault(node.work.guest, []).append(node)
-            elif node.work.isolated or env is not None:
-                name = f"analytics/{node.id}"
-                spec = self.analysis_spec(node)
-                actors.append(AnalyticsActorPlan(name, self.place_of(node), (spec,), env))
+    def actors(self) -> tuple[ActorPlan, ...]:
+        """Actors of cameras, analyses and recorder.
+
+        Those of one place share one: `isolated` analyses, those with an environment of their own,
+        cameras that decode what a stranger may send, and each guest's analyses are apart.
+        """
+        cameras: dict[Placement, list[CameraSpec]] = {}
+        analyses: dict[Placement, list[AnalysisSpec]] = {}
+        guests: dict[str, list[AnalysisSpec]] = {}
+        apart = []
+        for camera in self.cameras():
+            if self.is_confined(camera):
+                apart.append(ActorPlan(f"sensor/{camera.stream}", camera.place, (camera,)))
             else:
-                shared.setdefault(self.place_of(node), []).append(self.analysis_spec(node))
-        for guest, mine in guests.items():
-            # Never beside the owner's or another guest's: one's end is that of its actor.
-            specs = tuple(self.analysis_spec(node) for node in mine)
-            actors.append(AnalyticsActorPlan(guest_actor(guest), self.edge_of(None), specs))
-        for place, nodes in shared.items():
-            name = f"analytics/{place.node or place.kind}"
-            actors.append(AnalyticsActorPlan(name, place, tuple(nodes)))
-        return tuple(actors)
+                cameras.setdefault(camera.place, []).append(camera)
+        for node in self.analyses():
+            env, spec, place = (
+                self.runtime_env_of(node),
+                self.analysis_spec(node),
+                self.place_of(node),
+            )
+            if isinstance(node.work, GuestAnalysis):
+                guests.setdefault(node.work.guest, []).append(spec)
+            elif node.work.isolated or env is not None:
+                apart.append(ActorPlan(f"analytics/{node.id}", place, (), (spec,), env))
+            else:
+                analyses.setdefault(place, []).append(spec)
+        # Never beside the owner's or another guest's: one's end is that of its actor.
+        apart += [
+            ActorPlan(guest_actor(guest), self.edge_of(None), (), tuple(specs))
+            for guest, specs in guests.items()
+        ]
+        home = [Placement()] if self.recorded else []
+        places: list[Placement] = list(dict.fromkeys([*cameras, *analyses, *home]))
+        shared = [
+            ActorPlan(
+                place.node or place.kind,
+                place,
+                tuple(cameras.get(place, ())),
+                tuple(analyses.get(place, ())),
+                records=self.recorded and place == Placement(),
+            )
+            for place in places
+        ]
+        return (*apart, *shared)
+
+    def is_confined(self, camera: CameraSpec) -> bool:
+        """Whether a camera needs a process whose memory can be limited."""
+        driver = self.session.environment.camera_driver(camera.sensor)
+        return hasattr(load_plugin("cameras", driver), "most_memory")
 
     def robot_spec(self, robot: RobotConfig) -> RobotSpec:
         edges = [edge for edge in self.graph.navigation if edge.robot == robot.id]
@@ -348,7 +400,7 @@ class _Planner:
             scheduler=self.scheduler,
         )
 
-    def observed(self, cameras: tuple[Cameras, ...]) -> dict[str, float]:
+    def observed(self, cameras: tuple[CameraSpec, ...]) -> dict[str, float]:
         """Rates of what measures a simulated vehicle: cameras and external sources."""
         rates = {camera.stream: camera.sensor.rate for camera in cameras}
         external = [node for node in self.analyses() if node.kind == "external"]
@@ -382,7 +434,7 @@ def make_plan(
     check_plugins(session.environment, planner.robots, lenses, here=here)
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
     cameras = planner.cameras()
-    analyses = planner.analyses_by_actor()
+    actors = planner.actors()
     streams = [stream for spec in specs for stream in VehicleController.streams(spec)]
     streams += [camera.stream for camera in cameras]
     streams += [node.id for node in planner.analyses()]
@@ -391,16 +443,14 @@ def make_plan(
         streams.append(DECISIONS)
     drones = by_actor(specs, [planner.edge_of(one.robot.id) for one in specs], session)
     names = [*_names(drones)]
-    names += [f"sensor/{camera.stream}" for camera in cameras]
-    names += [actor.name for actor in analyses]
+    names += [actor.name for actor in actors]
     names += ["dispatcher"] if dispatch is not None else []
     streams += [alert_stream(name) for name in names]
     return FlightPlan(
         session=replace(session, environment=session.environment.for_actors()),
         drones=drones,
         edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
-        cameras=cameras,
-        analyses=analyses,
+        actors=actors,
         dispatch=dispatch,
         observed=planner.observed(cameras) if session.simulated else None,
         recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},

@@ -166,7 +166,7 @@ class FlightView:
                 stream, self._rates.get(stream), sent.median_ms, sent.p99_ms, dropped.get(stream, 0)
             )
             for name, report in state.reports.items()
-            if name.startswith(("sensor/", "analytics/"))
+            if not name.startswith(("drone/", "dispatcher"))
             for stream, sent in report.sent.items()
             if not is_internal(stream)
         ]
