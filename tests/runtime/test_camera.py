@@ -171,7 +171,7 @@ def test_the_last_picture_ends_the_mission_if_it_is_to(*, ends: bool) -> None:
     assert [message.stream for message in found[2:]] == [end_stream(_STREAM)] * ends
     assert [message.item for message in found[2:]] == [End("drone/cam has no more pictures")] * ends
     assert node.finished
-    assert node.values() == {"skipped": 3, "finished": True}
+    assert node.values() == {"skipped": {"drone/cam": 3}, "finished": {"drone/cam": True}}
 
 
 def test_a_camera_that_could_be_opened_is_closed_once() -> None:

@@ -90,16 +90,20 @@ def test_light_analyses_share_an_actor_by_place(environment: Environment) -> Non
     Above(1, "b").deploy(env.get_compute_resource_by_id("cloud")).analyse(odometry(env))
     Above(1, "c").deploy(env.get_compute_resource_by_id("near")).analyse(odometry(env))
     ProcessId("").deploy(env.get_compute_resource_by_id("cloud")).analyse(odometry(env))
-    actors = {actor.name: actor for actor in plan(env).analyses}
-    streams = {name: [node.stream for node in actor.nodes] for name, actor in actors.items()}
+    actors = {actor.name: actor for actor in plan(env).actors}
+    streams = {
+        name: [spec.stream for spec in (*actor.cameras, *actor.analyses)]
+        for name, actor in actors.items()
+    }
     assert streams == {
         "analytics/drone/process_id": ["drone/process_id"],
-        "analytics/edge": ["drone/jitter", "drone/a"],
-        "analytics/cloud": ["drone/b"],
-        "analytics/10.0.0.7": ["drone/c"],
+        "edge": ["drone/cam", "drone/jitter", "drone/a"],
+        "cloud": ["drone/b"],
+        "10.0.0.7": ["drone/c"],
     }
-    assert actors["analytics/cloud"].place == Placement("cloud")
-    assert actors["analytics/10.0.0.7"].place == Placement("edge", "10.0.0.7")
+    assert [name for name, actor in actors.items() if actor.records] == ["edge"]
+    assert actors["cloud"].place == Placement("cloud")
+    assert actors["10.0.0.7"].place == Placement("edge", "10.0.0.7")
 
 
 def test_unread_sensors_of_a_flying_robot_run_all_the_same(environment: Environment) -> None:
@@ -172,7 +176,7 @@ def test_triggers_belong_to_whoever_publishes_the_results(environment: Environme
     assert made.dispatch is not None
     (managed,) = made.dispatch.managed
     assert len(managed.triggers) == 1
-    counts = {node.stream: len(node.triggers) for actor in made.analyses for node in actor.nodes}
+    counts = {spec.stream: len(spec.triggers) for spec in made.analyses}
     assert sorted(counts.values()) == [0, 1]
     assert counts["drone/above"] == 1
 
