@@ -37,7 +37,7 @@ class ServiceSettings:
     oidc: OidcSettings | None = None
     """OpenID Connect issuer whose tokens are good, too."""
     rehearsal_seconds: float = 300.0
-    """Most seconds of a processor that a rehearsal uses, in all its processes together."""
+    """Most seconds of a processor that a rehearsal uses."""
     rehearsal_bytes: int = 2 << 30
     """Most memory of the same."""
     most_rehearsals: int = field(default_factory=lambda: len(os.sched_getaffinity(0)))

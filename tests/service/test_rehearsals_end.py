@@ -22,37 +22,26 @@ FAR = [(25.0 * (number % 2), float(number)) for number in range(16)]
 SECONDS = 60.0
 
 
-def rehearsing(provider: Served) -> list[psutil.Process]:
-    """The rehearsal's process and all that it has started, its simulator's engine among them."""
+def rehearsal_of(provider: Served) -> psutil.Process:
+    """The process of the rehearsal that the service has started."""
     until = time.monotonic() + SECONDS
     while time.monotonic() < until:
         for process in psutil.Process(provider.process.pid).children():
-            found = process.children(recursive=True)
-            if any("raylet" in one.name() for one in found):
-                return [process, *found]
+            if "aerodaas.service.flights" in process.cmdline():
+                return process
         time.sleep(0.05)
     raise AssertionError(provider.log.read_text())
 
 
-def left(processes: list[psutil.Process]) -> list[psutil.Process]:
-    """Those that have not ended."""
-    return [one for one in processes if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]
-
-
 def test_a_rehearsal_ends_with_the_service_that_is_killed() -> None:
-    """With its engine; the mission is rehearsed again by the next service, and approved."""
+    """The mission is rehearsed again by the next service, and approved."""
     with Served(fleet(robot("one", endurance=3600)), "--approval") as provider:
         body = {"document": document("one", *FAR), "minutes": 30}
         id_ = provider.ask("POST", "/v1/missions", body)["id"]
-        processes = rehearsing(provider)
-        assert len(left(processes)) == len(processes)
+        rehearsal = rehearsal_of(provider)
         provider.stop(signal.SIGKILL)
-        until = time.monotonic() + SECONDS
-        while left(processes) and time.monotonic() < until:
-            time.sleep(0.1)
-        assert left(processes) == []
+        rehearsal.wait(SECONDS)
         provider.start()
-        assert provider.mission(id_)["phase"] in {"rehearsing", "awaiting_approval"}
         found = provider.until_phase(id_, "awaiting_approval")
         assert found["phase"] == "awaiting_approval", found["reason"]
 
@@ -86,7 +75,7 @@ def rehearse(folder: Path, **bounds: float) -> tuple[FlightFolder, int]:
 def test_a_rehearsal_that_uses_too_much_is_ended(
     bounds: dict[str, float], told: str, tmp_path: Path
 ) -> None:
-    """With all that it has started; its verdict says what it used too much of."""
+    """Its verdict says what it used too much of."""
     made, code = rehearse(tmp_path, **bounds)
     assert code == -signal.SIGKILL
     outcome = made.outcome()

@@ -84,7 +84,7 @@ class FlightOrder(_Record):
     rehearsal: bool = False
     """Fly in simulation, and judge the recording."""
     rehearsal_seconds: float = 300.0
-    """Most seconds of a processor that the rehearsal uses, in all its processes together."""
+    """Most seconds of a processor that the rehearsal uses."""
     rehearsal_bytes: int = 2 << 30
     """Most memory of the same."""
     battery: dict[str, float] = Field(default_factory=dict)

@@ -26,7 +26,7 @@ __all__ = ["rehearse"]
 _NICENESS = 10
 """So that flights under way have the processor first."""
 _LOOK_SECONDS = 1.0
-"""Between two looks at what it uses."""
+"""Wall seconds between two looks at what it uses."""
 
 
 def rehearse(path: Path) -> None:
@@ -46,10 +46,11 @@ def rehearse(path: Path) -> None:
 
 
 def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
-    """Tell how far the rehearsal has come, and end all its processes where it uses too much."""
+    """Write how far the rehearsal has come, and end its process where it uses too much."""
+    process = psutil.Process()
     while True:
         time.sleep(_LOOK_SECONDS)
-        processor, memory = _used()
+        processor, memory = time.process_time(), process.memory_info()
         # A full disk ends a rehearsal elsewhere; its bounds hold all the same.
         with contextlib.suppress(OSError):
             folder.advance(Progress(flown=flying.flown_seconds, processor=processor))
@@ -59,7 +60,7 @@ def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
                 f"its rehearsal used more than {order.rehearsal_seconds:g} s of a processor: "
                 "submit a shorter mission"
             )
-        elif memory > order.rehearsal_bytes:
+        elif memory.rss - memory.shared > order.rehearsal_bytes:
             reason = (
                 f"its rehearsal used more than {order.rehearsal_bytes >> 20} MiB of memory: submit "
                 "one with fewer drones or waypoints"
@@ -70,20 +71,7 @@ def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
             folder.end(
                 Outcome(landed=False, reason=reason, began=ended, ended=ended, verdict=verdict)
             )
-            os.killpg(os.getpgrp(), signal.SIGKILL)
-
-
-def _used() -> tuple[float, int]:
-    """Seconds of a processor and bytes of memory that this process and its children use."""
-    own = psutil.Process()
-    processor, memory = 0.0, 0
-    for one in (own, *own.children(recursive=True)):
-        with contextlib.suppress(psutil.Error):
-            times, pages = one.cpu_times(), one.memory_info()
-            # Of those that have ended, their parent knows.
-            processor += times.user + times.system + times.children_user + times.children_system
-            memory += pages.rss - pages.shared
-    return processor, memory
+            os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _verdict(
