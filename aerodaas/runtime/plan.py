@@ -7,7 +7,6 @@ from typing import Any
 
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import (
     ComputeConfig,
@@ -320,6 +319,10 @@ class _Planner:
         work: Analytics[Any] = node.work
         if resource is None or resource.kind != "http" or self.is_managed(node):
             return work
+        from aerodaas.analytics.endpoint.analysis import (  # noqa: PLC0415 - loads HTTP
+            endpoint_analysis,
+        )
+
         return endpoint_analysis(work, short_name(node), resource, strict=False)
 
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import random
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from aerodaas.config.model import SimulationConfig
 from aerodaas.schedulers.analytics.base import Task
-from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.types.clock import NANOSECONDS
+
+if TYPE_CHECKING:
+    from aerodaas.schedulers.lab.network import Network
+    from aerodaas.schedulers.lab.times import ExecutionTimes
 
 __all__ = ["Executions"]
 
@@ -35,6 +37,10 @@ class Executions:
         """
         if simulation.execution_times is None:
             return None
+        # Few flights simulate executions, and the laboratory takes long to load.
+        from aerodaas.schedulers.lab.network import Network  # noqa: PLC0415
+        from aerodaas.schedulers.lab.times import ExecutionTimes  # noqa: PLC0415
+
         period = round(simulation.network_period * NANOSECONDS)
         return cls(
             ExecutionTimes.named(simulation.execution_times),

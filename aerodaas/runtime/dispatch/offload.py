@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.analytics.base import Analytics
-from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
 from aerodaas.dataflow.graph import Node
@@ -107,6 +106,10 @@ def _work(node: Node, resource: ComputeConfig) -> Analytics[Any]:
     work: Analytics[Any] = node.work
     if resource.kind != "http":
         return work
+    from aerodaas.analytics.endpoint.analysis import (  # noqa: PLC0415 - loads HTTP
+        endpoint_analysis,
+    )
+
     return endpoint_analysis(work, short_name(node), resource, strict=True)
 
 
