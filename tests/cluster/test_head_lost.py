@@ -32,8 +32,8 @@ pytestmark = [
 ]
 _ROOT = Path(__file__).resolve().parents[2]
 _PORT = 6379
-_ACTORS = ["ray::AnalyticsActor", "ray::DroneActor", "ray::RecorderActor"]
-"""The first has joined in flight."""
+_ACTORS = ["ray::DroneActor", "ray::NodeActor", "ray::RecorderActor"]
+"""The second has joined in flight."""
 _NODES_OWN = ("ray::IDLE", "ray::DashboardAgent", "ray::RuntimeEnvAgent")
 _APPLICATION = """
 import time

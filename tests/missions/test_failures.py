@@ -326,7 +326,7 @@ def start_application(
 
 def actors_below(pid: int) -> set[psutil.Process]:
     """Actors of the drone, recorder and analytics among a process' descendants."""
-    names = ("ray::DroneActor", "ray::RecorderActor", "ray::AnalyticsActor")
+    names = ("ray::DroneActor", "ray::RecorderActor", "ray::NodeActor")
     found = set()
     for process in psutil.Process(pid).children(recursive=True):
         with contextlib.suppress(psutil.Error):
