@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from _cluster_apps import Work, environment, flying, hover
 
+from aerodaas.actors.run.flight import Flight
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -69,8 +70,9 @@ def _failures(
     cluster: EdgeCloud, run: Run, plain: Shape
 ) -> list[tuple[str, Callable[[], None], Callable[[], None]]]:
     def kill(actor: str) -> Callable[[], None]:
-        assert run._flight is not None  # noqa: S101, SLF001 - launched
-        infos = run._flight.infos()  # noqa: SLF001 - a benchmark may look inside
+        flight = run._flight  # noqa: SLF001 - a benchmark may look inside
+        assert isinstance(flight, Flight)  # noqa: S101 - on Ray
+        infos = flight.infos()
         return lambda: cluster.edge.find(infos[actor].pid).kill()
 
     def everywhere(act: Callable[[str], None]) -> Callable[[], None]:

@@ -14,9 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from aerodaas.actors.worker import Worker
-
 from aerodaas.actors.streams import codec, local_publisher, local_subscriber, subscriber
+from aerodaas.runtime.analysis import AnalysisNode
 from aerodaas.runtime.controller import VehicleController
 
 __all__ = ["FOLDER", "dump", "install"]
@@ -101,7 +100,7 @@ def install() -> None:
     _wrap(local_publisher.LocalPublisher, "send", _send)
     _wrap(local_subscriber.LocalSubscriber, "_ready", _ready)
     _wrap(subscriber, "decode", _decode)
-    _wrap(Worker, "_work", _work)
+    _wrap(AnalysisNode, "_process_input", _work)
     _wrap(VehicleController, "take", _take)
 
 

@@ -22,6 +22,7 @@ from _latency_ours import HEIGHT, WIDTH, read_frame
 from _report import Report
 
 from aerodaas.actors.streams import Publisher, Subscriber
+from aerodaas.runtime.node import Outlet
 from aerodaas.types.data import Frame, Header
 
 UNITS = {"median": "us", "p99": "us", "publisher": "us of processor", "reader": "us of processor"}
@@ -37,7 +38,7 @@ def _processor() -> float:
 
 def _publish(scope: str, kind: str, count: int) -> float:
     """Publish `count` messages; returns seconds of processor for each."""
-    publisher = Publisher(scope, "s")
+    publisher, outlet = Publisher(scope, "s"), Outlet("s")
     image = np.random.default_rng(0).integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
     time.sleep(1.0)
     began = 0.0
@@ -47,9 +48,9 @@ def _publish(scope: str, kind: str, count: int) -> float:
         time.sleep(_PERIOD)
         header = Header(number, number, "drone/camera")
         item: Any = Frame(header, image) if kind == "frame" else {"value": float(number)}
-        publisher.measure(item, header, time.monotonic_ns())
+        publisher.publish(outlet.measure(item, header, time.monotonic_ns()))
     used = _processor() - began
-    publisher.measure(None, Header(0, 0, "the end"), 0)
+    publisher.publish(outlet.measure(None, Header(0, 0, "the end"), 0))
     publisher.close()
     return used / count
 

@@ -32,9 +32,9 @@ from aerodaas import (
     VelocityCommand,
     Waypoint,
 )
-from aerodaas.actors.run.live import LiveReader
 from aerodaas.analytics.base import Context
 from aerodaas.config.options import RunOptions, current_options
+from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.session import CONTROL_PERIOD_NS
 
 RATE = 13

@@ -19,6 +19,7 @@ import typer
 from _cluster_apps import Work, environment, flying, hover
 from _report import Report
 
+from aerodaas.actors.run.flight import Flight
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -50,12 +51,17 @@ def _computed(process: psutil.Process) -> float:
     return float(times.user + times.system)
 
 
+def _flight(run: Run) -> Flight:
+    flight = run._flight  # noqa: SLF001 - a benchmark may look inside
+    assert isinstance(flight, Flight)  # noqa: S101 - on Ray
+    return flight
+
+
 def _kill(run: Run) -> tuple[float, psutil.Process, list[Moment]]:
     """Kill the actor; return when, in host seconds, its successor, and how that came up."""
-    assert run._flight is not None  # noqa: S101, SLF001 - launched
     before = _ray_processes()
     died = time.time()
-    before[run._flight.infos()[_ACTOR].pid].kill()  # noqa: SLF001 - a benchmark may look inside
+    before[_flight(run).infos()[_ACTOR].pid].kill()
     moments: list[Moment] = []
     began = 0.0
     while time.time() < died + _PATIENCE:
@@ -98,8 +104,7 @@ def main(
                 died, process, moments = _kill(run)
                 time.sleep(_SETTLE)
                 rounds.append((died, _computed(process), moments))
-            assert run._flight is not None  # noqa: S101, SLF001 - launched
-            origin = run._flight._origin / 1e9  # noqa: SLF001
+            origin = _flight(run)._origin / 1e9  # noqa: SLF001 - as above
         assert run.recording is not None  # noqa: S101 - asked for
         with Recording.open(run.recording) as recording:
             flight = RecordedFlight.read(recording)

@@ -1,13 +1,11 @@
 """The walk of a camera frame to a setpoint: the files that it passes, in order.
 
     python benchmarks/walks.py
-    python benchmarks/walks.py --inline
 
-One frame of the simulated camera goes to the detector that ships, its boxes to a follower, and the
-follower's command to the drone's setpoint loop. All four are the nodes that fly, stepped by hand in
-one process. Between them a message travels through shared memory, as between actors on one
-machine, or with `--inline` as it is, as in simulated time. Listed are the project's files whose
-functions run on the way, those of the simulator left out.
+One frame of the simulated camera goes through shared memory to the detector that ships, its boxes
+to a follower, and the follower's command to a drone, each a node of a flight, all in one process.
+Listed are the project's files whose functions run on the way, those of the simulator left out; the
+actors that step the nodes (`base`, `node_runner`, `drone/actor`) are three more.
 """
 
 from __future__ import annotations
@@ -15,10 +13,10 @@ from __future__ import annotations
 import sys
 import types
 import uuid
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -33,48 +31,67 @@ from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.drone import DroneNode
-from aerodaas.runtime.inline import InlineExecutor, Part
 from aerodaas.runtime.node import Node
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.stream_names import setpoint_stream, state_stream
+from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.status import Message
+from aerodaas.types.clock import NANOSECONDS, SimulatedClock
+from aerodaas.types.status import Message, SetpointRecord
 
 _ROOT = Path(aerodaas.__file__).resolve().parents[1]
 _ENVIRONMENT = _ROOT / "apps" / "environments" / "campus.json"
 _PARTS = ("aerodaas", "actors", "schedulers")
-_CYCLE = NANOSECONDS // 20
-_CAMERA, _VESTS, _FOLLOW = "tello/cam1", "tello/vests", "tello/follow"
-
-Carry = Callable[[Message[Any]], Message[Any]]
-
-
-@contextmanager
-def _walked(files: dict[str, None]) -> Iterator[None]:
-    """Add the project's files whose functions are called meanwhile, in order of the first call."""
-
-    def on_event(frame: types.FrameType, event: str, _: object) -> None:
-        path = Path(frame.f_code.co_filename).resolve()
-        if event == "call" and any(path.is_relative_to(_ROOT / part) for part in _PARTS):
-            name = str(path.relative_to(_ROOT))
-            if "simulation/" not in name:
-                files.setdefault(name)
-
-    sys.setprofile(on_event)
-    try:
-        yield
-    finally:
-        sys.setprofile(None)
+_LONGEST = 30 * NANOSECONDS
+"""Mission time within which the follower must steer, nanoseconds."""
+_FRAMES, _BOXES, _NAVIGATION = "tello/cam1", "tello/vests", "tello/follow"
 
 
-def _analysis(session: Session, work: Analytics[Any], stream: str, reads: str) -> AnalysisNode:
+class _Host:
+    """Host of the nodes, on a simulated clock."""
+
+    def __init__(self) -> None:
+        self.time = 0
+
+    def now(self) -> int:
+        return self.time
+
+    def alert(
+        self,
+        kind: str,
+        text: str,
+        stamp: int | None = None,
+        values: Mapping[str, Any] | None = None,
+        source: str = "",
+    ) -> None:
+        del kind, text, stamp, values, source
+
+    def wake(self) -> None:
+        return
+
+
+class _Stream:
+    """A stream in shared memory, with both ends in this process."""
+
+    def __init__(self, scope: str, name: str) -> None:
+        self._publisher = Publisher(scope, name)
+        self._subscriber = Subscriber(scope, {name: 1})
+
+    def carry(self, messages: Sequence[Message[Any]]) -> list[Message[Any]]:
+        """Publish messages of a node, and return what a reader gets."""
+        for message in messages:
+            self._publisher.publish(message)
+        return self._subscriber.receive(5.0) if messages else []
+
+
+def _analysis(
+    session: Session, stream: str, work: Analytics[Any], reads: str, state: str
+) -> AnalysisNode:
     spec = AnalysisSpec(
-        stream,
-        work,
-        {reads: 1},
+        stream=stream,
+        work=work,
+        inputs={reads: 1},
         robot="tello",
-        state=state_stream("tello"),
+        state=state,
         external=False,
         dormant=False,
         triggers=(),
@@ -85,78 +102,66 @@ def _analysis(session: Session, work: Analytics[Any], stream: str, reads: str) -
     return spec.make(session)
 
 
-class _SharedMemory:
-    """Streams in shared memory, with both ends in this process."""
+@contextmanager
+def _walked(files: dict[str, None]) -> Iterator[None]:
+    """Add the project's files whose functions are called meanwhile, in order of the first call."""
 
-    def __init__(self, streams: Sequence[str], closing: ExitStack) -> None:
-        scope = f"walk/{uuid.uuid4().hex[:8]}"
-        self._publishers = {stream: Publisher(scope, stream) for stream in streams}
-        self._subscribers = {stream: Subscriber(scope, {stream: 1}) for stream in streams}
-        for end in (*self._subscribers.values(), *self._publishers.values()):
-            closing.callback(end.close)
+    def note(frame: types.FrameType, event: str, _: object) -> None:
+        path = Path(frame.f_code.co_filename).resolve()
+        if event == "call" and any(path.is_relative_to(_ROOT / one) for one in _PARTS):
+            name = str(path.relative_to(_ROOT))
+            if "simulation/" not in name:
+                files.setdefault(name)
 
-    def carry(self, message: Message[Any]) -> Message[Any]:
-        """Publish a message, and receive it."""
-        self._publishers[message.stream].publish(message)
-        return self._subscribers[message.stream].receive(5.0)[-1]
-
-
-def _as_it_is(message: Message[Any]) -> Message[Any]:
-    return message
+    sys.setprofile(note)
+    try:
+        yield
+    finally:
+        sys.setprofile(None)
 
 
-def _steer(
-    nodes: Sequence[Node], carry: Carry, now: int, state: Message[Any]
-) -> list[Message[Any]]:
-    """Step each node with what the one before has published; what the last one publishes."""
-    found: list[Message[Any]] = []
-    for node in nodes:
-        published = node.step(now, [*found, state])
-        found = [carry(message) for message in published if message.stream == node.name]
-        if not found:
-            return []
-    return found
-
-
-def main(
-    *,
-    inline: Annotated[bool, typer.Option("--inline", help="As in simulated time.")] = False,
-) -> None:
+def main() -> None:
     """Fly until the follower steers, noting the files of each frame's walk; print the last one."""
     environment = EnvironmentConfig.load(_ENVIRONMENT)
-    robot = environment.robots[0]
-    session = Session(environment, None)
-    spec = RobotSpec(robot, (), (_FOLLOW,), (), (), (OpenStream(_FOLLOW),), OrderedScheduler())
-    drone = DroneNode(
-        session, "drone", (spec,), lambda _, scheduler: InlinePlanner(scheduler), observed={}
+    session, host, robot = Session(environment, None), _Host(), environment.robots[0]
+    sensor, state = robot.sensors[0], state_stream(robot.id)
+    spec = RobotSpec(
+        robot, (), (_NAVIGATION,), (), (), (OpenStream(_NAVIGATION),), OrderedScheduler()
     )
-    state = state_stream(robot.id)
-    camera = CameraNode(session, _CAMERA, robot.sensors[0], state, ends=False)
-    detector = _analysis(session, VipDetectionAnalytics(), _VESTS, _CAMERA)
-    follower = _analysis(session, VipFollowAnalytics(distance=2.0), _FOLLOW, _VESTS)
-    executor = InlineExecutor()
-    walk: dict[str, None] = {}
-    steered: list[Message[Any]] = []
-    with ExitStack() as closing:
-        streams = (_CAMERA, _VESTS, _FOLLOW)
-        carry: Carry = _as_it_is if inline else _SharedMemory(streams, closing).carry
-        for node in (drone, camera, detector, follower):
-            closing.callback(node.close)
-            node.open(Part(node.name, executor))
-            node.start(executor.clock)
-        for cycle in range(1, 600):
-            now = cycle * _CYCLE
-            executor.clock.advance_to(now)
-            with _walked(walk):
-                sent = {message.stream: message for message in drone.step(now, ())}
-            record = sent[setpoint_stream(robot.id)].item
-            if record is not None and record.cause is not None and steered:
-                print("\n".join(f"{number:3}  {file}" for number, file in enumerate(walk, 1)))
-                return
-            walk = {}
-            with _walked(walk):
-                steered = _steer((camera, detector, follower), carry, now, sent[state])
-                drone.step(now, steered)
+    drone = DroneNode(
+        session,
+        "drone",
+        (spec,),
+        lambda _, scheduler: InlinePlanner(scheduler),
+        observed={_FRAMES: sensor.rate},
+    )
+    camera = CameraNode(session, _FRAMES, sensor, state, ends=False)
+    detector = _analysis(session, _BOXES, VipDetectionAnalytics(), _FRAMES, state)
+    follower = _analysis(session, _NAVIGATION, VipFollowAnalytics(distance=2.0), _BOXES, state)
+    scope = f"walk/{uuid.uuid4().hex[:8]}"
+    frames, boxes, navigation = (_Stream(scope, name) for name in (_FRAMES, _BOXES, _NAVIGATION))
+    nodes: tuple[Node, ...] = (drone, camera, detector, follower)
+    for node in nodes:
+        node.open(host)
+        node.start(SimulatedClock())
+    steering: list[Message[Any]] = []
+    files: dict[str, None] = {}
+    while host.time < _LONGEST:
+        host.time = drone.due
+        with _walked(files):
+            published = drone.step(host.time, steering)
+        records = [one.item for one in published if isinstance(one.item, SetpointRecord)]
+        if any(record.cause is not None and record.sent is not None for record in records):
+            print("\n".join(f"{number:3}  {file}" for number, file in enumerate(files, 1)))
+            return
+        steering = []
+        if host.time >= camera.due:
+            states = [message for message in published if message.stream == state]
+            files = {}
+            with _walked(files):
+                seen = frames.carry(camera.step(host.time, states))
+                found = boxes.carry(detector.step(host.time, [*seen, *states]))
+                steering = navigation.carry(follower.step(host.time, [*found, *states]))
     raise SystemExit("the follower never steered")
 
 
