@@ -1,9 +1,9 @@
 """Simulated seconds per wall second, and the processor's time that each of them takes.
 
-Farm Survey flies whole, in simulated time: physics, a camera of 640 x 360 at 15 a second, streams,
-recording with JPEG pictures. The processor's time is that of the actors in flight, as the recording
-has it; Ray's threads cost some of it for each second of the wall, so it wants a quiet machine, too.
-"parts, in one process" (`_parts.py`) wants less of one: drone, camera and recorder by themselves.
+Farm Survey flies whole, in simulated time: physics, a camera of 640 x 360 at 15 a second, recording
+with JPEG pictures. The processor's time is that of the flight's process, as the recording has it,
+or of an older checkout's actors. "parts, in one process" (`_parts.py`) has drone, camera and
+recorder by themselves.
 "side by side" is `aerodaas run --seeds`, whose wall time includes all that comes before and after
 the flights.
 """
@@ -33,10 +33,16 @@ from aerodaas.types.clock import NANOSECONDS
 _CHECKOUT = Path(__file__).resolve().parents[1]
 _APPS = _CHECKOUT / "apps"
 APPLICATION = _APPS / "farm_survey.py"
-_ACTORS = {"drone": "drone", "sensor": "camera", "analytics": "analyses", "recorder": "recorder"}
-"""Name of an actor's figure, by the first part of its own."""
+_PROCESSES = {
+    "inline": "flight",
+    "drone": "drone",
+    "sensor": "camera",
+    "analytics": "analyses",
+    "recorder": "recorder",
+}
+"""Name of a process' figure, by the first part of its own; older checkouts have actors."""
 UNITS = {"simulated": "s", "wall": "s", "factor": "s/s", "ready after": "s"}
-UNITS |= dict.fromkeys((*_ACTORS.values(), "actors"), "ms of processor/s")
+UNITS |= dict.fromkeys((*_PROCESSES.values(), "all"), "ms of processor/s")
 _NONE = dict.fromkeys(UNITS, float("nan"))
 _LINE = re.compile(r"flew ([\d.]+) s in ([\d.]+) s, .*ready after ([\d.]+) s")
 _SIDE_BY_SIDE = "side by side"
@@ -70,12 +76,11 @@ def fly(checkout: Path | None, folder: Path, words: Sequence[str]) -> dict[str, 
     mission, wall, ready = (float(text) for text in found.groups())
     used = processor(folder / "flight.mcap")
     figures = {"simulated": mission, "wall": wall, "factor": mission / wall, "ready after": ready}
-    actors = {**dict.fromkeys(_ACTORS.values(), 0.0), **used, "actors": sum(used.values())}
-    return {**_NONE, **figures, **actors}
+    return {**_NONE, **figures, **used, "all": sum(used.values())}
 
 
 def processor(recording: Path) -> dict[str, float]:
-    """Milliseconds of the processor for a simulated second, by kind of actor."""
+    """Milliseconds of the processor for a simulated second, by kind of process."""
     readings: dict[str, list[tuple[int, float]]] = defaultdict(list)
     with Recording.open(recording) as opened:
         for record in opened.records(schemas=("aerodaas.Vitals",)):
@@ -83,7 +88,7 @@ def processor(recording: Path) -> dict[str, float]:
             readings[value["actor"]].append((value["stamp"], value["cpu_seconds"]))
     used: dict[str, float] = defaultdict(float)
     for actor, found in readings.items():
-        kind = _ACTORS.get(actor.partition("/")[0])
+        kind = _PROCESSES.get(actor.partition("/")[0])
         (began, before), (ended, after) = found[0], found[-1]
         if kind is not None and ended > began:
             used[kind] += 1000 * (after - before) / ((ended - began) / NANOSECONDS)

@@ -1,4 +1,4 @@
-"""Base classes of analyses: graph node in the application, worker in an actor.
+"""Base classes of analyses: part of a graph in the application, work of a node in flight.
 
 A user's analysis is one class::
 
@@ -9,8 +9,8 @@ A user's analysis is one class::
         def process(self, item: Frame, context: Context) -> float:
             return float(item.image.mean())
 
-The instance is sent to its actor by value before `open` is called there, so a constructor stores
-only state that is cheap to send and validates only the user's settings.
+The instance is copied to where it runs before `open` is called there, so a constructor stores
+only state that is cheap to copy and validates only the user's settings.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ O_co = TypeVar("O_co", covariant=True)
 
 
 class Context(Protocol):
-    """Services that the actor provides to the analysis it runs."""
+    """Services of the node to the analysis that it runs."""
 
     def now(self) -> int:
         """Mission time of the item being processed, in nanoseconds."""
@@ -78,7 +78,7 @@ class Context(Protocol):
 
     @property
     def kind(self) -> ComputeKind:
-        """Compute resource of this actor: the edge node beside the vehicle, or the cloud."""
+        """Compute resource on which it runs: the edge node beside the vehicle, or the cloud."""
         ...
 
 
@@ -94,7 +94,7 @@ class TimedContext(Protocol):
 class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses declare the types they accept and produce, and implement `process`.
 
-    Life cycle in the actor: `open` once, `process` for one item at a time (the newest one; in
+    Life cycle in flight: `open` once, `process` for one item at a time (the newest one; in
     simulated time, every one in order), `close` once.
     """
 
@@ -138,14 +138,14 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
                 cls.produces = results[0]
 
     def open(self) -> None:
-        """Load models and connect; called once in the actor, before the mission starts."""
+        """Load models and connect; called once where it runs, before the mission starts."""
 
     def process(self, item: Any, context: Context) -> O_co | None:  # noqa: ANN401
         """Compute the result of one item.
 
         Args:
             item: Newest item of an analysed stream; None for an external source.
-            context: Services of the actor.
+            context: Services of its node.
 
         Returns:
             The result to publish, or None for no result.
@@ -361,7 +361,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
         return self.node
 
     def __getstate__(self) -> dict[str, Any]:
-        """State without the graph and the constructor's arguments, to be sent to an actor."""
+        """State without the graph and the constructor's arguments, to be copied in flight."""
         hidden = {"node", "_graph", "_given"}
         return {key: value for key, value in self.__dict__.items() if key not in hidden}
 

@@ -54,7 +54,7 @@ class MissionLink(Protocol):
 class CommandingAnalytics(NavigableAnalytics):
     """An analysis with its own threads that commands the mission, such as a remote control.
 
-    In the actor, `begin` is called between `open` and the first `process`. In simulated time, its
+    In flight, `begin` is called between `open` and the first `process`. In simulated time, its
     commands take effect in the next cycle of the drone's loop.
     """
 

@@ -59,7 +59,7 @@ class GeofenceConfig(Strict):
 
 
 class LimitsConfig(Strict):
-    """What the drone's actor clamps to, and how long it waits before it protects the drone."""
+    """What the drone's node clamps to, and how long it waits before it protects the drone."""
 
     cruise_speed: Positive = 1.0
     max_speed: Positive = 5.0

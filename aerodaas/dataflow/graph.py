@@ -98,7 +98,7 @@ class Node:
     item: type
     """Type of the items in its stream."""
     work: Any
-    """The actor's work: a sensor's configuration or an analysis."""
+    """The node's work: a sensor's configuration or an analysis."""
     robot: str | None = None
     inputs: list[str] = field(default_factory=list)
     compute: str | None = None

@@ -334,7 +334,7 @@ class Run:
                 return
 
     def reports(self) -> dict[str, ActorReport]:
-        """The newest report of each actor, by its name."""
+        """The newest report of each part, by its name; in real time a part is an actor."""
         assert self._flight is not None  # noqa: S101 - launched
         return self._flight.reports()
 
@@ -365,7 +365,7 @@ class Run:
         self._raise_problems()
 
     def plan(self) -> FlightPlan:
-        """Plan the actors of the flight; raises the errors of a graph that cannot fly."""
+        """Plan the nodes of the flight; raises the errors of a graph that cannot fly."""
         from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
         from aerodaas.runtime.plan import make_plan  # noqa: PLC0415
         from aerodaas.runtime.session import Session  # noqa: PLC0415
@@ -420,7 +420,7 @@ class Run:
         return application
 
     def _check_world(self) -> None:
-        """Raise ConfigError for an invalid scenario here rather than in an actor."""
+        """Raise ConfigError for an invalid scenario here rather than in flight."""
         from aerodaas.simulation.scenario import load_scenario  # noqa: PLC0415 - only here
 
         if any(robot.driver == "simulated" for robot in self.config.robots):

@@ -48,7 +48,7 @@ _DOING = {
 
 
 class SetpointLoop:
-    """The setpoint loop of one drone, turned by its actor 20 times a second."""
+    """The setpoint loop of one drone, turned by its node 20 times a second."""
 
     def __init__(self, vehicle: Vehicle, mission: Mission) -> None:
         """Fly `vehicle` by `mission`, within the mission's limits."""

@@ -1,6 +1,6 @@
 """The mission of one drone: commands and vehicle states in, one action per turn out.
 
-A mission is pure: it reads no clock, never sleeps and starts no thread, so that the drone's actor,
+A mission is pure: it reads no clock, never sleeps and starts no thread, so that the drone's node,
 a test and a study all fly it with the same result. Long computations, such as plans, are submitted
 to a `Planner`.
 """
@@ -85,7 +85,7 @@ _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 class Mission:
     """One flight, from take-off to landing.
 
-    The drone's actor calls `update` 20 times a second::
+    The drone's node calls `update` 20 times a second::
 
         action = mission.update(vehicle.read(), clock.now())
 

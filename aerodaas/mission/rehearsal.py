@@ -1,6 +1,6 @@
 """Check of the navigation known before take-off, on a mission that never starts.
 
-Every error that can be found without the vehicle is reported here, before any actor starts.
+Every error that can be found without the vehicle is reported here, before anything starts.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def rehearse(
     """Refuse navigation that the mission would refuse, or that the battery cannot cover.
 
     A real vehicle may stand elsewhere than the environment says: whether waypoints relative to it
-    lie within the fence is checked by its actor. Raises InvalidWaypointError, and ConfigError for
+    lie within the fence is checked by its node. Raises InvalidWaypointError, and ConfigError for
     an invalid fence.
     """
     commands = list(commands)
@@ -63,7 +63,7 @@ def rehearse(
     sea_level = home.above_sea if home else None
     clearance = _clearance(robot, environment, takeoff) if known else None
     later = {
-        # What the vehicle alone knows, or lies with it, its actor checks.
+        # What the vehicle alone knows, or lies with it, its node checks.
         HeightReference.SEA: sea_level is None and robot.driver != "simulated",
         HeightReference.GROUND: clearance is None and environment.terrain is not None,
     }

@@ -1,7 +1,7 @@
 """Checks of an environment and a graph before a run; each error names its remedy.
 
-Errors that an actor would raise when it opens are raised here first, if possible: Ray takes
-seconds to start, and a typing error should be found before the fleet is in the field.
+Errors that a node would raise when it opens are raised here first, if possible: models take
+seconds to load, and a typing error should be found before the fleet is in the field.
 """
 
 from __future__ import annotations

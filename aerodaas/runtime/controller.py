@@ -71,7 +71,7 @@ def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """Specification of one robot for its actor."""
+    """Specification of one robot for its node."""
 
     robot: RobotConfig
     sensors: tuple[SensorConfig, ...]
@@ -311,7 +311,7 @@ class VehicleController:
         return alerts
 
     def abandon(self) -> None:
-        """Make the vehicle land by itself, after a failure of the actor."""
+        """Make the vehicle land by itself, after a failure of the node."""
         with contextlib.suppress(AeroDaaSError):
             self.vehicle.land()
 

@@ -69,7 +69,7 @@ class Latencies:
 
 @dataclass(frozen=True)
 class StreamCount:
-    """Messages of one stream received and dropped by an actor."""
+    """Messages of one stream received and dropped by a part."""
 
     received: int
     dropped: int
@@ -77,7 +77,7 @@ class StreamCount:
 
 @dataclass(frozen=True)
 class SentCount:
-    """Messages published by an actor on one stream, and their latency."""
+    """Messages published by a part on one stream, and their latency."""
 
     count: int
     median_ms: float | None
@@ -96,7 +96,7 @@ class SentCount:
 
 @dataclass(frozen=True)
 class ActorReport:
-    """Status of an actor: phase, counters, vitals, alerts and problems."""
+    """Status of a part, in real time an actor: phase, counters, vitals, alerts and problems."""
 
     phase: Phase
     error: AeroDaaSError | None = None
@@ -109,7 +109,7 @@ class ActorReport:
     problems: tuple[str, ...] = ()
     """Descriptions of items that could not be sent or read."""
     values: dict[str, Any] = field(default_factory=dict)
-    """Figures specific to the kind of actor."""
+    """Figures specific to the kind of part."""
 
 
 def merged_values(nodes: Iterable[Node]) -> dict[str, Any]:
@@ -139,7 +139,7 @@ class FlightState:
 
     @property
     def alerts(self) -> list[Alert]:
-        """The newest alerts of all actors and of the application's process, oldest first."""
+        """The newest alerts of all parts and of the application's process, oldest first."""
         noted = {(note.kind, note.text) for note in self.notes}
         alerts = [
             alert

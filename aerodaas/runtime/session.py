@@ -1,4 +1,4 @@
-"""Session of a run: the data that each of its actors receives."""
+"""Session of a run: the data that each of its nodes receives."""
 
 from __future__ import annotations
 

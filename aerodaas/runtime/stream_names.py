@@ -79,7 +79,7 @@ def done_stream(node: str) -> str:
 
 
 def alert_stream(actor: str) -> str:
-    """Name of the stream of an actor's alerts."""
+    """Name of the stream of a part's alerts; in real time a part is an actor."""
     return f"{INTERNAL}alerts/{actor}"
 
 
@@ -94,7 +94,7 @@ def is_guest_actor(actor: str) -> bool:
 
 
 def vitals_stream(actor: str) -> str:
-    """Name of the stream of the vitals of an actor's process."""
+    """Name of the stream of the vitals of a part's process."""
     return f"{INTERNAL}vitals/{actor}"
 
 

@@ -1,7 +1,7 @@
 """The mission clock: wall time, scaled time or simulated time, behind one protocol.
 
 Every stamp in this project is an integer of nanoseconds on the mission clock, which reads zero
-when the mission's actors start. Latencies are taken on `host_time_ns`, because simulated time
+when the mission starts. Latencies are taken on `host_time_ns`, because simulated time
 may stand still while a frame is processed.
 
 The wall clock may be set at any time, by NTP or by hand. Durations therefore go by

@@ -150,7 +150,7 @@ class Decision:
 
 
 class TraceSpan(NamedTuple):
-    """One actor's share in a message's way, in nanoseconds of `clock.host_time_ns`."""
+    """One node's share in a message's way, in nanoseconds of `clock.host_time_ns`."""
 
     node: str
     received: int
@@ -176,5 +176,5 @@ class Message(Generic[E]):
 
     @property
     def latency_ns(self) -> int:
-        """Nanoseconds from capture to the last actor's publishing."""
+        """Nanoseconds from capture to the last node's publishing."""
         return (self.spans[-1].published - self.captured) if self.spans else 0

@@ -33,7 +33,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
     or the `http://` address of a feed that answers with its newest row (JSON, CSV or GPX).
 
     The first timestamp of a file is mission time zero, plus `offset` seconds: a row written 10 s
-    after the first one is current 10 s into the mission, at any speed and in simulated time. Rows
+    after the first one is current 10 s into the mission, at any speed. Rows
     without timestamps follow each other at `rate`. Each fix is published once. A feed is polled
     at `rate` by the wall clock, and its rows are stamped on arrival.
     """
@@ -50,7 +50,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         max_age: float = 10.0,
         timeout: float = 2.0,
     ) -> None:
-        """Read a file, which is sent to the actor by value; a feed is first polled in flight.
+        """Read a file, which is copied to where it runs; a feed is first polled in flight.
 
         Args:
             source: Path of a GPX, CSV or JSON file, or `http://` or `https://` address of a feed.

@@ -65,7 +65,7 @@ class Neighbours:
         self._now = 0
         self._present: dict[str, tuple[Whereabouts, float, Neighbour]] = {}
         """What is known of each at `_now`, for which distance, and what that makes of it: all
-        drones of one actor ask at one moment."""
+        drones of one node ask at one moment."""
 
     def hear(self, name: str, where: Whereabouts | None) -> None:
         """Take what the drone `name` tells; None, a place unknown to it, leaves the last."""

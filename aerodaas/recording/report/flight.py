@@ -160,11 +160,11 @@ class StreamLatency:
     age: list[float] = field(default_factory=list)
     """The same in mission time, of results; 0 in simulated time without simulated executions."""
     overhead: list[float] = field(default_factory=list)
-    """The part of `total` without computation: transport between actors and queueing."""
+    """The part of `total` without computation: transport between nodes and queueing."""
     wait: dict[str, list[float]] = field(default_factory=lambda: _Table(list))
-    """From the previous actor's publishing to this one's receiving, by actor."""
+    """From the previous node's publishing to this one's receiving, by node."""
     work: dict[str, list[float]] = field(default_factory=lambda: _Table(list))
-    """From receiving to publishing, by actor."""
+    """From receiving to publishing, by node."""
 
 
 @dataclass

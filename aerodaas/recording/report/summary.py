@@ -25,7 +25,7 @@ class LatencyFigures:
     median_ms: float
     p99_ms: float
     overhead_ms: float
-    """Median of the part without computation: transport between actors and queueing."""
+    """Median of the part without computation: transport between nodes and queueing."""
     age_ms: float
     """Median of results in mission time: in simulated time 0, or what simulated executions took."""
     age_p99_ms: float
