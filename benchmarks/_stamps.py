@@ -57,9 +57,9 @@ def _write(original: Any, self: Any, *target: Any) -> Any:  # noqa: ANN401
     return written
 
 
-def _send(original: Any, self: Any, encoded: Any) -> None:  # noqa: ANN401
-    original(self, encoded)
-    _note("sent", encoded.traced)
+def _send(original: Any, self: Any, encode: Any) -> None:  # noqa: ANN401
+    original(self, encode)
+    _note("sent", encode.__self__.message)
 
 
 def _ready(original: Any, self: Any, until: float) -> Any:  # noqa: ANN401

@@ -59,20 +59,23 @@ def _flight(run: Run) -> Flight:
 
 def _kill(run: Run) -> tuple[float, psutil.Process, list[Moment]]:
     """Kill the actor; return when, in host seconds, its successor, and how that came up."""
-    before = _ray_processes()
+    before, killed = _ray_processes(), _flight(run).infos()[_ACTOR].pid
     died = time.time()
-    before[_flight(run).infos()[_ACTOR].pid].kill()
+    before[killed].kill()
     moments: list[Moment] = []
     began = 0.0
     while time.time() < died + _PATIENCE:
-        for process in [new for pid, new in _ray_processes().items() if pid not in before]:
-            title, began = _title(process), began or time.time()
-            for mark, name in _TITLES.items():
+        for pid, process in _ray_processes().items():
+            # Ray may have had the process ready before; then there is no moment of its beginning.
+            title, fresh = _title(process), pid not in before
+            if fresh:
+                began = began or time.time()
+            for mark, name in _TITLES.items() if fresh else ():
                 if title.startswith(mark) and name not in [moment[0] for moment in moments]:
                     moments.append((name, time.time() - died, _computed(process)))
-            if title.startswith("ray::DispatcherActor"):
-                begun = ("a process is there", began - died, 0.0)
-                return died, process, [begun, *moments]
+            if pid != killed and title.startswith("ray::DispatcherActor"):
+                begun = [("a process is there", began - died, 0.0)] if began else []
+                return died, process, [*begun, *moments]
         time.sleep(0.005)
     raise TimeoutError(f"no other {_ACTOR} within {_PATIENCE:.0f} s")
 
