@@ -69,7 +69,7 @@ def name_of(process: psutil.Process, application: int) -> str:
     words = process.cmdline()
     line = " ".join(words)
     if found := re.match(r"ray::(\w+)", line):
-        return f"{found[1]} {process.pid}" if found[1] in {"IDLE", "SensorActor"} else found[1]
+        return f"{found[1]} {process.pid}" if found[1] in {"IDLE", "NodeActor"} else found[1]
     for part in ("gcs_server", "raylet", "ray_process.py"):
         if any(Path(word).name == part for word in words[:5]):
             return part

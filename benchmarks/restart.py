@@ -30,7 +30,8 @@ _SETTLE = 5.0
 _PATIENCE = 60.0
 _ACTOR = "dispatcher"
 _TASK = {"benefit": 10, "deadline": 900, "edge_time": 50, "cloud_time": 200, "cloud_cost": 1}
-_TITLES = {"ray::IDLE": "Ray in it is ready", "ray::DispatcherActor": "our modules are loaded"}
+_TITLE = "ray::NodeActor"
+_TITLES = {"ray::IDLE": "Ray in it is ready", _TITLE: "our modules are loaded"}
 """How Ray calls a process that has come so far."""
 Moment = tuple[str, float, float]
 """What has happened, seconds after the death, seconds of computing of the new process."""
@@ -59,9 +60,10 @@ def _flight(run: Run) -> Flight:
 
 def _kill(run: Run) -> tuple[float, psutil.Process, list[Moment]]:
     """Kill the actor; return when, in host seconds, its successor, and how that came up."""
-    before, killed = _ray_processes(), _flight(run).infos()[_ACTOR].pid
+    infos = _flight(run).infos()
+    before, actors = _ray_processes(), {info.pid for info in infos.values()}
     died = time.time()
-    before[killed].kill()
+    before[infos[_ACTOR].pid].kill()
     moments: list[Moment] = []
     began = 0.0
     while time.time() < died + _PATIENCE:
@@ -73,7 +75,7 @@ def _kill(run: Run) -> tuple[float, psutil.Process, list[Moment]]:
             for mark, name in _TITLES.items() if fresh else ():
                 if title.startswith(mark) and name not in [moment[0] for moment in moments]:
                     moments.append((name, time.time() - died, _computed(process)))
-            if pid != killed and title.startswith("ray::DispatcherActor"):
+            if pid not in actors and title.startswith(_TITLE):
                 begun = [("a process is there", began - died, 0.0)] if began else []
                 return died, process, [*begun, *moments]
         time.sleep(0.005)

@@ -19,7 +19,8 @@ from flying import Flyer, hop, robot
 from hosts import Hand, published
 
 from aerodaas import AeroStreamData, Environment, Frame
-from aerodaas.actors.dispatch.dispatcher import DispatcherActor, LiveDispatcher
+from aerodaas.actors.base import NodeActor
+from aerodaas.actors.dispatch.dispatcher import LiveDispatcher
 from aerodaas.actors.run.flight import Flight
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.config.model import EnvironmentConfig
@@ -121,7 +122,7 @@ def _require_one_end_each(run: Run) -> Counter[str]:
 def test_an_actor_that_is_not_set_up_reports() -> None:
     """Ray has restarted it, and the application asks before it has prepared it anew."""
     environment = EnvironmentConfig.model_validate({"robots": [robot()]})
-    actor = DispatcherActor(Session(environment), "dispatcher")
+    actor = NodeActor(Session(environment), "dispatcher")
     report = actor.report()
     assert (report.phase, report.values) == ("new", {})
     assert actor.stop().error is None
