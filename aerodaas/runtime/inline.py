@@ -132,7 +132,8 @@ class InlineExecutor:
         self._readers: dict[str, list[_Entry]] = {}
         self._taps: dict[str, list[Tap]] = {}
         self._posted: SimpleQueue[Message[Any]] = SimpleQueue()
-        self._part_at_work: Part | None = None
+        self.part_at_work: Part | None = None
+        """Part whose node is stepped, or was stepped last."""
 
     def add(self, part: str, nodes: Iterable[Node], *, first: bool = False) -> None:
         """Add nodes, stepped in the order in which they were added.
@@ -193,7 +194,7 @@ class InlineExecutor:
         for node in nodes:
             entry = self._entry(node)
             entry.part.phase = "running"
-            self._part_at_work = entry.part
+            self.part_at_work = entry.part
             try:
                 published = node.start(self.clock)
             except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
@@ -245,7 +246,7 @@ class InlineExecutor:
         if len(inputs) > 1:
             positions = entry.positions
             inputs.sort(key=lambda message: positions[message.stream])
-        self._part_at_work = entry.part
+        self.part_at_work = entry.part
         try:
             published = entry.node.step(now, inputs)
         except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
@@ -318,7 +319,7 @@ class InlineExecutor:
 
     def log_handler(self, level: int) -> logging.Handler:
         """A handler that publishes log records as alerts of the part at work."""
-        return _AlertHandler(level, lambda: self._part_at_work)
+        return _AlertHandler(level, lambda: self.part_at_work)
 
 
 def _as_project_error(node: Node, error: BaseException) -> AeroDaaSError:

@@ -40,6 +40,8 @@ __all__ = ["InlineFlight"]
 
 _ANSWER_TIMEOUT = 60.0
 """Wall seconds within which a call is served: between two moments, one may open a model."""
+_STOP_TIMEOUT = 5.0
+"""Wall seconds within which the step under way returns once the flight is stopped."""
 _REPORT_INTERVAL = 0.02
 """Wall seconds between two reports of the drones."""
 _VITALS_INTERVAL = 0.5
@@ -344,10 +346,21 @@ class InlineFlight:
         if not self._stopped:
             self._stopped = self._stopping = True
             if self._thread.ident is not None:
-                self._thread.join()
-            self._executor.close()
+                self._thread.join(_STOP_TIMEOUT)
+            if self._thread.is_alive():
+                self._leave_hung_step()
+            else:
+                self._executor.close()
             logging.getLogger("aerodaas").removeHandler(self._handler)
         return self.reports()
+
+    def _leave_hung_step(self) -> None:
+        """Say what has not returned, and close the recording without it."""
+        part = self._executor.part_at_work
+        names = ", ".join(node.name for node in part.nodes) if part is not None else "a node"
+        self.note("analysis_hung", f"{names} did not return within {_STOP_TIMEOUT:g} s: it is left")
+        if self._recorder is not None:
+            self._recorder.close()
 
     def leave(self) -> None:
         """End with the application: a simulated drone does not outlive it."""

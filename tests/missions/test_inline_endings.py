@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import ClassVar
 
@@ -71,6 +72,50 @@ def test_the_drone_lands_and_its_recording_is_closed(
         drone = RecordedFlight.read(recording).robots["drone"]
     assert [band.reason for band in drone.bands if band.state == "landing"] == [reason]
     assert drone.position[-1, 2] < 0.2
+
+
+_HANGING = """
+import time
+from aerodaas import AeroNavigation, Analytics, Environment, NavigationType, Odometry, Waypoint
+
+class Hanging(Analytics[str]):
+    accepts = (Odometry,)
+    def process(self, item, context):
+        if context.now() > 3e9:
+            print("hanging", flush=True)
+            time.sleep(1000)
+
+env = Environment("environment.json")
+drone = env.get_robot_by_id("drone")
+Hanging().analyse(drone.get_sensor_by_id("odom_drone").get_data_stream())
+drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [Waypoint("a", 9, 0, 2)]))
+drone.start_mission()
+"""
+
+
+@pytest.mark.slow
+def test_an_analysis_that_hangs_is_named_after_a_second_interrupt(tmp_path: Path) -> None:
+    """The run ends without it, and its recording is closed."""
+    (tmp_path / "environment.json").write_text(json.dumps(FLAT))
+    (tmp_path / "app.py").write_text(_HANGING)
+    with subprocess.Popen(
+        [sys.executable, "-m", "aerodaas", "run", "app.py", "--no-view", "--record", "out"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+    ) as process:
+        assert process.stdout is not None
+        assert any("hanging" in line for line in process.stdout)
+        for _ in range(2):
+            process.send_signal(signal.SIGINT)
+            time.sleep(1.0)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "drone/hanging" in errors
+    assert "did not return within" in errors
+    with Recording.open(tmp_path / "out" / "flight.mcap") as recording:
+        assert recording.complete
 
 
 class Exiting(Analytics[Readings]):
