@@ -55,7 +55,7 @@ def content(*robots: dict[str, Any], **sections: Any) -> dict[str, Any]:  # noqa
 def launched(flyer: Flyer, env: Environment) -> None:
     """Start, but for the flight, whose runtime must not have been reached."""
     with (
-        flyer.options(speed=1.0, lockstep=False),
+        flyer.options(speed=1.0, simulated_time=False),
         patch(
             "aerodaas.environment.run.Run._runtime",
             side_effect=AssertionError("nothing was refused"),
