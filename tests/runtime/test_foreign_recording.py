@@ -41,7 +41,7 @@ def short(env: Environment) -> None:
 
 
 @pytest.fixture(scope="module")
-def flown(runtime: None, tmp_path_factory: pytest.TempPathFactory) -> Path:  # noqa: ARG001
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded flight."""
     flyer = Flyer(tmp_path_factory.mktemp("flown"))
     run = flyer.fly(short, {**FLAT, "robots": [robot("drone")]}, record=flyer.folder / "first")

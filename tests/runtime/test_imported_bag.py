@@ -51,7 +51,6 @@ def brightness(path: Path) -> dict[int, float]:
         return {one.value["stamp"]: one.value["value"] for one in recording.records(topics=[topic])}
 
 
-@pytest.mark.usefixtures("runtime")
 def test_an_analysis_says_the_same_of_a_flight_and_of_its_bag(flyer: Flyer) -> None:
     """Of every picture, at its stamp, to the last bit."""
     content = {

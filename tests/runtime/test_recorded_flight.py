@@ -50,7 +50,7 @@ def build(env: Environment) -> None:
 
 
 @pytest.fixture(scope="module")
-def flown(runtime: None, tmp_path_factory: pytest.TempPathFactory) -> Path:  # noqa: ARG001
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The recording of a flight with all that is recorded."""
     flyer = Flyer(tmp_path_factory.mktemp("flown"))
     fence = {"polygon": [[-5, -5], [9, -5], [9, 9], [-5, 9]]}
