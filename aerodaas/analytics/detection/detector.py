@@ -52,7 +52,7 @@ class OnnxDetector(Analytics[Detections]):
     """Detects objects, with their keypoints if the model is a pose model.
 
     ``OnnxDetector("yolox-nano", classes=["person"])``, or a file of one's own. The model's family,
-    class names and input size are read from the file, which is sent to the actor by value: an edge
+    class names and input size are read from the file, which is copied to where it runs: an edge
     or cloud node needs no copy.
     """
 

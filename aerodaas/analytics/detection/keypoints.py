@@ -38,7 +38,7 @@ class KeypointModel:
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Read the file, or a fetched model by its name; it is sent to the actor by value.
+        """Read the file, or a fetched model by its name; it is copied to where it runs.
 
         Raises:
             ModelError: If it is missing, or is no such network.

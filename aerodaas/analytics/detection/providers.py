@@ -61,7 +61,7 @@ def open_session(
     options.log_severity_level = _ERRORS_ONLY
     options.intra_op_num_threads = threads or default_threads()
     options.inter_op_num_threads = 1
-    # Spinning threads would occupy cores that other actors need.
+    # Spinning threads would occupy cores that other nodes need.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     if "TensorrtExecutionProvider" in chosen:
         _ENGINES.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,8 @@
 """GuestAnalysis: stands for an analysis of a guest in the owner's graph, and calls it.
 
-It runs in an actor of this guest alone, and its `process` asks the guest's process, which holds
-the guest's code. All analyses of a guest share that process and take turns in it.
+It is the work of a node, in real time in an actor of this guest alone. Its `process` asks the
+guest's process, which holds the guest's code. All analyses of a guest share that process and take
+turns in it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _OPENING = 40.0
 _ITEM = 4.0
 """Wall seconds for a guest to process one item; shorter than the alert of a hung analysis."""
 _processes: dict[str, GuestProcess] = {}
-"""Running guests of this actor."""
+"""Running guests of this process."""
 _lock = threading.Lock()
 
 

@@ -1,7 +1,7 @@
 """HereAnalysis: stands for an analysis at the user's side in a provider's graph, and asks it.
 
-It runs in an actor of the flight. Its `process` sends the item to the flight's relay and waits for
-the answer; a user's side that is missing or slow yields no results, which is told once.
+It is the work of a node. Its `process` sends the item to the flight's relay and waits for the
+answer; a user's side that is missing or slow yields no results, which is told once.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""HereRelay: takes questions of a flight's actors to the user's side, and the answers back.
+"""HereRelay: takes questions of a flight's nodes to the user's side, and the answers back.
 
 It lives in the flight's process. Stand-ins (`HereAnalysis`) connect to its Unix socket, each with
 one question at a time; the user's side is whatever connection the flight attaches to it.
@@ -29,11 +29,11 @@ LARGEST_ANSWER = 1 << 20
 _MOST_GROUPS = 20_000
 """Most lists and objects of an answer: a thousand boxes have a fifth; they take long to parse."""
 _ANSWER_SECONDS = 3.0
-"""Wall seconds for an answer, less than an actor waits, and than a hung analysis may take."""
+"""Wall seconds for an answer, less than a node waits, and than a hung analysis may take."""
 _PARTS = ("item", "fired", "alerts", "failed")
 """What an answer may hold, beside its `number` and the seconds that it `took`."""
 _CONNECTIONS = 256
-"""Most actors' connections at once; a document has fewer analyses and conditions."""
+"""Most nodes' connections at once; a document has fewer analyses and conditions."""
 
 
 @dataclass
@@ -93,7 +93,7 @@ class HereUser:
 
 
 class HereRelay:
-    """Relay between the actors of one flight and the side of its user."""
+    """Relay between the nodes of one flight and the side of its user."""
 
     def __init__(self, path: Path, *, seconds: float = _ANSWER_SECONDS) -> None:
         """Relay at the socket `path`, which waits `seconds` for each answer."""
@@ -110,7 +110,7 @@ class HereRelay:
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
 
     def start(self) -> None:
-        """Listen for actors; raises ConfigError if there can be no socket at the path."""
+        """Listen for nodes; raises ConfigError if there can be no socket at the path."""
         try:
             with contextlib.suppress(FileNotFoundError):
                 self.path.unlink()

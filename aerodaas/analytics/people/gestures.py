@@ -71,7 +71,7 @@ class GestureClassifier:
     """Gesture classifier in an ONNX file, with a probability for each of `GESTURES`."""
 
     def __init__(self, path: str | Path = GESTURE_MODEL, *, min_confidence: float = 0.35) -> None:
-        """Read the model, which is sent to the actor by value; raises ModelError.
+        """Read the model, which is copied to where it runs; raises ModelError.
 
         Keypoints below `min_confidence` (0 to 1) count as missing.
         """

@@ -31,7 +31,7 @@ from aerodaas.types.errors import InvalidWaypointError
 __all__ = ["build_app"]
 
 _PATIENCE = 5.0
-"""Timeout of an answer from the drone's actor in seconds; its loop runs at 20 Hz."""
+"""Timeout of an answer from the drone's node in seconds; its loop runs at 20 Hz."""
 
 _COMMANDS: dict[str, tuple[Command, str]] = {
     "pause": (Pause(), "Hover until told to resume."),

@@ -73,7 +73,7 @@ class Candidates:
 
 
 class Decoder(Protocol):
-    """Converts the raw outputs of one model to candidates; sent to the actor by value."""
+    """Converts the raw outputs of one model to candidates; copied to where it runs."""
 
     @property
     def family(self) -> str:
