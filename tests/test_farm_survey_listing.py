@@ -66,7 +66,7 @@ def test_the_disaster_survey_builds_as_printed(
         assert started == [names["drone"]]
         env.place_entries()
         plan = Run(env).plan()
-    nodes = {node.stream: tuple(node.inputs) for actor in plan.analyses for node in actor.nodes}
+    nodes = {node.stream: tuple(node.inputs) for node in plan.analyses}
     assert nodes == {
         "quadrotor_base/monitoring": ("quadrotor_base/odom",),
         "quadrotor_base/remote": ("quadrotor_base/cam1",),
