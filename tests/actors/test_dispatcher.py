@@ -56,6 +56,7 @@ def _build(scheduler: Any, edge_ms: float, cloud_ms: float = 0.0) -> Callable[[E
         env.set_analytics_scheduler(scheduler)
         drone = env.get_robot_by_id("drone")
         model = SyntheticAnalytics("model", edge_ms, cloud_ms)
+        model.isolated = True  # in a process of its own, which a test may kill
         model.deploy(env.get_compute_resource_by_id("edge"))
         model.analyse(drone.get_sensor_by_id("camera").get_data_stream())
         drone.navigate(hop((1, 0), hover=600))
@@ -188,7 +189,7 @@ def test_an_executor_that_dies_is_restarted_and_its_task_tried_again(flyer: Flye
     content = _environment(1.0, edge_time=900, deadline=20_000)
     with flyer.flying(_build("fifo", 900), content, speed=1.0) as env:
         _until(env, lambda values: values["outcomes"].get("done", 0) >= 2)
-        os.kill(_pid(env, "analytics/edge"), signal.SIGKILL)
+        os.kill(_pid(env, "analytics/drone/model"), signal.SIGKILL)
         done = _values(env)["outcomes"]["done"]
         _until(env, lambda values: values["outcomes"]["done"] >= done + 3)
         env.get_robot_by_id("drone").end_mission()
@@ -215,7 +216,7 @@ def test_a_task_whose_deadline_is_too_near_is_not_tried_again(flyer: Flyer) -> N
     with flyer.flying(_build("fifo", 900), content, speed=1.0) as env:
         _until(env, lambda values: values["outcomes"].get("done", 0) >= 2)
         time.sleep(0.3)  # by then it is at the next, which comes a second after the one before
-        os.kill(_pid(env, "analytics/edge"), signal.SIGKILL)
+        os.kill(_pid(env, "analytics/drone/model"), signal.SIGKILL)
         _until(env, lambda values: values["outcomes"].get("failed", 0) == 1)
         done = _values(env)["outcomes"]["done"]
         _until(env, lambda values: values["outcomes"]["done"] > done)
