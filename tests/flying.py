@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
@@ -15,7 +15,10 @@ from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
-__all__ = ["FLAT", "Flyer", "hop", "recorded", "robot"]
+if TYPE_CHECKING:
+    from aerodaas.actors.run.flight import Flight
+
+__all__ = ["FLAT", "Flyer", "flight_of", "hop", "recorded", "robot"]
 
 _FAST = {"cruise_speed": 4.0, "max_speed": 6.0, "max_acceleration": 4.0, "takeoff_height": 1.5}
 
@@ -110,6 +113,14 @@ class Flyer:
     def _begin_ray(self) -> None:
         if self._start_ray is not None:
             self._start_ray()
+
+
+def flight_of(run: Run) -> Flight:
+    """The flight of a run on Ray."""
+    from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads ray
+
+    assert isinstance(run._flight, Flight)
+    return run._flight
 
 
 def recorded(run: Run) -> RecordedFlight:

@@ -9,7 +9,7 @@ from aerodaas.runtime.node import Outlet
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.status import Message
 
-__all__ = ["Hand", "published"]
+__all__ = ["Hand", "item_of", "published"]
 
 
 class Hand:
@@ -47,3 +47,9 @@ def published(stream: str, item: Any, stamp: int, seq: int = 0) -> Message[Any]:
     outlet = Outlet(stream)
     outlet.sent = seq
     return outlet.measure(item, Header(seq, stamp, stream), 0)
+
+
+def item_of(message: Message[Any]) -> Any:  # noqa: ANN401 - of any stream
+    """The item of a message that has one."""
+    assert message.item is not None
+    return message.item

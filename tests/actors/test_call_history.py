@@ -34,7 +34,8 @@ def _head() -> psutil.Process:
 
 def test_the_head_does_not_grow_with_each_call(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """Its memory is the same after 10,000 calls of an actor without task events, as ours are."""
-    actor_class: Any = ray.remote(num_cpus=0, enable_task_events=False)(_Drone)
+    remote: Any = ray.remote
+    actor_class = remote(num_cpus=0, enable_task_events=False)(_Drone)
     drone = actor_class.remote()
     ray.get([drone.report.remote() for _ in range(1000)])
     head = _head()

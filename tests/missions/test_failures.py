@@ -18,7 +18,7 @@ import numpy as np
 import psutil
 import pytest
 from faulty import DyingScheduler, HangingScheduler, Mortal, RaisingScheduler, Stuck
-from flying import FLAT, Flyer, hop, recorded, robot
+from flying import FLAT, Flyer, flight_of, hop, recorded, robot
 from ray.cluster_utils import Cluster
 from scripted import RemoteUser, free_port
 
@@ -139,8 +139,7 @@ def test_remote_service_dies(flyer: Flyer) -> None:
 
         def stop_early(user: RemoteUser) -> None:
             user.until(lambda status: status["state"] == "enroute")
-            assert run._flight is not None
-            os.kill(run._flight.infos()["analytics/drone/remote"].pid, signal.SIGKILL)
+            os.kill(flight_of(run).infos()["analytics/drone/remote"].pid, signal.SIGKILL)
             before = user.until(lambda _: True)
             assert before["state"] == "enroute"
             user.client.command("return-home")
@@ -166,18 +165,17 @@ def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
         frames.get_data_stream()
         drone.navigate(hop((300, 0)))
         run = env.launch()
-        flight = run._flight
-        assert flight is not None
+        flight = flight_of(run)
         frames.poll(20.0)
-        before = flight.infos()["sensor/drone/cam"].pid
+        before = flight.infos()["edge"].pid
         os.kill(before, signal.SIGKILL)
-        assert wait_for(lambda: flight.infos()["sensor/drone/cam"].pid != before, 60.0)
+        assert wait_for(lambda: flight.infos()["edge"].pid != before, 60.0)
         assert run.look().robots["drone"].status.state.value != "aborted"
         drone.end_mission()
         run.wait()
     told = alerts(recorded(run))
-    assert "the actor sensor/drone/cam died" in told["actor_lost"]
-    assert "sensor/drone/cam is back after" in told["actor_back"]
+    assert "the actor edge died" in told["actor_lost"]
+    assert "edge is back after" in told["actor_back"]
 
 
 @pytest.mark.wall_clock
@@ -191,13 +189,12 @@ def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
         env = Environment(flyer.write(environment()))
         env.get_robot_by_id("drone").navigate(hop((300, 0)))
         run = env.launch()
-        assert run._flight is not None
         assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
         with run._polling:
             time.sleep(pause)
         time.sleep(1.0)
         run.look()
-        os.kill(run._flight.infos()["drone/drone"].pid, signal.SIGKILL)
+        os.kill(flight_of(run).infos()["drone/drone"].pid, signal.SIGKILL)
         with pytest.raises(
             MissionError, match="the actor of drone died: a simulated drone ends with its process"
         ):
@@ -222,9 +219,8 @@ def test_a_drone_that_hangs_is_told_though_nobody_waits(
         env.start_mission(wait=False)
         run = env.run
         assert run is not None
-        assert run._flight is not None
         assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
-        pid = run._flight.infos()["drone/drone"].pid
+        pid = flight_of(run).infos()["drone/drone"].pid
         os.kill(pid, signal.SIGSTOP)
         try:
             assert wait_for(lambda: heard("drone/drone has not answered for"), 30.0)
@@ -245,16 +241,15 @@ def test_a_recorder_that_is_killed_and_then_hangs(flyer: Flyer) -> None:
         drone = env.get_robot_by_id("drone")
         drone.navigate(hop((300, 0)))
         run = env.launch()
-        flight = run._flight
-        assert flight is not None
-        assert wait_for(lambda: bool(run.look().reports["recorder"].values), 20.0)
-        os.kill(first := flight.infos()["recorder"].pid, signal.SIGKILL)
-        assert wait_for(lambda: flight.infos()["recorder"].pid != first, 60.0)
-        assert wait_for(lambda: told(run, "recorder is back after"), 20.0)
+        flight = flight_of(run)
+        assert wait_for(lambda: bool(run.look().reports["edge"].values), 20.0)
+        os.kill(first := flight.infos()["edge"].pid, signal.SIGKILL)
+        assert wait_for(lambda: flight.infos()["edge"].pid != first, 60.0)
+        assert wait_for(lambda: told(run, "edge is back after"), 20.0)
         assert wait_for(lambda: len(flight.recordings) == 2, 20.0)
-        os.kill(second := flight.infos()["recorder"].pid, signal.SIGSTOP)
+        os.kill(second := flight.infos()["edge"].pid, signal.SIGSTOP)
         try:
-            assert wait_for(lambda: told(run, "recorder has not answered for"), 30.0)
+            assert wait_for(lambda: told(run, "edge has not answered for"), 30.0)
             drone.end_mission()
             with pytest.raises(MissionError, match="the recorder did not answer") as failed:
                 run.wait()
@@ -280,9 +275,8 @@ def test_a_drone_whose_actor_died_keeps_no_other_in_the_air(flyer: Flyer) -> Non
         for drone in env.get_env_robots():
             drone.navigate(hop((300, 0)))
         run = env.launch()
-        assert run._flight is not None
         assert wait_for(lambda: bool(run.look().reports["drone/first"].values), 20.0)
-        os.kill(run._flight.infos()["drone/first"].pid, signal.SIGKILL)
+        os.kill(flight_of(run).infos()["drone/first"].pid, signal.SIGKILL)
         with pytest.raises(MissionError, match="the actor of first died"):
             run.wait()
     path = flyer.folder / "flight" / "flight.mcap"

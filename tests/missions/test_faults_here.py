@@ -19,7 +19,7 @@ from unittest.mock import patch
 import psutil
 import pytest
 from faulty import Forward
-from flying import FLAT, Flyer, hop, recorded, robot
+from flying import FLAT, Flyer, flight_of, hop, recorded, robot
 from required import needs_root
 
 from aerodaas import AeroNavigation, Environment, NavigationType
@@ -63,8 +63,7 @@ def until(run: Run, holds: Callable[[], bool], seconds: float = 60.0) -> None:
 
 def process_of(run: Run, actor: str) -> psutil.Process:
     """The process of an actor."""
-    assert run._flight is not None
-    return psutil.Process(run._flight.infos()[actor].pid)
+    return psutil.Process(flight_of(run).infos()[actor].pid)
 
 
 def holders(folder: Path) -> set[int]:
@@ -102,14 +101,14 @@ def test_a_run_is_watched_before_its_drones_fly(flyer: Flyer) -> None:
     """An application that is suspended at once sends no later heartbeat to a reaper that starts."""
     with flyer.flying(hover, with_camera(), speed=1.0) as env:
         run = env.launch()
-        recorder = process_of(run, "recorder")
+        recorder = process_of(run, "edge")
         assert recorder.pid in holders(Path(recorder.environ()[VARIABLE]) / LOCKS)
         until(run, lambda: state_of(run) is MissionState.ENROUTE)
         env.get_robot_by_id("drone").end_mission()
 
 
-def test_a_recorder_and_a_sensor_that_steers_die(flyer: Flyer) -> None:
-    """The drone flies on without a recorder, and holds until there are pictures again.
+def test_the_actor_of_recorder_and_steering_camera_dies(flyer: Flyer) -> None:
+    """The drone holds until there are pictures again.
 
     Both files can be read, and the second one says what happened.
     """
@@ -125,16 +124,13 @@ def test_a_recorder_and_a_sensor_that_steers_die(flyer: Flyer) -> None:
     with flyer.flying(build, content, speed=1.0) as env:
         run = env.launch()
         until(run, lambda: state_of(run) is MissionState.FOLLOWING)
-        recorder, sensor = (process_of(run, name) for name in ("recorder", "sensor/drone/cam"))
+        shared = process_of(run, "edge")
         time.sleep(2.0)
-        recorder.kill()
-        until(run, lambda: run.reports()["recorder"].phase == "failed")
-        until(run, lambda: run.reports()["recorder"].phase == "running")
-        assert process_of(run, "recorder").pid != recorder.pid
-        sensor.kill()
+        shared.kill()
         until(run, lambda: state_of(run) is MissionState.HOLDING)
         until(run, lambda: state_of(run) is MissionState.FOLLOWING)
-        assert process_of(run, "sensor/drone/cam").pid != sensor.pid
+        assert run.reports()["edge"].phase == "running"
+        assert process_of(run, "edge").pid != shared.pid
         env.get_robot_by_id("drone").end_mission()
     first = flyer.folder / "flight" / "flight.mcap"
     with Recording.open(first) as recording:
@@ -144,9 +140,7 @@ def test_a_recorder_and_a_sensor_that_steers_die(flyer: Flyer) -> None:
         assert recording.complete
         flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].outcome.startswith("landed")
-    assert "the actor sensor/drone/cam died" in alerts(flight)["actor_lost"]
-    for actor in ("recorder", "sensor/drone/cam"):
-        assert any(f"{actor} is back after" in text for text in alerts(flight)["actor_back"])
+    assert any("edge is back after" in text for text in alerts(flight)["actor_back"])
 
 
 @pytest.mark.slow
@@ -158,17 +152,17 @@ def test_the_orphan_reaper_outlives_its_host(flyer: Flyer, monkeypatch: pytest.M
         flyer.flying(hover, with_camera(), speed=1.0) as env,
     ):
         run = env.launch()
-        assert run._flight is not None
-        reaper = run._flight._reaper
-        with patch.object(run._flight, "_inform_reaper", wraps=run._flight._inform_reaper) as told:
-            process_of(run, "recorder").kill()
-            until(run, lambda: run.reports()["recorder"].phase == "failed")
-            until(run, lambda: run.reports()["recorder"].phase == "running")
+        flown = flight_of(run)
+        reaper = flown._reaper
+        with patch.object(flown, "_inform_reaper", wraps=flown._inform_reaper) as told:
+            process_of(run, "edge").kill()
+            until(run, lambda: run.reports()["edge"].phase == "failed")
+            until(run, lambda: run.reports()["edge"].phase == "running")
             told.assert_called_once_with()
-        assert run._flight._reaper == reaper
-        process_of(run, "recorder").kill()
-        until(run, lambda: run._flight is not None and run._flight._reaper != reaper)
-        assert not ask(run._flight._call_reaper("ending"), 20.0)
+        assert flown._reaper == reaper
+        process_of(run, "edge").kill()
+        until(run, lambda: flown._reaper != reaper)
+        assert not ask(flown._call_reaper("ending"), 20.0)
         env.get_robot_by_id("drone").end_mission()
 
 
@@ -199,7 +193,7 @@ def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
     with flyer.flying(managed("edf"), content, speed=1.0) as env:
         run = env.launch()
         until(run, lambda: done(run) > 5)
-        with frozen(process_of(run, "analytics/edge")):
+        with frozen(process_of(run, "edge")):
             until(run, lambda: bool(run.look().reports["dispatcher"].values.get("edge_down")), 20.0)
         before = done(run)
         until(run, lambda: done(run) > before + 5)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hosts import Hand, published
+from hosts import Hand, item_of, published
 
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
@@ -111,8 +111,8 @@ def test_frames_come_at_the_sensors_rate() -> None:
     assert [frame.header.stamp for frame in frames] == [
         NANOSECONDS * number // 5 for number in range(4)
     ]
-    assert [frame.item.header.id for frame in frames] == [0, 1, 2, 3]
-    assert [int(frame.item.image[0, 0, 0]) for frame in frames] == [0, 1, 2, 3]
+    assert [item_of(frame).header.id for frame in frames] == [0, 1, 2, 3]
+    assert [int(item_of(frame).image[0, 0, 0]) for frame in frames] == [0, 1, 2, 3]
     assert {frame.stream for frame in frames} == {_STREAM}
 
 
@@ -123,16 +123,16 @@ def test_a_camera_that_is_not_due_shows_nothing() -> None:
     due = node.due
     assert list(node.step(due - 1, [state(due - 1, 4.0)])) == []
     (frame,) = node.step(due, [])
-    assert frame.item.odometry.position[0] == 5.0
+    assert item_of(frame).odometry.position[0] == 5.0
 
 
 def test_frames_carry_the_newest_estimate_and_the_camera_gets_the_truth() -> None:
     """Before the first state there is neither."""
     node = started()
     (first,) = shown(node, 1)
-    assert first.item.odometry is None
+    assert item_of(first).odometry is None
     (second,) = shown(node, 1, state(1, 1.0), state(2, 2.0))
-    assert second.item.odometry.position[0] == 3.0
+    assert item_of(second).odometry.position[0] == 3.0
     assert isinstance(node.camera, Film)
     before, after = node.camera.poses
     assert before is None
@@ -143,14 +143,14 @@ def test_frames_carry_the_newest_estimate_and_the_camera_gets_the_truth() -> Non
 def test_a_pictures_own_odometry_counts() -> None:
     """As that of a recorded flight."""
     (frame,) = shown(started(placed=True), 1, state(0, 1.0))
-    assert frame.item.odometry.position[0] == 9.0
+    assert item_of(frame).odometry.position[0] == 9.0
 
 
 def test_a_missing_picture_is_no_frame() -> None:
     """The next one has the next number."""
     frames = shown(started(misses=[1, 2]), 4)
-    assert [frame.item.header.id for frame in frames] == [0, 1]
-    assert [int(frame.item.image[0, 0, 0]) for frame in frames] == [0, 3]
+    assert [item_of(frame).header.id for frame in frames] == [0, 1]
+    assert [int(item_of(frame).image[0, 0, 0]) for frame in frames] == [0, 3]
 
 
 def test_a_picture_that_is_old_already_is_stamped_by_its_own_time() -> None:
@@ -158,7 +158,7 @@ def test_a_picture_that_is_old_already_is_stamped_by_its_own_time() -> None:
     node = started(late=NANOSECONDS // 10)
     shown(node, 1)
     (frame,) = shown(node, 1)
-    assert frame.item.header.stamp == NANOSECONDS // 10
+    assert item_of(frame).header.stamp == NANOSECONDS // 10
     assert node.outlet(_STREAM).latencies[-1] >= 100.0
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from drone_nodes import DroneFlight, UnreadableVehicle
 from flying import hop, robot
+from hosts import item_of
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.mission.commands import (
@@ -140,7 +141,7 @@ def test_a_command_that_raises_is_refused() -> None:
     replies = flight.tap(reply_stream(_ANALYSIS))
     flight.send(request_stream(_ANALYSIS), Request(7, nonsense))
     flight.fly(0.1)
-    (reply,) = (message.item for message in replies())
+    (reply,) = (item_of(message) for message in replies())
     assert reply.number == 7
     assert not reply.answer.accepted
     _land(flight)
@@ -241,7 +242,7 @@ def test_drones_of_different_nodes_keep_their_distance() -> None:
     for _ in range(60):
         flight.fly(0.5)
         for name, setpoints in taps.items():
-            if any("separation" in message.item.clipped_by for message in setpoints()):
+            if any("separation" in item_of(message).clipped_by for message in setpoints()):
                 slowed.add(name)
         apart = float(np.linalg.norm(flight.position("east") - flight.position("west")))
         nearest = min(nearest, apart)

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from hosts import item_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -241,7 +242,7 @@ def test_a_node_that_raises_ends_and_the_others_go_on() -> None:
     assert text.endswith("(at 1.000 s of mission time, with source #2)")
     assert len(bad.log) == 3
     assert len(good.log) == 5
-    (alert,) = (message.item for message in alerts.received)
+    (alert,) = (item_of(message) for message in alerts.received)
     assert (alert.kind, alert.text, alert.header.stamp) == ("actor_failed", text, NANOSECONDS)
     assert executor.parts["good"].phase == "running"
     executor.close()
@@ -287,7 +288,7 @@ def test_alerts_are_published_once_in_five_seconds() -> None:
 
     node.react = react
     run(executor, 11 * NANOSECONDS)
-    told = [message.item for message in reader.received]
+    told = [item_of(message) for message in reader.received]
     same = [one.header.stamp // NANOSECONDS for one in told if one.text == "the same"]
     assert same == [0, 0, 5, 5, 10, 10]
     assert sum(one.text.startswith("at ") for one in told) == 12
@@ -325,7 +326,7 @@ def test_a_message_from_another_thread_is_delivered_at_the_next_moment() -> None
     thread.join()
     assert reader.log == []
     run(executor, 0)
-    assert [message.item for message in reader.received] == [0, 1, 2]
+    assert [item_of(message) for message in reader.received] == [0, 1, 2]
     assert [message.item for message in tap.receive(0.0)] == [0, 1, 2]
     assert tap.receive(0.0) == []
 
@@ -368,7 +369,7 @@ def test_a_node_listens_to_further_streams_once_it_has_subscribed() -> None:
     executor.subscribe(reader)
     executor.subscribe(reader)
     run(executor, 30)
-    assert [message.item for message in reader.received] == [20, 30]
+    assert [item_of(message) for message in reader.received] == [20, 30]
 
 
 def test_nodes_that_could_not_be_opened_are_removed() -> None:
@@ -392,7 +393,7 @@ def test_retired_nodes_get_nothing_more() -> None:
     run(executor, 10)
     executor.retire([reader])
     executor.step(source, 20)
-    assert [message.item for message in reader.received] == [0, 10]
+    assert [item_of(message) for message in reader.received] == [0, 10]
     assert executor.clock.now() == 20
 
 
@@ -408,7 +409,7 @@ def test_the_close_records_what_is_told_last() -> None:
     recorder = Recorder("recorder", alert_stream("one"), alert_stream("two"))
     executor = started(one, two, recorder)
     executor.close()
-    assert [message.item.text for message in recorder.received] == ["one", "two"]
+    assert [item_of(message).text for message in recorder.received] == ["one", "two"]
     assert [node.closed for node in (one, two, recorder)] == [1, 1, 1]
     assert {part.phase for part in executor.parts.values()} == {"done"}
 

@@ -92,7 +92,7 @@ TOLD = (
     "recorder cannot read Picky from drone/raise: TypeError: ",
     "After cannot read Picky from drone/raise: TypeError: ",
     "with a lock",
-    "analytics/edge's alert: Alert cannot be sent: its item 'lock', a lock: cannot pickle",
+    "edge's alert: Alert cannot be sent: its item 'lock', a lock: cannot pickle",
 )
 
 

@@ -123,7 +123,7 @@ def test_a_plan_names_each_stream_once(tmp_path: Path) -> None:
     )
     spec = made.drones[0][0]
     published = [f"drone/{sensor.id}" for sensor in spec.sensors]
-    published += [node.stream for actor in made.analyses for node in actor.nodes]
+    published += [spec.stream for spec in made.analyses]
     published += [_names.state_stream("drone"), _names.status_stream("drone")]
     published += [_names.setpoint_stream("drone"), _names.end_stream("drone")]
     assert len(published) == len(set(published))
