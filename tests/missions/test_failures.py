@@ -152,32 +152,6 @@ def test_remote_service_dies(flyer: Flyer) -> None:
     assert "return-home: accepted" in alerts(flight)["remote_command"]
 
 
-@pytest.mark.slow
-def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
-    """The drone flies on, frames come again, and the recording says who died and for how long."""
-    camera = {"id": "cam", "type": "camera", "rate": 5}
-    content = environment()
-    content["robots"][0]["sensors"].append(camera)
-    with flyer.options(speed=1.0, simulated_time=False):
-        env = Environment(flyer.write(content))
-        drone = env.get_robot_by_id("drone")
-        frames = drone.get_sensor_by_id("cam")
-        frames.get_data_stream()
-        drone.navigate(hop((300, 0)))
-        run = env.launch()
-        flight = flight_of(run)
-        frames.poll(20.0)
-        before = flight.infos()["edge"].pid
-        os.kill(before, signal.SIGKILL)
-        assert wait_for(lambda: flight.infos()["edge"].pid != before, 60.0)
-        assert run.look().robots["drone"].status.state.value != "aborted"
-        drone.end_mission()
-        run.wait()
-    told = alerts(recorded(run))
-    assert "the actor edge died" in told["actor_lost"]
-    assert "edge is back after" in told["actor_back"]
-
-
 @pytest.mark.wall_clock
 @pytest.mark.parametrize("pause", [0.0, pytest.param(7.0, marks=pytest.mark.slow)])
 def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
