@@ -16,7 +16,7 @@ from aerodaas.runtime.node import NEVER, Node
 from aerodaas.runtime.reports import StreamCount
 from aerodaas.runtime.session import Session
 from aerodaas.types.clock import Clock
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.memory_limit import limit_memory
 from aerodaas.types.status import Message
 
@@ -217,6 +217,8 @@ class NodeRunner:
             self.node.close()
         except AeroDaaSError as error:
             return error
+        except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
+            return AeroDaaSError(f"{self.node.name}: {failure_line(error)}")
         finally:
             if self._subscriber is not None:
                 self._subscriber.close()

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.cameras.base import (
     Camera,
@@ -26,6 +29,8 @@ from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["CameraNode"]
+
+T = TypeVar("T", bound=np.generic)
 
 
 class CameraNode(Node):
@@ -123,7 +128,8 @@ class CameraNode(Node):
         odometry = picture.odometry
         if odometry is None and self._vehicle is not None:
             odometry = self._vehicle.odometry
-        return Frame(header, picture.image, self.camera.model, odometry, picture.depth)
+        depth = None if picture.depth is None else _read_only(picture.depth)
+        return Frame(header, _read_only(picture.image), self.camera.model, odometry, depth)
 
     @property
     def finished(self) -> bool:
@@ -144,3 +150,10 @@ class CameraNode(Node):
             "skipped": {self.name: self.camera.skipped},
             "finished": {self.name: self.finished},
         }
+
+
+def _read_only(pixels: NDArray[T]) -> NDArray[T]:
+    """A view that cannot be written to: every reader of a frame is given the same pixels."""
+    view = pixels.view()
+    view.flags.writeable = False
+    return view

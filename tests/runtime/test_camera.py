@@ -192,3 +192,10 @@ def test_a_camera_that_cannot_be_opened_is_refused_by_name() -> None:
     node.close()
     assert isinstance(node.camera, Film)
     assert node.camera.closed == 1
+
+
+def test_a_frame_cannot_be_written_to() -> None:
+    """All its readers are given the same pixels."""
+    (frame,) = shown(started(), 1)
+    with pytest.raises(ValueError, match="read-only"):
+        item_of(frame).image[0, 0, 0] = 1
