@@ -34,6 +34,7 @@ from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.data import Alert, Header
+from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.vitals import read_vitals
 
 __all__ = ["InlineFlight"]
@@ -173,6 +174,20 @@ class InlineFlight:
         self._thread.start()
 
     def _run(self) -> None:
+        try:
+            self._fly()
+        except Exception as error:  # noqa: BLE001 - the flight must end, and tell why
+            for part in self._executor.parts.values():
+                part.phase = "failed"
+                part.error = part.error or AeroDaaSError(f"{part.name}: {failure_line(error)}")
+        finally:
+            self._calls.close("the mission is over")
+            self._publish_reports()
+            with self._changed:
+                self._over = True
+                self._changed.notify_all()
+
+    def _fly(self) -> None:
         executor = self._executor
         reported = recorded = time.monotonic()
         # Pure readers start first.
@@ -193,10 +208,6 @@ class InlineFlight:
         self._calls.close("the mission is over")
         self._end_executions()
         self._record_vitals()
-        self._publish_reports()
-        with self._changed:
-            self._over = True
-            self._changed.notify_all()
 
     def _end_executions(self) -> None:
         """Let the simulated executions of the last frames end, so that each has its outcome."""
