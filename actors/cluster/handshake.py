@@ -21,7 +21,7 @@ from aerodaas.actors.cluster.encryption import require_same_encryption
 from aerodaas.actors.cluster.ray_process import RAY
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["HTTP2_PREFACE", "greet", "hushed", "listener_of", "reach"]
+__all__ = ["HTTP2_PREFACE", "greet", "hushed", "kept_address", "listener_of", "reach"]
 
 _PROBE_SECONDS = 5.0
 _REFUSED = "InvalidAuthToken"
@@ -29,6 +29,8 @@ _REFUSED = "InvalidAuthToken"
 HTTP2_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
 """First bytes of an HTTP/2 client, with empty settings (RFC 9113, section 3.4)."""
 _SETTINGS_FRAME = 4
+_LOOPBACK = "[::ffff:127.0.0.1]"
+"""127.0.0.1, written as an IPv6 address."""
 
 
 def reach(address: str) -> None:
@@ -63,7 +65,7 @@ def greet(address: str) -> None:
     """
     reach(address)
     with subprocess.Popen(  # noqa: S603 - fixed program, and an address that has answered
-        [sys.executable, "-c", RAY, "status", f"--address={address}"],
+        [sys.executable, "-c", RAY, "status", f"--address={kept_address(address)}"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -78,6 +80,16 @@ def greet(address: str) -> None:
             last = line.strip() or last
     if asking.returncode:
         raise AeroDaaSError(f"the head of the cluster at {address} does not answer: {last}")
+
+
+def kept_address(address: str) -> str:
+    """`address` in a form that Ray keeps.
+
+    Ray replaces a loopback address by the machine's in its network, where a head that listens on
+    loopback only does not answer.
+    """
+    host, _, port = address.rpartition(":")
+    return f"{_LOOPBACK}:{port}" if host in {"127.0.0.1", "localhost"} else address
 
 
 def listener_of(address: str) -> tuple[str, int] | None:

@@ -16,7 +16,7 @@ import ray
 from ray.exceptions import RuntimeEnvSetupError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from aerodaas.actors.cluster.handshake import greet, hushed, listener_of, reach
+from aerodaas.actors.cluster.handshake import greet, hushed, kept_address, listener_of, reach
 from aerodaas.actors.cluster.head_watch import answers
 from aerodaas.actors.cluster.local_ray import LOOPBACK, LocalRay
 from aerodaas.config.model import ComputeConfig
@@ -44,8 +44,6 @@ _ACCELERATOR_TYPE = "accelerator_type:"
 """Prefix of the resource by which Ray tells an accelerator's product name."""
 _SHARE = 0.001
 """Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
-_LOOPBACK = "[::ffff:127.0.0.1]"
-"""127.0.0.1, written as an IPv6 address."""
 _VERSIONS = re.compile(r"Ray: (\S+)\s+Python: (\S+)")
 """What Ray says of the head's and this machine's versions where they differ."""
 _PYTHON_MATCH = "RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL"
@@ -149,7 +147,7 @@ def _init(address: str, modules: Sequence[Path]) -> None:
     try:
         with hushed():
             ray.init(
-                address=_as_it_is(address),
+                address=kept_address(address),
                 namespace=_NAMESPACE,
                 runtime_env={"py_modules": [*map(str, modules)]} if modules else None,
                 **quiet,
@@ -163,16 +161,6 @@ def _init(address: str, modules: Sequence[Path]) -> None:
         raise AeroDaaSError(f"the application's own modules cannot be sent: {error}") from None
     _brought.clear()
     _brought.update({path: _state_of(path) for path in modules})
-
-
-def _as_it_is(address: str) -> str:
-    """`address` in a form that Ray keeps.
-
-    Ray replaces a loopback address by the machine's in its network, where a head that listens on
-    loopback only does not answer.
-    """
-    host, _, port = address.rpartition(":")
-    return f"{_LOOPBACK}:{port}" if host in {"127.0.0.1", "localhost"} else address
 
 
 def _other_versions(address: str, reason: str) -> AeroDaaSError:

@@ -332,11 +332,13 @@ class _Planner:
     def actors(self) -> tuple[ActorPlan, ...]:
         """Actors of cameras, analyses and recorder.
 
-        Those of one place share one: `isolated` analyses, those with an environment of their own,
-        cameras that decode what a stranger may send, and each guest's analyses are apart.
+        Those of one place share one. Apart are `isolated` analyses, those with an environment of
+        their own, those that the dispatcher manages (an executor that hangs keeps no camera
+        waiting), cameras that decode what a stranger may send, and each guest's analyses.
         """
         cameras: dict[Placement, list[CameraSpec]] = {}
         analyses: dict[Placement, list[AnalysisSpec]] = {}
+        managed: dict[Placement, list[AnalysisSpec]] = {}
         guests: dict[str, list[AnalysisSpec]] = {}
         apart = []
         for camera in self.cameras():
@@ -355,7 +357,12 @@ class _Planner:
             elif node.work.isolated or env is not None:
                 apart.append(ActorPlan(f"analytics/{node.id}", place, (), (spec,), env))
             else:
-                analyses.setdefault(place, []).append(spec)
+                group = managed if self.is_managed(node) else analyses
+                group.setdefault(place, []).append(spec)
+        apart += [
+            ActorPlan(f"analytics/{place.node or place.kind}", place, (), tuple(specs))
+            for place, specs in managed.items()
+        ]
         # Never beside the owner's or another guest's: one's end is that of its actor.
         apart += [
             ActorPlan(guest_actor(guest), self.edge_of(None), (), tuple(specs))

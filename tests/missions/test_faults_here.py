@@ -193,7 +193,7 @@ def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
     with flyer.flying(managed("edf"), content, speed=1.0) as env:
         run = env.launch()
         until(run, lambda: done(run) > 5)
-        with frozen(process_of(run, "edge")):
+        with frozen(process_of(run, "analytics/edge")):
             until(run, lambda: bool(run.look().reports["dispatcher"].values.get("edge_down")), 20.0)
         before = done(run)
         until(run, lambda: done(run) > before + 5)
@@ -274,7 +274,7 @@ def test_a_full_disk_is_told_without_a_view(tmp_path: Path) -> None:
             RecordedFlight.read(recording)
     finally:
         run("umount", str(disk))
-    assert "recorder: " in flown.stderr
+    assert "edge: " in flown.stderr
     assert "No space left on device" in flown.stderr
     assert "Traceback" not in flown.stderr
     assert flown.returncode == 1, flown.stderr

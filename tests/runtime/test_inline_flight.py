@@ -187,5 +187,5 @@ def test_the_applications_objects_stay_as_they_are(flyer: Flyer) -> None:
         ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
 
     run = flyer.fly(build)
-    assert run.reports()["analytics/edge"].sent["ticker"].count > 10
+    assert run.reports()["edge"].sent["ticker"].count > 10
     assert not hasattr(ticker, "_count")
