@@ -7,7 +7,9 @@ gives the same flight.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
+import os
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -63,12 +65,21 @@ _PICTURES = (
 )
 
 
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+_PORTS = itertools.cycle(range(20_000 + 1_000 * _WORKER, 21_000 + 1_000 * _WORKER))
+"""Ports of this worker alone, below those that the kernel gives out by itself."""
+
+
 def free_port() -> int:
-    """A UDP port that nobody uses at present."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((LOOPBACK, 0))
-        port: int = probe.getsockname()[1]
-        return port
+    """A UDP port that nobody uses; each call gives another one."""
+    for port in _PORTS:
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+            contextlib.suppress(OSError),
+        ):
+            probe.bind((LOOPBACK, port))
+            return port
+    raise AssertionError
 
 
 def wait_for(condition: Callable[[], bool], timeout: float = 20.0) -> None:
