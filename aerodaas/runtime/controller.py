@@ -115,7 +115,7 @@ class VehicleController:
         self.latencies = Latencies()
         """Milliseconds from capture to the arrival of the resulting navigation."""
         self._session = session
-        self._told = 0
+        self._alerts_read = 0
         self._photographed = 0
         """How many of the mission's pictures have been published."""
         self._turned = -1
@@ -220,11 +220,11 @@ class VehicleController:
         """Execute a command; one that raises is refused, with an alert."""
         return self.mission.handle(command, now)
 
-    def _tell(self, now: int, kind: str, text: str) -> None:
+    def _raise_alert(self, now: int, kind: str, text: str) -> None:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
-    def take(self, message: Message[Any], now: int) -> None:
-        """Execute a received message: navigation, a trigger's command, or a request."""
+    def receive(self, message: Message[Any], now: int) -> None:
+        """Handle a received message: navigation, a trigger's command, or a request."""
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
@@ -263,7 +263,7 @@ class VehicleController:
     def _recover(self, error: Exception, now: int) -> SetpointRecord:
         if self._failures == 1:
             text = f"the queue was emptied, for flying by it raised {failure_line(error)}"
-            self._tell(now, "turn_failed", text)
+            self._raise_alert(now, "turn_failed", text)
             self.mission.handle(ClearNavigation(), now)
             with contextlib.suppress(AeroDaaSError):
                 self.vehicle.hold()
@@ -304,8 +304,8 @@ class VehicleController:
 
     def new_alerts(self) -> list[Alert]:
         """Alerts since the last call."""
-        alerts = list(self.mission.alerts[self._told :])
-        self._told += len(alerts)
+        alerts = list(self.mission.alerts[self._alerts_read :])
+        self._alerts_read += len(alerts)
         alerts += self._alerts
         self._alerts.clear()
         return alerts

@@ -194,7 +194,7 @@ class DroneNode(Node):
                 self._whereabouts.hear(name, where)
             return
         for controller in self._controllers.values():
-            controller.take(message, now)
+            controller.receive(message, now)
 
     def command(self, robot: str, command: Command, now: int) -> Answer:
         """Execute a command on one robot's mission."""
