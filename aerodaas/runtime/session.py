@@ -65,10 +65,6 @@ class Session:
         place = bisect_right(stamps, after)
         return stamps[place] if place < len(stamps) else NEVER
 
-    def is_due(self, source: str, rate: float, stamp: int) -> bool:
-        """Return whether `source`, of `rate` Hz, is due at `stamp`."""
-        return self.next_due(source, rate, stamp - 1) == stamp
-
     def scope(self, node_id: str) -> str:
         """Prefix of the run's stream names on one Ray node; two nodes may share a host."""
         return f"{self.id}/{node_id[:12]}"
