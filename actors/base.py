@@ -25,7 +25,7 @@ from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
-from aerodaas.runtime.alerts import AlertLog
+from aerodaas.runtime.alerts import AlertHandler, AlertLog
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.node import Node
 from aerodaas.runtime.reports import (
@@ -34,10 +34,11 @@ from aerodaas.runtime.reports import (
     SentCount,
     StreamCount,
     merged_values,
+    sent_counts,
 )
 from aerodaas.runtime.session import Session
 from aerodaas.types.clock import host_time_ns
-from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
+from aerodaas.types.errors import AeroDaaSError, MissionError, as_project_error
 from aerodaas.types.status import Message
 from aerodaas.types.vitals import read_vitals
 
@@ -78,17 +79,6 @@ class ActorInfo:
     """Host time of its machine when it was ready, nanoseconds."""
 
 
-class _AlertHandler(logging.Handler):
-    """Publishes the warnings of the project's own modules as alerts."""
-
-    def __init__(self, actor: NodeActor) -> None:
-        super().__init__(logging.WARNING)
-        self._actor = actor
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._actor.alert("warning", record.getMessage())
-
-
 class NodeActor:
     """Actor that runs the nodes of the specifications passed to `prepare`."""
 
@@ -121,7 +111,7 @@ class NodeActor:
         del variables
         be_nice(min((spec.niceness for spec in specs), default=self.niceness))
         logging.captureWarnings(capture=True)
-        logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
+        logging.getLogger("aerodaas").addHandler(AlertHandler(self.alert))
         self.publisher(self.alerts.outlet.stream, f"{self.name}'s alert")
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._open(specs)
@@ -364,11 +354,7 @@ class NodeActor:
 
     def sent(self) -> dict[str, SentCount]:
         """Messages published, by stream."""
-        outlets = [self.alerts.outlet]
-        outlets += [outlet for one in self.runners for outlet in tuple(one.node.outlets.values())]
-        return {
-            outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies)) for outlet in outlets
-        }
+        return sent_counts(self.alerts.outlet, (runner.node for runner in self.runners))
 
     @property
     def stopping(self) -> bool:
@@ -390,8 +376,7 @@ class NodeActor:
 
     def fail(self, error: Exception) -> None:
         """End as failed, with an alert; called in the thread of a node whose step raised."""
-        if not isinstance(error, AeroDaaSError):
-            error = AeroDaaSError(f"{self.name}: {failure_line(error)}")
+        error = as_project_error(self.name, error)
         self._error = self._error or error
         self._phase = "failed"
         self.alert("actor_failed", str(error))

@@ -54,7 +54,7 @@ class _Stepped(NamedTuple):
     outlets: tuple[str, ...]
 
 
-class _NodeHostActor:
+class _NodeHostActor(Host):
     """Actor that runs one node, and serves as its host between two calls."""
 
     def __init__(self, session: Session) -> None:
@@ -104,17 +104,11 @@ class _NodeHostActor:
         """Mission time of the call under way."""
         return self._now
 
-    def alert(
-        self,
-        kind: str,
-        text: str,
-        stamp: int | None = None,
-        values: Mapping[str, Any] | None = None,
-        source: str = "",
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
         """Keep an alert for the answer to this call, or to the next one."""
-        at = self._now if stamp is None else stamp
-        self._alerts.append(_Alert(kind, text, at, values or {}, source))
+        self._alerts.append(_Alert(kind, text, stamp, values, source))
 
     def wake(self) -> None:
         """Do nothing: what is to be published goes with the next step."""
@@ -144,12 +138,11 @@ class NodeProxy(Node):
         options = {**options_for(place, restarts=0), **isolation_options(env, place, name)}
         remote: Any = ray.remote(_NodeHostActor)
         self._actor = remote.options(**options).remote(session)
-        self._spec = spec
-        self._variables = ProcessVariables(private_variables(env))
         self._due = 0
         self._values: dict[str, Any] = {}
+        variables = ProcessVariables(private_variables(env))
         # Its streams are known before it is opened, as those of any node.
-        self._opened = ask(self._actor.open.remote(self._variables, spec), _OPENING)
+        self._opened = ask(self._actor.open.remote(variables, spec), _OPENING)
         self.reads = dict(self._opened.reads)
         for stream in self._opened.outlets:
             self.outlet(stream)

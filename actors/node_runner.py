@@ -12,11 +12,11 @@ from aerodaas.cameras.base import most_memory
 from aerodaas.runtime.alerts import AlertLog
 from aerodaas.runtime.analysis import AnalysisNode
 from aerodaas.runtime.camera import CameraNode
-from aerodaas.runtime.node import NEVER, Node
+from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.reports import StreamCount
 from aerodaas.runtime.session import Session
 from aerodaas.types.clock import Clock
-from aerodaas.types.errors import AeroDaaSError, failure_line
+from aerodaas.types.errors import AeroDaaSError, as_project_error
 from aerodaas.types.memory_limit import limit_memory
 from aerodaas.types.status import Message
 
@@ -74,8 +74,8 @@ class RunnerActor(Protocol):
         ...
 
 
-class NodeRunner:
-    """One node, its subscriber and its publishers; the node's `Host`."""
+class NodeRunner(Host):
+    """One node, its subscriber and its publishers; the node's host."""
 
     def __init__(self, actor: RunnerActor, node: Node) -> None:
         """Run `node` in `actor`."""
@@ -105,18 +105,11 @@ class NodeRunner:
         """Mission time, nanoseconds."""
         return self._actor.clock.now()
 
-    def alert(
-        self,
-        kind: str,
-        text: str,
-        stamp: int | None = None,
-        values: Mapping[str, Any] | None = None,
-        source: str = "",
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert by the actor; parameters as in `Host`."""
-        self._actor.publish_alert(
-            kind, text, self.now() if stamp is None else stamp, values or {}, source
-        )
+        """Publish an alert by the actor."""
+        self._actor.publish_alert(kind, text, stamp, values, source)
 
     def wake(self) -> None:
         """End a wait for messages; thread-safe."""
@@ -215,10 +208,8 @@ class NodeRunner:
         """Close the node and its subscriptions; returns the error of the node's `close`."""
         try:
             self.node.close()
-        except AeroDaaSError as error:
-            return error
         except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
-            return AeroDaaSError(f"{self.node.name}: {failure_line(error)}")
+            return as_project_error(self.node.name, error)
         finally:
             if self._subscriber is not None:
                 self._subscriber.close()

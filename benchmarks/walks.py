@@ -31,7 +31,7 @@ from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.drone import DroneNode
-from aerodaas.runtime.node import Node
+from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
@@ -46,7 +46,7 @@ _LONGEST = 30 * NANOSECONDS
 _FRAMES, _BOXES, _NAVIGATION = "tello/cam1", "tello/vests", "tello/follow"
 
 
-class _Host:
+class _Host(Host):
     """Host of the nodes, on a simulated clock."""
 
     def __init__(self) -> None:
@@ -55,13 +55,8 @@ class _Host:
     def now(self) -> int:
         return self.time
 
-    def alert(
-        self,
-        kind: str,
-        text: str,
-        stamp: int | None = None,
-        values: Mapping[str, Any] | None = None,
-        source: str = "",
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
         del kind, text, stamp, values, source
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from aerodaas.runtime.node import Outlet
+from aerodaas.runtime.node import Host, Outlet
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.status import Message
 
 __all__ = ["Hand", "item_of", "published"]
 
 
-class Hand:
+class Hand(Host):
     """Keeps the alerts of a node; mission time is what the test sets."""
 
     def __init__(self) -> None:
@@ -25,17 +25,12 @@ class Hand:
         """Mission time, nanoseconds."""
         return self.time
 
-    def alert(
-        self,
-        kind: str,
-        text: str,
-        stamp: int | None = None,
-        values: Mapping[str, Any] | None = None,
-        source: str = "",
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
         """Keep an alert."""
-        header = Header(len(self.alerts), self.time if stamp is None else stamp, source)
-        self.alerts.append(Alert(header, kind, text, dict(values or {})))
+        header = Header(len(self.alerts), stamp, source)
+        self.alerts.append(Alert(header, kind, text, dict(values)))
 
     def wake(self) -> None:
         """Count the calls."""

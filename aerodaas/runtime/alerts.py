@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from aerodaas.runtime.node import Outlet
@@ -13,7 +14,7 @@ from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.status import Message
 
-__all__ = ["AlertLog"]
+__all__ = ["AlertHandler", "AlertLog"]
 
 _KEPT = 50
 _REPEATED = 5 * NANOSECONDS
@@ -56,3 +57,16 @@ class AlertLog:
             alert = Alert(header, kind, text, dict(values))
             self.newest.append(alert)
             return self.outlet.measure(alert, header, host_time_ns())
+
+
+class AlertHandler(logging.Handler):
+    """Publishes the warnings of the project's own modules as alerts."""
+
+    def __init__(self, alert: Callable[[str, str], None]) -> None:
+        """Publish by `alert`, which takes kind and text."""
+        super().__init__(logging.WARNING)
+        self._alert = alert
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Publish one record."""
+        self._alert("warning", record.getMessage())

@@ -11,16 +11,16 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any
 
-from aerodaas.runtime.alerts import AlertLog
-from aerodaas.runtime.node import NEVER, Node
-from aerodaas.runtime.reports import ActorReport, Phase, SentCount, merged_values
+from aerodaas.runtime.alerts import AlertHandler, AlertLog
+from aerodaas.runtime.node import NEVER, Host, Node
+from aerodaas.runtime.reports import ActorReport, Phase, merged_values, sent_counts
 from aerodaas.types.clock import SimulatedClock, seconds
-from aerodaas.types.errors import AeroDaaSError, failure_line
+from aerodaas.types.errors import AeroDaaSError, as_project_error, failure_line
 from aerodaas.types.status import Message
 
 __all__ = ["InlineExecutor", "Part", "Tap"]
@@ -28,8 +28,8 @@ __all__ = ["InlineExecutor", "Part", "Tap"]
 _TAP_DEPTH = 256
 
 
-class Part:
-    """A named group of nodes with one report and one stream of alerts: their `Host`."""
+class Part(Host):
+    """A named group of nodes with one report and one stream of alerts."""
 
     def __init__(self, name: str, executor: InlineExecutor) -> None:
         """Create the part `name` of a flight."""
@@ -44,18 +44,11 @@ class Part:
         """Mission time, nanoseconds."""
         return self._executor.clock.now()
 
-    def alert(
-        self,
-        kind: str,
-        text: str,
-        stamp: int | None = None,
-        values: Mapping[str, Any] | None = None,
-        source: str = "",
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert; parameters as in `Host`."""
-        message = self.alerts.message(
-            kind, text, self.now() if stamp is None else stamp, values or {}, source
-        )
+        """Publish an alert, unless it repeats another one."""
+        message = self.alerts.message(kind, text, stamp, values, source)
         if message is not None:
             self._executor.post(message)
 
@@ -65,15 +58,10 @@ class Part:
 
     def report(self) -> ActorReport:
         """Phase, counters, alerts and figures."""
-        outlets = [self.alerts.outlet]
-        outlets += [outlet for node in self.nodes for outlet in tuple(node.outlets.values())]
         return ActorReport(
             phase=self.phase,
             error=self.error,
-            sent={
-                outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies))
-                for outlet in outlets
-            },
+            sent=sent_counts(self.alerts.outlet, self.nodes),
             alerts=tuple(self.alerts.newest),
             values=merged_values(self.nodes),
         )
@@ -313,27 +301,15 @@ class InlineExecutor:
             try:
                 entry.node.close()
             except BaseException as error:  # noqa: BLE001 - a plug-in may call exit(), too
-                entry.part.error = entry.part.error or _as_project_error(entry.node, error)
+                entry.part.error = entry.part.error or as_project_error(entry.node.name, error)
             if entry.part.phase in {"ready", "running"}:
                 entry.part.phase = "done"
 
-    def log_handler(self, level: int) -> logging.Handler:
-        """A handler that publishes log records as alerts of the part at work."""
-        return _AlertHandler(level, lambda: self.part_at_work)
+    def log_handler(self) -> logging.Handler:
+        """A handler that publishes warnings as alerts of the part at work."""
 
+        def alert(kind: str, text: str) -> None:
+            if self.part_at_work is not None:
+                self.part_at_work.alert(kind, text)
 
-def _as_project_error(node: Node, error: BaseException) -> AeroDaaSError:
-    if isinstance(error, AeroDaaSError):
-        return error
-    return AeroDaaSError(f"{node.name}: {failure_line(error)}")
-
-
-class _AlertHandler(logging.Handler):
-    def __init__(self, level: int, part: Callable[[], Part | None]) -> None:
-        super().__init__(level)
-        self._part = part
-
-    def emit(self, record: logging.LogRecord) -> None:
-        part = self._part()
-        if part is not None:
-            part.alert("warning", record.getMessage())
+        return AlertHandler(alert)

@@ -165,7 +165,7 @@ class InlineFlight:
         `progress` is called with the name of each part that is ready.
         """
         logging.captureWarnings(capture=True)
-        self._handler = self._executor.log_handler(logging.WARNING)
+        self._handler = self._executor.log_handler()
         logging.getLogger("aerodaas").addHandler(self._handler)
         for part in tuple(self._executor.parts.values()):
             self._executor.open(part.nodes)

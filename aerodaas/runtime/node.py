@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from aerodaas.types.clock import Clock, host_time_ns
 from aerodaas.types.data import Header
@@ -22,12 +22,12 @@ NEVER = 2**63 - 1
 _LATENCIES_KEPT = 256
 
 
-class Host(Protocol):
-    """Services of an executor to the nodes that it steps; every method is thread-safe."""
+class Host:
+    """Base of what gives nodes the services of an executor; every method is thread-safe."""
 
     def now(self) -> int:
         """Mission time at this moment, nanoseconds."""
-        ...
+        raise NotImplementedError
 
     def alert(
         self,
@@ -46,11 +46,18 @@ class Host(Protocol):
             values: Further figures by name.
             source: Name of the part that raises it; empty for the host's own name.
         """
-        ...
+        at = self.now() if stamp is None else stamp
+        self.publish_alert(kind, text, at, values or {}, source)
+
+    def publish_alert(
+        self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
+    ) -> None:
+        """Publish an alert with every parameter of `alert` given."""
+        raise NotImplementedError
 
     def wake(self) -> None:
         """Have the node stepped soon, even if no message arrives."""
-        ...
+        raise NotImplementedError
 
 
 class Outlet:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from aerodaas.runtime.node import Node
+from aerodaas.runtime.node import Node, Outlet
 from aerodaas.types.data import Alert
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.health import HealthReport
@@ -25,6 +25,7 @@ __all__ = [
     "SentCount",
     "StreamCount",
     "merged_values",
+    "sent_counts",
 ]
 
 LATENCIES_KEPT = 20_000
@@ -110,6 +111,12 @@ class ActorReport:
     """Descriptions of items that could not be sent or read."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures specific to the kind of part."""
+
+
+def sent_counts(alerts: Outlet, nodes: Iterable[Node]) -> dict[str, SentCount]:
+    """Messages published, by stream: on the stream of `alerts`, and by the nodes of one report."""
+    outlets = [alerts, *(outlet for node in nodes for outlet in tuple(node.outlets.values()))]
+    return {outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies)) for outlet in outlets}
 
 
 def merged_values(nodes: Iterable[Node]) -> dict[str, Any]:

@@ -155,3 +155,10 @@ def failure_line(error: BaseException) -> str:
     except Exception:  # noqa: BLE001 - a plug-in's class, whose `__str__` may raise
         said = "it cannot say why"
     return f"{type(error).__name__}: {said}{place}"
+
+
+def as_project_error(name: str, error: BaseException) -> AeroDaaSError:
+    """The error itself if it is the project's; else one that names the part that raised it."""
+    if isinstance(error, AeroDaaSError):
+        return error
+    return AeroDaaSError(f"{name}: {failure_line(error)}")

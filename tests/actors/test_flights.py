@@ -10,9 +10,10 @@ from functools import partial
 
 import pytest
 from analyses import ProcessId
-from flying import FLAT, Flyer, hop, recorded, robot
+from flying import FLAT, Flyer, recorded, robot
+from one_drone import drone_of, long, odometry_of, short, state_of
 
-from aerodaas import Environment, Odometry, Robot
+from aerodaas import Environment, Odometry
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.types.errors import GraphError, MissionError
 from aerodaas.types.status import MissionState
@@ -22,37 +23,12 @@ pytestmark = pytest.mark.wall_clock
 SPEED = 5.0
 
 
-def drone_of(env: Environment) -> Robot:
-    """The only drone."""
-    return env.get_robot_by_id("drone")
-
-
-def odometry_of(env: Environment) -> AeroStreamData[Odometry]:
-    """Its odometry."""
-    return drone_of(env).get_sensor_by_id("odom_drone").get_data_stream()
-
-
-def short(env: Environment) -> None:
-    """One waypoint."""
-    drone_of(env).navigate(hop((3, 0)))
-
-
-def long(env: Environment) -> None:
-    """A waypoint to stay at until told otherwise."""
-    drone_of(env).navigate(hop((1, 0), hover=600))
-
-
 def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> None:
     """Wait until `condition` holds."""
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "it never happened"
         time.sleep(0.05)
-
-
-def state_of(env: Environment) -> MissionState:
-    """The mission's state."""
-    return env.launch().look().robots["drone"].status.state
 
 
 def test_a_flight_in_scaled_time(flyer: Flyer) -> None:

@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar
 
@@ -37,6 +39,23 @@ print("in the air", flush=True)
 """
 
 
+@contextmanager
+def flying_when(folder: Path, application: str, said: str) -> Iterator[subprocess.Popen[str]]:
+    """The process of an application that flies, once it has said so."""
+    (folder / "environment.json").write_text(json.dumps(FLAT))
+    (folder / "app.py").write_text(application)
+    with subprocess.Popen(
+        [sys.executable, "-m", "aerodaas", "run", "app.py", "--no-view", "--record", "out"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+    ) as process:
+        assert process.stdout is not None
+        assert any(said in line for line in process.stdout)
+        yield process
+
+
 @pytest.mark.parametrize(
     ("ending", "sent", "code", "reason"),
     [
@@ -51,17 +70,7 @@ def test_the_drone_lands_and_its_recording_is_closed(
     tmp_path: Path, ending: str, sent: signal.Signals | None, code: int, reason: str
 ) -> None:
     """However the application ends; its exit code says how, and no Ray is loaded."""
-    (tmp_path / "environment.json").write_text(json.dumps(FLAT))
-    (tmp_path / "app.py").write_text(_APP + ending)
-    with subprocess.Popen(
-        [sys.executable, "-m", "aerodaas", "run", "app.py", "--no-view", "--record", "out"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=tmp_path,
-    ) as process:
-        assert process.stdout is not None
-        assert any("in the air" in line for line in process.stdout)
+    with flying_when(tmp_path, _APP + ending, "in the air") as process:
         if sent is not None:
             process.send_signal(sent)
         _, errors = process.communicate(timeout=60)
@@ -96,17 +105,7 @@ drone.start_mission()
 @pytest.mark.slow
 def test_an_analysis_that_hangs_is_named_after_a_second_interrupt(tmp_path: Path) -> None:
     """The run ends without it, and its recording is closed."""
-    (tmp_path / "environment.json").write_text(json.dumps(FLAT))
-    (tmp_path / "app.py").write_text(_HANGING)
-    with subprocess.Popen(
-        [sys.executable, "-m", "aerodaas", "run", "app.py", "--no-view", "--record", "out"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=tmp_path,
-    ) as process:
-        assert process.stdout is not None
-        assert any("hanging" in line for line in process.stdout)
+    with flying_when(tmp_path, _HANGING, "hanging") as process:
         for _ in range(2):
             process.send_signal(signal.SIGINT)
             time.sleep(1.0)

@@ -11,19 +11,17 @@ from contextlib import contextmanager
 import pytest
 from analyses import Above, Jitter, Ticker, Weave
 from flying import FLAT, Flyer, hop, recorded, robot
+from one_drone import drone_of, odometry_of, state_of
 
 from aerodaas import (
     AeroNavigation,
     Environment,
     NavigationType,
-    Odometry,
-    Robot,
     SchedulingType,
     TrajectoryScheduler,
     Waypoint,
 )
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.errors import GraphError, MissionError
 from aerodaas.types.status import MissionState
@@ -49,16 +47,6 @@ class Unopened(Above):
         raise MissionError("the model is not there")
 
 
-def drone_of(env: Environment) -> Robot:
-    """The only drone."""
-    return env.get_robot_by_id("drone")
-
-
-def odometry_of(env: Environment) -> AeroStreamData[Odometry]:
-    """Its odometry."""
-    return drone_of(env).get_sensor_by_id("odom_drone").get_data_stream()
-
-
 def stay(env: Environment) -> None:
     """Hover at a place until the mission is ended."""
     drone_of(env).navigate(hop((1, 0), hover=600))
@@ -71,11 +59,6 @@ def until(env: Environment, condition: Callable[[], bool], seconds: float = 30.0
         assert time.monotonic() < deadline, "it never happened"
         assert not env.launch().look().over, "the mission is over"
         time.sleep(0.02)
-
-
-def state_of(env: Environment) -> MissionState:
-    """The mission's state."""
-    return env.launch().look().robots["drone"].status.state
 
 
 def pending(env: Environment) -> list[str]:

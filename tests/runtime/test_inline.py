@@ -439,7 +439,7 @@ def test_warnings_become_alerts_of_the_part_at_work() -> None:
         return got
 
     executor = started(Recorder("quiet", period=10), Recorder("warm", period=10, react=warn))
-    handler = executor.log_handler(logging.WARNING)
+    handler = executor.log_handler()
     logger.addHandler(handler)
     try:
         run(executor, 10)

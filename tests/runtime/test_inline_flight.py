@@ -9,33 +9,13 @@ from collections.abc import Callable
 import pytest
 from analyses import Above, Broken, Jitter, Ticker, Unwritten
 from flying import FLAT, Flyer, hop, recorded, robot
+from one_drone import drone_of, long, odometry_of, short, state_of
 
-from aerodaas import AeroListData, Environment, Odometry, Robot, Waypoint
-from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas import AeroListData, Environment, Odometry, Waypoint
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.types.errors import GraphError, MissionError
 from aerodaas.types.status import MissionState
-
-
-def drone_of(env: Environment) -> Robot:
-    """The only drone."""
-    return env.get_robot_by_id("drone")
-
-
-def odometry_of(env: Environment) -> AeroStreamData[Odometry]:
-    """Its odometry."""
-    return drone_of(env).get_sensor_by_id("odom_drone").get_data_stream()
-
-
-def short(env: Environment) -> None:
-    """One waypoint."""
-    drone_of(env).navigate(hop((3, 0)))
-
-
-def long(env: Environment) -> None:
-    """A waypoint to stay at until told otherwise."""
-    drone_of(env).navigate(hop((1, 0), hover=600))
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -44,11 +24,6 @@ def until(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < deadline, "it never happened"
         time.sleep(0.005)
-
-
-def state_of(env: Environment) -> MissionState:
-    """The mission's state."""
-    return env.launch().look().robots["drone"].status.state
 
 
 def test_a_flight_visits_its_waypoint_and_lands(flyer: Flyer) -> None:
