@@ -163,6 +163,23 @@ def _until(holds: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
+def test_a_drone_whose_application_is_silent_comes_home() -> None:
+    """It is told why, and once: a report to the liveness monitor is no word of the application."""
+    actor = drone_by_hand(AddNavigation(hop((4, 0), hover=900)), speed=2.0, mission=_HOLD)
+    actor.start(host_time_ns())
+    end = time.monotonic() + 30.0
+    while not (lost := [one for one in actor.report().alerts if one.kind == "application_lost"]):
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    time.sleep(0.2)
+    status = actor.robots()["drone"].status
+    assert status.state in {MissionState.RETURNING, MissionState.LANDING}
+    assert [one.text for one in lost] == [status.reason]
+    _until_over(actor)
+    assert actor.robots()["drone"].status.state is MissionState.LANDED
+    actor.stop()
+
+
 def _until_over(actor: DroneByHand) -> None:
     _until(lambda: actor.report().phase != "running")
 
