@@ -189,6 +189,7 @@ class InlineFlight:
 
     def _fly(self) -> None:
         executor = self._executor
+        read_vitals()  # the first reading of a thread only begins the machine's measurement
         reported = recorded = time.monotonic()
         # Pure readers start first.
         executor.start(reversed(self._nodes()))

@@ -50,9 +50,11 @@ def loads_figure(flight: RecordedFlight) -> Figure:
     share.set(ylim=(0, 105), ylabel="Whole machine (%)")
     share.set_zorder(cores.get_zorder() - 1)
     cores.patch.set_visible(False)
-    cores.set(ylabel="Processor (cores)", ylim=(0, None))
-    memory.set(ylabel="Memory (MB)", xlabel="Mission time (s)", ylim=(0, None))
+    cores.set(ylabel="Processor (cores)")
+    memory.set(ylabel="Memory (MB)", xlabel="Mission time (s)")
     for axes in (cores, memory):
+        # From zero, with room above a line that hardly changes.
+        axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
         grid(axes, "y")
     legend(figure, lines)
     return figure
