@@ -7,6 +7,9 @@ import json
 from pathlib import Path
 from typing import Any, ClassVar
 
+import aerodaas.actors  # noqa: F401 - sets what Ray reads as it is imported
+
+# isort: split
 import ray
 
 from aerodaas import AeroNavigation, Analytics, Environment, Frame, NavigationType, Waypoint

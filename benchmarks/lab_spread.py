@@ -12,6 +12,9 @@ from pathlib import Path
 from statistics import median
 from typing import Annotated, Any
 
+import aerodaas.actors  # noqa: F401 - sets what Ray reads as it is imported
+
+# isort: split
 import psutil
 import ray
 import typer

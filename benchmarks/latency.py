@@ -21,6 +21,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import aerodaas.actors  # noqa: F401 - sets what Ray reads as it is imported
+
+# isort: split
 import numpy as np
 import psutil
 import ray

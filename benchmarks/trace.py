@@ -16,6 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
+import aerodaas.actors  # noqa: F401 - sets what Ray reads as it is imported
+
+# isort: split
 import _stamps
 import ray
 import typer

@@ -111,9 +111,9 @@ class Lock(Analytics[object]):
 
 seen = See().deploy(edge).analyse(camera)
 Check().deploy(edge).analyse(seen)
-Lock().deploy(edge).analyse(camera)
+Check().deploy(edge).analyse(Lock().deploy(edge).analyse(camera))
 drone.navigate(AeroListData([Waypoint("a", 1, 0, 2), Waypoint("b", 1, 1, 2)]))
-drone.start_mission(wait=False)
+drone.start_mission(wait=False, speed=1)
 first = next(iter(seen))
 assert isinstance(first, Seen), first
 print("read", type(first).__name__, first.value)
