@@ -25,6 +25,10 @@ from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
+from aerodaas.clock import host_time_ns
+from aerodaas.errors import AeroDaaSError, MissionError, as_project_error
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.vitals import read_vitals
 from aerodaas.runtime.alerts import AlertHandler, AlertLog
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.node import Node
@@ -37,10 +41,6 @@ from aerodaas.runtime.reports import (
     sent_counts,
 )
 from aerodaas.runtime.session import Session
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.errors import AeroDaaSError, MissionError, as_project_error
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import read_vitals
 
 __all__ = ["ActorInfo", "NodeActor", "NodeMaker"]
 

@@ -24,8 +24,8 @@ from aerodaas.actors.cluster.ray_cluster import nodes_at, pinned
 from aerodaas.actors.process_variables import ray_variables
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import cleaned
+from aerodaas.errors import ConfigError
 from aerodaas.runtime.placement import Placement
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["isolation_options"]
 

@@ -18,14 +18,14 @@ from aerodaas.actors.cluster.ray_cluster import options_for
 from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables
 from aerodaas.actors.run.member import ask
+from aerodaas.clock import Clock, SimulatedClock
 from aerodaas.config.model import RuntimeEnvConfig
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.plan import ActorPlan, CameraSpec
 from aerodaas.runtime.session import Session
-from aerodaas.types.clock import Clock, SimulatedClock
-from aerodaas.types.status import Message
 
 __all__ = ["NodeProxy", "Proxies"]
 

@@ -7,7 +7,7 @@ import stat
 import warnings
 from pathlib import Path
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["private_folder"]
 

@@ -12,11 +12,11 @@ from aerodaas.actors.batch_pause import BatchPause
 from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.config.options import LiveViews
+from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.node import Node
 from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.session import Session
-from aerodaas.types.vitals import Vitals
 
 __all__ = ["RecorderActor", "RecorderSpec"]
 

@@ -26,7 +26,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
 
 __all__ = ["NoiseCamera", "Steer", "Work", "environment", "flying", "hover"]
 

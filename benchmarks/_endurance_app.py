@@ -14,8 +14,8 @@ import ray
 
 from aerodaas import AeroNavigation, Analytics, Environment, Frame, NavigationType, Waypoint
 from aerodaas.analytics.base import Context
+from aerodaas.clock import seconds
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.clock import seconds
 
 TASKS = "Events of tasks kept by Ray's head"
 SIZE = (320, 180)

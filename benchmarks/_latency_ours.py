@@ -22,7 +22,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture, PictureMemory, own_memory
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
 
 __all__ = [
     "HEIGHT",

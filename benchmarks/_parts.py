@@ -21,9 +21,14 @@ import numpy as np
 import typer
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.identifiers import internal
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
@@ -31,11 +36,6 @@ from aerodaas.mission.planner import InlinePlanner
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.identifiers import internal
-from aerodaas.types.status import Message, TraceSpan
 
 _ENVIRONMENT = Path(__file__).parents[1] / "apps" / "environments" / "farm.json"
 _CORNERS = ((0, 0), (0, 10), (10, 10), (10, 0))

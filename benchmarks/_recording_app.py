@@ -12,8 +12,8 @@ from aerodaas import AeroNavigation, Analytics, Environment, Frame, NavigationTy
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["RATE", "SIZE", "ReadyCamera", "build", "draw_pictures", "environment"]
 

@@ -6,9 +6,9 @@ import json
 import sys
 import time
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.camera import TelloCamera
-from aerodaas.types.clock import NANOSECONDS
 from tools.tello_vehicle.stamp import read_age
 
 _WARM_UP = 2.0

@@ -18,8 +18,8 @@ from _report import Report
 
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.errors import AeroDaaSError
 from aerodaas.simulation.world import Thing
-from aerodaas.types.errors import AeroDaaSError
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.meetings import STRANGER, crossing
 from tools.tuning.perception import DetectorPerception, TruthPerception

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 from _report import Report
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -26,7 +27,6 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
-from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {
     "mean": "us",

@@ -15,11 +15,11 @@ import typer
 from _report import Report
 from rich.progress import track
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.lab import LabResult, Workload, run_lab
 from aerodaas.schedulers.lab.workload import Arrival
-from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {
     "first": "%",

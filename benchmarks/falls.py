@@ -24,12 +24,15 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
 from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
 from aerodaas.analytics.people.pose import PoseAnalytics
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import Thing, World
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
-from aerodaas.types.vehicle import VehicleState
 from tools.tuning.chase import Chase
 from tools.tuning.perception import DetectorPerception, Perception, TruthPerception
 from tools.tuning.walk import PERSON, walk

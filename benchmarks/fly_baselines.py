@@ -14,7 +14,7 @@ import typer
 from _pace import set_pace
 from missions.plain import BASELINES, Baseline, fly
 
-from aerodaas.types.errors import UnknownIdError
+from aerodaas.errors import UnknownIdError
 
 
 def main(

@@ -15,7 +15,7 @@ from _report import Report
 
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.perception import DetectorPerception, TruthPerception
 from tools.tuning.walk import PERSON, walk

@@ -22,8 +22,8 @@ from _latency_ours import HEIGHT, WIDTH, read_frame
 from _report import Report
 
 from aerodaas.actors.streams import Publisher, Subscriber
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.runtime.node import Outlet
-from aerodaas.types.data import Frame, Header
 
 UNITS = {"median": "us", "p99": "us", "publisher": "us of processor", "reader": "us of processor"}
 _PERIOD = 0.033

@@ -15,9 +15,9 @@ from _report import Report
 from rich.progress import track
 
 from aerodaas.actors.cluster.ray_map import spread_over
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.registry import scheduler_names
 from aerodaas.schedulers.lab import Workload, run_lab
-from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {"time": "s", "CPU": "s", "tasks": "k", "rate": "k tasks/s", "per task": "us"}
 

@@ -26,6 +26,7 @@ from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.cli.flown_tasks import Flown
 from aerodaas.cli.flown_workload import flown_trace, flown_workload
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
@@ -35,7 +36,6 @@ from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
-from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {
     "completion": "%",

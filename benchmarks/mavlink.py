@@ -25,20 +25,20 @@ import typer
 from _ports import free_port
 from _report import Report
 
+from aerodaas.clock import NANOSECONDS, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.framing import Framer
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import Setpoint, VehicleState
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand
 from aerodaas.mission.commands import OpenStream, Start, StreamItem
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS, ScaledClock
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import Setpoint, VehicleState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 UNITS = {

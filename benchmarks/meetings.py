@@ -19,7 +19,7 @@ from _report import Report
 
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.meeting_plot import plot_meeting
 from tools.tuning.meetings import CONTACT, STRANGER, Nearest, NoGuard, returning, stranger

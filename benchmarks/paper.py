@@ -28,7 +28,7 @@ from missions.flying import Flown, fly
 from rich.console import Console
 from rich.table import Table
 
-from aerodaas.types.errors import AeroDaaSError, UnknownIdError
+from aerodaas.errors import AeroDaaSError, UnknownIdError
 
 _PAPER_SAVED = 22.0
 """Metres that nearest neighbour saved in the paper's Disaster Survey."""

@@ -16,10 +16,10 @@ import typer
 from _report import Report
 
 from aerodaas.config.plugins import load_plugin
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.optimal import OptimalScheduler
 from aerodaas.schedulers.trajectory.travel import tour_length
-from aerodaas.types.waypoints import Waypoint
 
 SCHEDULERS = ("ordered", "nearest_neighbor", "deadline", "optimal")
 AIMS = {10: 0.1, 50: 0.5, 200: 2.0}

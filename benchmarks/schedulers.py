@@ -13,10 +13,10 @@ import typer
 from _report import Report
 from rich.progress import track
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.registry import scheduler_names
 from aerodaas.schedulers.lab import ExecutionTimes, LabResult, Network, Workload, run_lab
 from aerodaas.schedulers.lab.workload import SIX
-from aerodaas.types.clock import NANOSECONDS
 
 CASES = {
     "nominal": ("nominal", "steady"),

@@ -31,8 +31,8 @@ from rich.progress import track
 from websockets.asyncio.client import connect
 
 from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import CommandIn, MissionIn
-from aerodaas.types.errors import AeroDaaSError
 
 T = TypeVar("T")
 UNITS = {"count": "", "median": "ms", "p99": "ms", "rate": "per s"}

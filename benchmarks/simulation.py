@@ -27,8 +27,8 @@ import typer
 from _report import Report
 from rich.progress import track
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.recording.reader import Recording
-from aerodaas.types.clock import NANOSECONDS
 
 _CHECKOUT = Path(__file__).resolve().parents[1]
 _APPS = _CHECKOUT / "apps"

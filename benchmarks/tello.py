@@ -23,7 +23,7 @@ from _report import Report
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 UNITS = {"median": "ms", "p99": "ms", "largest": "ms", "cpu": "% of a core", "frames": "asked for"}
 _HERE = Path(__file__).resolve().parent

@@ -23,19 +23,19 @@ import typer
 from _report import Report
 from numpy.typing import NDArray
 
+from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.sitl.process import SitlProcess
 from aerodaas.drivers.mavlink.sitl.programs import Family, SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, HandOver, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import ScaledClock
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
 UNITS = {
     "time": "s",

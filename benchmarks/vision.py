@@ -19,8 +19,8 @@ from _report import Report
 
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.providers import default_threads
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.frames import Frame, Header
 
 UNITS = {
     "pre": "ms",

@@ -24,7 +24,10 @@ import aerodaas
 from aerodaas.actors.streams import Publisher, Subscriber
 from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
 from aerodaas.analytics.base import Analytics
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.mission import SetpointRecord
 from aerodaas.mission.commands import OpenStream
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
@@ -35,8 +38,6 @@ from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.status import Message, SetpointRecord
 
 _ROOT = Path(aerodaas.__file__).resolve().parents[1]
 _ENVIRONMENT = _ROOT / "apps" / "environments" / "campus.json"

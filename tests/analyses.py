@@ -18,7 +18,7 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics.base import Context
-from aerodaas.types.data import Readings
+from aerodaas.messages.readings import Readings
 
 __all__ = [
     "Above",

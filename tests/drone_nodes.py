@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.runtime.controller import RobotSpec
@@ -15,10 +21,6 @@ from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.node import Outlet
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.status import Message, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["DroneFlight", "UnreadableVehicle", "robot_spec"]
 

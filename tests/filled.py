@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.types.appearance import ZONE_BYTES, ZONES
-from aerodaas.types.data import Detection, Frame
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.messages.appearance import ZONE_BYTES, ZONES
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["filled", "names"]
 

@@ -9,21 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import LimitsConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream, Start
-from aerodaas.mission.loop import SetpointLoop
-from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner, Planner
-from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.geometry import GeodeticOrigin, Vector, wrap_angle
-from aerodaas.types.status import MissionState, MissionStatus, SetpointRecord
-from aerodaas.types.vehicle import (
+from aerodaas.geometry.frames import GeodeticOrigin, Vector, wrap_angle
+from aerodaas.messages.mission import MissionState, MissionStatus, SetpointRecord
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -31,7 +24,14 @@ from aerodaas.types.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
+from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.mission.safety.ground_clearance import GroundClearance
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 PERIOD = NANOSECONDS // 20
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.config.model import LimitsConfig
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.terrain.ground import Ground
 from aerodaas.terrain.terrain import Terrain
 from aerodaas.terrain.tile import Grid, Tile
-from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["ORIGIN", "clearance", "ground"]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
 from aerodaas.runtime.node import Host, Outlet
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.status import Message
 
 __all__ = ["Hand", "item_of", "published"]
 

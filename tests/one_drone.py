@@ -6,7 +6,7 @@ from flying import hop
 
 from aerodaas import Environment, Odometry, Robot
 from aerodaas.dataflow.graph import AeroStreamData
-from aerodaas.types.status import MissionState
+from aerodaas.messages.mission import MissionState
 
 __all__ = ["drone_of", "long", "odometry_of", "short", "state_of"]
 

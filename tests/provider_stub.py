@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 from typing_extensions import Self
 
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.messages.health import Verdict
 from aerodaas.protocol.schemas import (
     CommandIn,
     FleetOut,
@@ -25,7 +26,6 @@ from aerodaas.protocol.schemas import (
     MissionPhase,
     RobotOut,
 )
-from aerodaas.types.health import Verdict
 
 TOKEN = "t0k3n"  # noqa: S105 - of these tests alone
 MISSION = "3f1a6c0d9b2e"

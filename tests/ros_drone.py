@@ -14,12 +14,12 @@ from types import TracebackType
 import numpy as np
 from typing_extensions import Self
 
+from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.ros import messages as ros
 from aerodaas.ros.link import RosLink
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.dynamics import STEP, KinematicState, Multirotor
 from aerodaas.simulation.wind import Wind
-from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["RosDrone", "odometry_message", "quaternion"]
 

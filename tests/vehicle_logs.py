@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Battery, Header, Odometry
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 EPOCH = 1_800_000_000
 """Second since 1970 at which the mission begins."""

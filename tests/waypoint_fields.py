@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from hypothesis import strategies as st
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.waypoints import Waypoint
 
 HOME = PlanningContext(0.0, np.zeros(3), np.zeros(3), speed=2.0)
 

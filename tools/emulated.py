@@ -12,12 +12,12 @@ from typing import ClassVar, Generic, TypeVar
 import typer
 from typing_extensions import Self
 
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits
 from aerodaas.simulation.dynamics import Multirotor
 from aerodaas.simulation.noise import SensorNoise
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["LONGEST_LEAP", "EmulatedFlight", "EmulatedVehicle", "watch"]
 

@@ -12,7 +12,7 @@ import warnings
 from pathlib import Path
 
 from aerodaas.actors.cluster.ray_variables import AUTH_MODE, UNAUTHENTICATED
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 
 __all__ = ["make_token", "refusal", "require_authentication", "require_token"]
 

@@ -13,7 +13,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.cluster import ray_cluster as cluster
 from aerodaas.actors.cluster.probe import LinkMeasurement, NodeFacts, Probe
-from aerodaas.types.finding import Finding
+from aerodaas.findings import Finding
 
 __all__ = ["check_cluster"]
 

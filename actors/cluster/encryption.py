@@ -6,7 +6,7 @@ import os
 import socket
 import ssl
 
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 
 __all__ = ["require_same_encryption"]
 

@@ -19,7 +19,7 @@ from aerodaas.actors.cluster.authentication import (
 )
 from aerodaas.actors.cluster.encryption import require_same_encryption
 from aerodaas.actors.cluster.ray_process import RAY
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["HTTP2_PREFACE", "greet", "hushed", "kept_address", "listener_of", "reach"]
 

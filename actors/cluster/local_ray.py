@@ -19,7 +19,7 @@ from aerodaas.actors.cluster.authentication import make_token, require_authentic
 from aerodaas.actors.cluster.ray_variables import LOOPBACK_ONLY
 from aerodaas.actors.private_folder import private_folder
 from aerodaas.config.secrets import MAVLINK_KEY
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["LOOPBACK", "LocalRay"]
 

@@ -12,7 +12,7 @@ from typing import Any
 import ray
 
 import aerodaas
-from aerodaas.types.clock import host_time_ns
+from aerodaas.clock import host_time_ns
 
 __all__ = ["LinkMeasurement", "NodeFacts", "Probe", "clock_offset"]
 

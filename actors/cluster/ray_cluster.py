@@ -20,8 +20,8 @@ from aerodaas.actors.cluster.handshake import greet, hushed, kept_address, liste
 from aerodaas.actors.cluster.head_watch import answers
 from aerodaas.actors.cluster.local_ray import LOOPBACK, LocalRay
 from aerodaas.config.model import ComputeConfig
+from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.runtime.placement import Placement
-from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 __all__ = [
     "begin",

@@ -17,6 +17,9 @@ from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
 from aerodaas.actors.dispatch.edge_turns import EdgeTurns
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
+from aerodaas.clock import NANOSECONDS, Clock
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
 from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.runtime.dispatch.dispatcher import Dispatcher, Managed
 from aerodaas.runtime.dispatch.estimates import Estimates
@@ -32,9 +35,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskOutcome,
     TaskPlace,
 )
-from aerodaas.types.clock import NANOSECONDS, Clock
-from aerodaas.types.data import Frame
-from aerodaas.types.status import Message
 
 __all__ = ["DispatcherSpec", "LiveDispatcher"]
 

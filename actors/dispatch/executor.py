@@ -19,12 +19,12 @@ from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Analytics, ComputeKind
+from aerodaas.clock import host_time_ns
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.runtime.dispatch.frame_codec import CodedFrame, decoded, load
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.status import Message, TraceSpan
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["FRAMES_KEPT", "CloudExecutor", "Executed", "MissingFrameError", "UnpreparedError"]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteExecutor, RemoteResult
+from aerodaas.messages.envelope import Message
 from aerodaas.schedulers.analytics.base import Task
-from aerodaas.types.status import Message
 
 __all__ = ["ExecutorPool"]
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors.streams import encode_message
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
 from aerodaas.runtime.dispatch.costs import LinkEstimate, Uplink
 from aerodaas.runtime.dispatch.frame_codec import Codec, load
-from aerodaas.types.data import Frame
-from aerodaas.types.status import Message
 
 __all__ = ["FrameTransfer", "FrameUplink"]
 

@@ -26,11 +26,11 @@ from aerodaas.actors.dispatch.executor import (
 from aerodaas.actors.dispatch.frame_uplink import FrameTransfer, FrameUplink
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import UnreadableError, decode_message
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.dispatch.costs import ExecutionEstimates
 from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import Task
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.status import Message
 
 __all__ = ["Executor", "RemoteExecutor", "RemoteResult"]
 

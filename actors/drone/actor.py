@@ -19,6 +19,8 @@ from aerodaas.actors.priority import Slack, punctual, raise_niceness
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.losses import ALONE
 from aerodaas.config.file_lock import actor_lock, exclusive
+from aerodaas.errors import MissionError
+from aerodaas.messages.envelope import Message
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.drone import DroneNode, failure_of
@@ -26,8 +28,6 @@ from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.reports import RobotReport
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import Message
 
 __all__ = ["ANSWER_TIMEOUT", "CHANGES", "COMMANDS", "DroneActor"]
 

@@ -13,11 +13,11 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
+from aerodaas.clock import NANOSECONDS
 from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["PlannerExecutor", "planner_for"]
 

@@ -40,7 +40,11 @@ from aerodaas.actors.run.losses import (
 )
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.shutdown import end_actors, may_fly
+from aerodaas.clock import host_time_ns
 from aerodaas.config.options import LiveViews
+from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.dispatch.offload import CloudProcess
@@ -51,9 +55,6 @@ from aerodaas.runtime.plan import ActorPlan, CameraSpec, DispatchPlan, FlightPla
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
 from aerodaas.runtime.stream_names import done_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["Flight"]
 

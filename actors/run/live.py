@@ -15,9 +15,9 @@ from aerodaas.actors.streams import (
     decode_message,
     shared_memory_available,
 )
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.live import LiveSource
 from aerodaas.runtime.session import Session
-from aerodaas.types.status import Message
 
 __all__ = ["live_source"]
 

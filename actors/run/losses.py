@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
+from aerodaas.errors import MissionError
 from aerodaas.runtime.reports import ActorReport
-from aerodaas.types.errors import MissionError
 
 __all__ = [
     "ALONE",

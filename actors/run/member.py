@@ -11,9 +11,9 @@ from ray.exceptions import GetTimeoutError, RayActorError, RayTaskError
 
 from aerodaas.actors.base import ActorInfo
 from aerodaas.actors.run.losses import DeadError, SilentError
+from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.runtime.reports import ActorReport
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["Member", "ask", "require_clock", "routes"]
 

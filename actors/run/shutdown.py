@@ -9,8 +9,8 @@ from typing import Any, cast
 import ray
 from ray.exceptions import GetTimeoutError, RayActorError, RayError
 
+from aerodaas.errors import AeroDaaSError
 from aerodaas.runtime.reports import ActorReport
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["end_actors", "may_fly"]
 

@@ -8,7 +8,7 @@ import sys
 from aerodaas.actors.streams.rendezvous import streams_folder
 from aerodaas.actors.streams.slots import SlotPool
 from aerodaas.actors.streams.wire import queue, waiting_bytes
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["shared_memory_available", "shared_memory_obstacle"]
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from aerodaas.actors.streams import definitions as _definitions
 from aerodaas.actors.streams.plain import NotPlainError, Plain, flatten, rebuild
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.sending import culprit
-from aerodaas.types.data import Header
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.status import Message, TraceSpan
 
 __all__ = ["Encoded", "UnreadableError", "UnsendableError", "decode", "encode"]
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ray import cloudpickle
 
-from aerodaas.types.records import record_of
+from aerodaas.messages.records import record_of
 
 __all__ = ["LONGEST_INLINE_ARRAY", "NotPlainError", "Plain", "flatten", "importable", "rebuild"]
 

@@ -16,7 +16,7 @@ from aerodaas.actors.streams.codec import Encoded, UnsendableError
 from aerodaas.actors.streams.local_publisher import LocalPublisher
 from aerodaas.actors.streams.remote import RemoteReader, send_to
 from aerodaas.cameras.base import own_memory
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
 
 __all__ = ["Publisher", "RemoteReader"]
 

@@ -12,7 +12,7 @@ from typing import Any
 from aerodaas.actors.streams.availability import shared_memory_available
 from aerodaas.actors.streams.codec import UnreadableError, decode
 from aerodaas.actors.streams.local_subscriber import LocalSubscriber
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
 
 __all__ = ["Subscriber"]
 

@@ -40,11 +40,11 @@ from aerodaas.dataflow.handles import Here
 from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.dataflow.names import PaperNames, snake_case
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import GraphError
+from aerodaas.identifiers import require_name
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import TRIGGERED
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import GraphError
-from aerodaas.types.identifiers import require_name
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = [
     "Analytics",

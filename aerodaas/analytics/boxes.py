@@ -7,8 +7,10 @@ from typing import ClassVar, TypeAlias, TypeVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.types.data import Alert, Detections, Frame
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.readings import Alert
 
 __all__ = ["BoxAnalytics", "shipped_detector"]
 

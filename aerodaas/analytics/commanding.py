@@ -7,10 +7,10 @@ from typing import Protocol
 
 from aerodaas.analytics.base import NavigableAnalytics
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.types.data import Alert
-from aerodaas.types.status import MissionStatus
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["CommandingAnalytics", "MissionLink"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import dist
 
-from aerodaas.types.data import Readings
+from aerodaas.messages.readings import Readings
 
 __all__ = ["Above", "Below", "Near"]
 

@@ -20,31 +20,41 @@ import numpy as np
 
 from aerodaas.config.annotations import is_subclass
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types import data, geometry, payload, status, target, traffic, vehicle, waypoints
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.records import secrets_of
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry import frames as geometry
+from aerodaas.messages import (
+    detections,
+    frames,
+    mission,
+    odometry,
+    payload,
+    readings,
+    vehicle,
+    waypoints,
+)
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.records import secrets_of
 
 __all__ = ["KNOWN_CLASSES", "ItemError", "decoded", "encoded"]
 
 KNOWN_CLASSES: dict[str, type] = {
     one.__name__: one
     for one in (
-        data.Alert,
-        data.Battery,
-        data.Detection,
-        data.Detections,
-        data.GpsFix,
-        data.Header,
-        data.Odometry,
-        data.Readings,
+        readings.Alert,
+        odometry.Battery,
+        detections.Detection,
+        detections.Detections,
+        odometry.GpsFix,
+        frames.Header,
+        odometry.Odometry,
+        readings.Readings,
         geometry.CameraModel,
         payload.GimbalAttitude,
-        status.BatteryOutlook,
-        status.Decision,
-        status.MissionStatus,
-        target.FollowedTarget,
-        traffic.Traffic,
+        mission.BatteryOutlook,
+        mission.Decision,
+        mission.MissionStatus,
+        waypoints.FollowedTarget,
+        vehicle.Traffic,
         vehicle.VehicleState,
         waypoints.VelocityCommand,
         waypoints.Waypoint,
@@ -54,8 +64,8 @@ KNOWN_CLASSES: dict[str, type] = {
 _KNOWN_ENUMS: dict[str, type[enum.Enum]] = {
     one.__name__: one
     for one in (
-        status.MissionState,
-        target.TargetState,
+        mission.MissionState,
+        waypoints.TargetState,
         vehicle.FlightEnd,
         vehicle.VehicleMode,
         waypoints.HeightReference,

@@ -7,9 +7,9 @@ import logging
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import GraphError
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.errors import GraphError
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from aerodaas.analytics.base import Analytics, ComputeKind

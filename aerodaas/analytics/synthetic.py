@@ -6,8 +6,9 @@ import time
 from typing import ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.types.data import Frame, Readings
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.readings import Readings
 
 __all__ = ["SyntheticAnalytics"]
 

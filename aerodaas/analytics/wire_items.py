@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.item_json import ItemError, decoded, encoded
-from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
+from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_size
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["ItemError", "pack", "unpack"]
 
@@ -34,8 +35,8 @@ def pack(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
     """Write an item for the wire.
 
     Args:
-        item: Of a class of `aerodaas.types`, navigation that is no stream, a plain value, a list,
-            tuple or dictionary of these; or None.
+        item: Of a class of `aerodaas.messages`, navigation that is no stream, a plain value, a
+            list, tuple or dictionary of these; or None.
         lossless: Write a frame as PNG, not as JPEG of quality 90.
 
     Returns:

@@ -9,10 +9,10 @@ from typing import Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.payload import GimbalAttitude
-from aerodaas.types.records import valued
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import GimbalAttitude
+from aerodaas.messages.records import valued
 
 __all__ = [
     "Camera",

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.cameras.base import Picture
+from aerodaas.cameras.picture_size import picture_format
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
+from aerodaas.clock import seconds
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.picture_size import picture_format
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["FolderCamera"]
 

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.errors import SourceError
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.cameras.picture_size import picture_fits, picture_size
+from aerodaas.errors import SourceError
 
 __all__ = [
     "IMAGE_SCHEMAS",

@@ -18,9 +18,9 @@ from av.error import FFmpegError
 from numpy.typing import NDArray
 
 from aerodaas.cameras.h264 import FrameDecoder, bgr_image
+from aerodaas.clock import host_time_ns
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 __all__ = ["LiveSource"]
 

@@ -6,8 +6,8 @@ import math
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, SensorConfig
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import CameraModel
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import CameraModel
 
 __all__ = ["camera_model", "camera_settings", "required_path"]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from aerodaas.cameras.base import Picture, PictureMemory, own_memory
 from aerodaas.cameras.settings import camera_settings
+from aerodaas.clock import seconds
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import GimbalAttitude, levelled, zoomed
 from aerodaas.simulation.world import World
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.payload import GimbalAttitude, levelled, zoomed
 
 if TYPE_CHECKING:
     from aerodaas.simulation.renderer import Renderer

@@ -11,8 +11,8 @@ from aerodaas.cameras.told_video import TOLD, ToldSource
 from aerodaas.cameras.video_file import VideoFile
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["VideoCamera"]
 

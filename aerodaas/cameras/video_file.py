@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 __all__ = ["VideoFile"]
 

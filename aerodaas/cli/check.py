@@ -17,21 +17,15 @@ from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.errors import (
-    AeroDaaSError,
-    GraphError,
-    SourceError,
-    VehicleError,
-    failure_line,
-)
-from aerodaas.types.finding import Finding
+from aerodaas.errors import AeroDaaSError, GraphError, SourceError, VehicleError, failure_line
+from aerodaas.findings import Finding
 
 if TYPE_CHECKING:
     from aerodaas.cameras.base import Camera
     from aerodaas.config.model import RobotConfig, SensorConfig
     from aerodaas.dataflow.graph import Node
     from aerodaas.environment.environment import Environment
-    from aerodaas.types.vehicle import Vehicle
+    from aerodaas.messages.vehicle import Vehicle
 
 __all__ = ["check", "examine_application"]
 
@@ -203,7 +197,7 @@ def _vehicle(
     connected: ExitStack,
 ) -> str:
     from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - slow to load
-    from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
+    from aerodaas.messages.health import Verdict  # noqa: PLC0415 - as above
 
     vehicle = load_vehicle(robot, environment.config, observing=True)
     connected.callback(vehicle.close)

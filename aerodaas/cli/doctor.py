@@ -21,8 +21,8 @@ from rich.table import Table
 from rich.text import Text
 
 from aerodaas.actors import priority
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.finding import Finding
+from aerodaas.errors import AeroDaaSError
+from aerodaas.findings import Finding
 
 __all__ = ["doctor", "examine", "show_findings"]
 

@@ -11,7 +11,7 @@ from aerodaas.cli.application import build_application
 from aerodaas.cli.options import OtherEnvironment
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["compile_document", "graph", "schema"]
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.shipped import APPLICATIONS, purpose, shipped_applications
-from aerodaas.types.errors import ConfigError, UnknownIdError
+from aerodaas.errors import ConfigError, UnknownIdError
 
 __all__ = ["examples"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerodaas.config.options import current_options
-from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
+from aerodaas.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
 
 __all__ = ["Failure", "failure_of", "show_failure"]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_environment import allowed_content, merged, recorded_content
 from aerodaas.schedulers.analytics.base import (
@@ -18,7 +19,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
 )
 from aerodaas.schedulers.analytics.published.profiles import told_profile
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["Flown", "FlownTask"]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from statistics import median
 
 from aerodaas.cli.flown_tasks import Flown, FlownTask
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Result, Task, TaskPlace
 from aerodaas.schedulers.lab.simulator import Trace
 from aerodaas.schedulers.lab.workload import Arrival, Workload
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["flown_trace", "flown_workload"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.recording.ros.bag import RosBag

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.beginning import Beginning

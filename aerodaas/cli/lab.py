@@ -11,7 +11,7 @@ import typer
 
 from aerodaas.cli.failure import failure_of, show_failure
 from aerodaas.cli.help_examples import ExampleGroup
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["app"]
 

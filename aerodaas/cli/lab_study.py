@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.extras import require_extra
 from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
@@ -32,7 +33,6 @@ from aerodaas.schedulers.lab.spreading import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["registered", "spread_of", "study", "workload_of"]
 

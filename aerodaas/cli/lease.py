@@ -9,7 +9,7 @@ import typer
 
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json, print_table
-from aerodaas.types.errors import ConfigError, MissionError
+from aerodaas.errors import ConfigError, MissionError
 
 if TYPE_CHECKING:
     from aerodaas.environment.provider.client import ProviderClient

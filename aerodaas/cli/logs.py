@@ -13,10 +13,10 @@ import typer
 
 from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.robot import connected_robot
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 if TYPE_CHECKING:
-    from aerodaas.types.vehicle_log import LogEntry, LoggingVehicle
+    from aerodaas.messages.vehicle_log import LogEntry, LoggingVehicle
 
 __all__ = ["logs"]
 
@@ -53,7 +53,7 @@ def logs(
     aerodaas logs drone 3 4 --env campus.json
     aerodaas logs drone --attach runs/survey-20260101-120000/flight.mcap
     """
-    from aerodaas.types.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
+    from aerodaas.messages.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
 
     # Before anything is fetched: the recording may be none.
     flown = None if attach is None else _flight(attach, robot)
@@ -86,7 +86,7 @@ def _flight(recording: Path, robot: str) -> tuple[float, float]:
 
 
 def _written_then(found: Sequence[LogEntry], flown: tuple[float, float]) -> LogEntry:
-    from aerodaas.types.vehicle_log import log_of_flight  # noqa: PLC0415 - slow to load
+    from aerodaas.messages.vehicle_log import log_of_flight  # noqa: PLC0415 - slow to load
 
     chosen = log_of_flight(found, *flown)
     if chosen is None:

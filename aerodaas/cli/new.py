@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.shipped import TEMPLATES
-from aerodaas.types.errors import ConfigError, UnknownIdError
+from aerodaas.errors import ConfigError, UnknownIdError
 
 __all__ = ["new"]
 

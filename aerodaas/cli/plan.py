@@ -11,11 +11,11 @@ import typer
 
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
-    from aerodaas.types.geometry import GeodeticOrigin
-    from aerodaas.types.waypoints import Waypoint
+    from aerodaas.geometry.frames import GeodeticOrigin
+    from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["app"]
 
@@ -45,7 +45,7 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
     aerodaas plan show survey.plan
     """
     from aerodaas.dataflow.plans.reading import flown_plan  # noqa: PLC0415 - slow to load
-    from aerodaas.types.waypoints import HeightReference  # noqa: PLC0415
+    from aerodaas.messages.waypoints import HeightReference  # noqa: PLC0415
 
     waypoints, notices = flown_plan(plan, home_altitude)
     for one in waypoints:
@@ -58,7 +58,7 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
 
 
 def _flown(waypoint: Waypoint) -> str:
-    from aerodaas.types.geometry import yaw_enu_to_ned  # noqa: PLC0415 - loads numpy
+    from aerodaas.geometry.frames import yaw_enu_to_ned  # noqa: PLC0415 - loads numpy
 
     said = [] if waypoint.speed is None else [f", {waypoint.speed:g} m/s"]
     if waypoint.hover_duration:
@@ -122,7 +122,7 @@ def fence(
     """
     from aerodaas.dataflow.plans.fences import geofence_of  # noqa: PLC0415 - slow to load
     from aerodaas.dataflow.plans.reading import read_plan  # noqa: PLC0415
-    from aerodaas.types.geometry import GeodeticOrigin  # noqa: PLC0415
+    from aerodaas.geometry.frames import GeodeticOrigin  # noqa: PLC0415
 
     read = read_plan(plan)
     if not read.fence:
@@ -139,7 +139,7 @@ def fence(
 
 def _home(text: str) -> GeodeticOrigin:
     from aerodaas.dataflow.plans.numbers import place  # noqa: PLC0415 - as above
-    from aerodaas.types.geometry import GeodeticOrigin  # noqa: PLC0415
+    from aerodaas.geometry.frames import GeodeticOrigin  # noqa: PLC0415
 
     try:
         latitude, longitude = (float(one) for one in text.split(","))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from aerodaas.config.model import RobotConfig
-    from aerodaas.types.health import HealthItem
-    from aerodaas.types.vehicle import Vehicle
+    from aerodaas.messages.health import HealthItem
+    from aerodaas.messages.vehicle import Vehicle
 
 __all__ = ["preflight", "settled_items"]
 
@@ -65,8 +65,8 @@ def settled_items(vehicle: Vehicle, robot: RobotConfig) -> list[HealthItem]:
 
     It is read until then, for drivers watch over who steers by how often they are read.
     """
+    from aerodaas.messages.vehicle import SteppedVehicle  # noqa: PLC0415 - as above
     from aerodaas.mission.safety.checklist import Checklist  # noqa: PLC0415 - slow to load
-    from aerodaas.types.vehicle import SteppedVehicle  # noqa: PLC0415 - as above
 
     checklist = Checklist(vehicle, robot.limits, robot.preflight)
     patience = 0.0 if isinstance(vehicle, SteppedVehicle) else _SETTLING

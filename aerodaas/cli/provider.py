@@ -14,7 +14,7 @@ from aerodaas.cli.application import run_application, submit_application
 from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json, print_table
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
-from aerodaas.types.errors import ConfigError, MissionError
+from aerodaas.errors import ConfigError, MissionError
 
 if TYPE_CHECKING:
     from aerodaas.protocol.schemas import RobotOut

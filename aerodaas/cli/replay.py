@@ -15,7 +15,7 @@ from aerodaas.cli.report import Recorded
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import MissionError
+from aerodaas.errors import MissionError
 
 __all__ = ["replay"]
 

@@ -7,11 +7,11 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerodaas.types.errors import UnknownIdError
+from aerodaas.errors import UnknownIdError
 
 if TYPE_CHECKING:
     from aerodaas.config.model import RobotConfig
-    from aerodaas.types.vehicle import Vehicle
+    from aerodaas.messages.vehicle import Vehicle
 
 __all__ = ["connected_robot"]
 

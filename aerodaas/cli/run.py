@@ -11,7 +11,7 @@ from aerodaas.cli.application import run_application, runtime_option, speed_opti
 from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["run"]
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.application import speed_option
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig

@@ -7,7 +7,7 @@ import difflib
 from pathlib import Path
 
 import aerodaas
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["APPLICATIONS", "TEMPLATES", "find_application", "purpose", "shipped_applications"]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 import typer
 
 from aerodaas.cli.help_examples import ExampleGroup
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:
     from aerodaas.drivers.mavlink.sitl.process import SitlProcess

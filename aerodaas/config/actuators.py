@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from aerodaas.config.checked import near
 from aerodaas.config.strict import Strict
-from aerodaas.types.identifiers import Identifier
+from aerodaas.identifiers import Identifier
 
 __all__ = [
     "ACTUATOR_TYPES",

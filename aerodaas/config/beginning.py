@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from aerodaas.types.errors import ConfigError, UnknownIdError
+from aerodaas.errors import ConfigError, UnknownIdError
 
 __all__ = ["VEHICLES", "Beginning", "camera_words", "default_address"]
 

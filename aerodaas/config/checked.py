@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from aerodaas.config.annotations import is_subclass
 from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["checked", "explained", "near"]
 

@@ -10,7 +10,7 @@ from typing_extensions import Self
 
 from aerodaas.config.secrets import SecretUrl, shown_text
 from aerodaas.config.strict import NotNegative, Positive, Settings, Strict
-from aerodaas.types.identifiers import Identifier
+from aerodaas.identifiers import Identifier
 
 __all__ = ["ComputeConfig", "EndpointConfig", "RuntimeEnvConfig"]
 

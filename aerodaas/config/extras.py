@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["has_extra", "require_extra"]
 

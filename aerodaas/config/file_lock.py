@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from aerodaas.types.errors import MissionError
+from aerodaas.errors import MissionError
 
 __all__ = ["actor_lock", "exclusive", "is_locked"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import redacted
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["Catalogue", "GuestGrants", "GuestQuota", "parse_grants", "parse_words", "reduced"]
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from aerodaas.config.strict import Finite, Strict
 
 if TYPE_CHECKING:
-    from aerodaas.types.geometry import GeodeticOrigin
+    from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["HomeConfig"]
 
@@ -28,6 +28,6 @@ class HomeConfig(Strict):
     def origin(self) -> GeodeticOrigin:
         """The origin of the local ENU frame."""
         # Reading an environment file needs no numpy.
-        from aerodaas.types.geometry import GeodeticOrigin  # noqa: PLC0415
+        from aerodaas.geometry.frames import GeodeticOrigin  # noqa: PLC0415
 
         return GeodeticOrigin(self.latitude, self.longitude, self.altitude)

@@ -38,7 +38,7 @@ from aerodaas.config.robot import (
 from aerodaas.config.strict import Finite, NotNegative, Positive, Strict
 from aerodaas.config.terrain import TerrainConfig
 from aerodaas.config.traffic import TrafficConfig
-from aerodaas.types.identifiers import Identifier, ScopedName
+from aerodaas.identifiers import Identifier, ScopedName
 
 __all__ = [
     "CameraConfig",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue

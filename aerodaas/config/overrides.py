@@ -11,7 +11,7 @@ from typing import Any
 
 from aerodaas.config.json_text import parse_json
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
-from aerodaas.types.errors import AmbiguousIdError, ConfigError, UnknownIdError
+from aerodaas.errors import AmbiguousIdError, ConfigError, UnknownIdError
 
 __all__ = ["located", "overridden", "parse_setting"]
 

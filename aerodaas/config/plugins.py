@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from aerodaas.types.errors import AeroDaaSError, ConfigError, UnknownIdError
+from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
 __all__ = [
     "PluginKind",

@@ -13,7 +13,7 @@ from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.strict import Finite, NotNegative, Positive, Settings, Strict
 from aerodaas.config.traffic import TrafficConfig
-from aerodaas.types.identifiers import Identifier
+from aerodaas.identifiers import Identifier
 
 __all__ = [
     "SIMULATED_INTERVAL",

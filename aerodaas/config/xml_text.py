@@ -6,7 +6,7 @@ import io
 import math
 from xml.etree import ElementTree as ET
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["XmlError", "parse_xml"]
 

@@ -23,6 +23,7 @@ from aerodaas.console.map_archive import archive_routes
 from aerodaas.console.own_flight import OWN, OwnFlight
 from aerodaas.console.page import page_routes
 from aerodaas.console.surveys import SurveyPlanner
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.preflight import PreflightOut
@@ -40,7 +41,6 @@ from aerodaas.protocol.schemas import (
     Scope,
     Word,
 )
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["account_of", "build_console", "build_page", "require_known"]
 

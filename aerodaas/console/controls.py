@@ -20,9 +20,9 @@ from pydantic import ValidationError
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.console.access import SUBPROTOCOL
 from aerodaas.console.jobs import end_jobs
+from aerodaas.errors import AeroDaaSError
 from aerodaas.mission.commands import ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["ControlCommand", "ControlSession", "Freshness", "told_of_controls"]
 

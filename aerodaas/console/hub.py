@@ -14,8 +14,8 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import PictureForm
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Item", "StreamHub", "Watcher"]
 

@@ -9,11 +9,11 @@ from typing import Annotated, Protocol, TypeAlias
 
 from fastapi import Query, WebSocket, WebSocketDisconnect
 
+from aerodaas.clock import host_time_ns
 from aerodaas.console.access import SUBPROTOCOL
 from aerodaas.console.hub import StreamHub, Watcher
 from aerodaas.console.jobs import end_jobs
 from aerodaas.protocol.schemas import PictureForm
-from aerodaas.types.clock import host_time_ns
 
 __all__ = [
     "Form",

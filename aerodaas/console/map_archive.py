@@ -17,8 +17,8 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
 from aerodaas.config.map_tiles import MapTilesConfig
+from aerodaas.errors import ConfigError
 from aerodaas.protocol.scenery import ARCHIVE_PATH
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["archive_routes", "require_pictures"]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.clock import host_time_ns, seconds
+from aerodaas.messages.mission import GROUNDED
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut
-from aerodaas.types.clock import host_time_ns, seconds
-from aerodaas.types.status import GROUNDED
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import ActorReport, FlightState

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams, ground_of
+from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import MissionOut, MissionPhase, PictureForm
-from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig

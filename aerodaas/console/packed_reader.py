@@ -12,6 +12,10 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.graph import Graph
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import AeroDaaSError, ConfigError, failure_line
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.protocol.schemas import PictureForm, StreamKind
 from aerodaas.recording.h264 import H264Encoder, is_key_frame
 from aerodaas.recording.playback.page_items import (
@@ -21,9 +25,6 @@ from aerodaas.recording.playback.page_items import (
     packed_target,
 )
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import AeroDaaSError, ConfigError, failure_line
-from aerodaas.types.status import Message
 
 __all__ = ["PackedReader", "drawn_streams", "ground_of"]
 

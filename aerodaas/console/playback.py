@@ -11,11 +11,11 @@ from typing import Annotated, TypeAlias
 
 from fastapi import Query, Response
 
+from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import AeroDaaSError, ConfigError, RecordingError
 
 __all__ = ["Moment", "Player", "Players", "Stream", "flight_answer", "picture_answer"]
 

@@ -15,7 +15,7 @@ from aerodaas.analytics.remote.serving import web_server
 from aerodaas.console.access import FlightKeys, TokenGuard
 from aerodaas.console.app import build_console
 from aerodaas.console.own_flight import Flown, OwnFlight
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["ConsoleServer", "PageServer"]
 

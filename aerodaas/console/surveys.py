@@ -12,11 +12,11 @@ import numpy as np
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.errors import MissionError
 from aerodaas.mission.survey import SurveySettings, plan_survey
 from aerodaas.mission.survey_photos import SurveyPhotos, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
 from aerodaas.schedulers.trajectory.coverage import footprint
-from aerodaas.types.errors import MissionError
 
 __all__ = ["SurveyPlanner"]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from fastapi import APIRouter, HTTPException, Response
 
+from aerodaas.clock import seconds
 from aerodaas.console.app import account_of, build_page
 from aerodaas.console.own_flight import OWN
 from aerodaas.console.playback import Moment, Player, Stream, flight_answer, picture_answer
 from aerodaas.console.server import PageServer
 from aerodaas.protocol.schemas import FleetOut, MissionOut, MissionPhase
 from aerodaas.recording.reader import Recording
-from aerodaas.types.clock import seconds
 
 __all__ = ["RecordingServer"]
 

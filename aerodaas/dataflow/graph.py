@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.dataflow.interfaces import IAeroData
 from aerodaas.dataflow.names import PaperNames
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 if TYPE_CHECKING:
     from aerodaas.dataflow.navigation import AeroNavigation

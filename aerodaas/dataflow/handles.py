@@ -10,9 +10,10 @@ from aerodaas.config.model import ComputeConfig, SensorConfig
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.dataflow.interfaces import ICompute, IPullSensor, IPushSensor
 from aerodaas.dataflow.names import PaperNames
-from aerodaas.types.data import Battery, Frame, GpsFix, Odometry
-from aerodaas.types.errors import UnknownIdError
-from aerodaas.types.status import MissionStatus
+from aerodaas.errors import UnknownIdError
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 
 __all__ = ["SENSOR_ITEMS", "Compute", "Here", "Sensor"]
 

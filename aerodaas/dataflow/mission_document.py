@@ -25,10 +25,12 @@ from typing_extensions import Self
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types import data
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.identifiers import ScopedWord, Word
-from aerodaas.types.waypoints import (
+from aerodaas.errors import ConfigError
+from aerodaas.identifiers import ScopedWord, Word
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Readings
+from aerodaas.messages.waypoints import (
     DEFAULT_PRIORITY,
     LARGEST,
     HeightReference,
@@ -80,12 +82,12 @@ HereItem: TypeAlias = Literal[
 ]
 HERE_ITEMS: dict[HereItem, type] = {
     "AeroNavigation": AeroNavigation,
-    "Battery": data.Battery,
-    "Detections": data.Detections,
-    "GpsFix": data.GpsFix,
+    "Battery": Battery,
+    "Detections": Detections,
+    "GpsFix": GpsFix,
     "None": type(None),
-    "Odometry": data.Odometry,
-    "Readings": data.Readings,
+    "Odometry": Odometry,
+    "Readings": Readings,
     "bool": bool,
     "float": float,
     "int": int,

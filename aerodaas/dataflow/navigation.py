@@ -10,9 +10,9 @@ from typing import Any, Generic, TypeVar, cast
 from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.dataflow.containers import AeroListData
 from aerodaas.dataflow.graph import AeroStreamData
-from aerodaas.types.errors import ConfigError, InvalidWaypointError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.waypoints import (
+from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.waypoints import (
     DEFAULT_PRIORITY,
     NavigationItem,
     NavigationType,

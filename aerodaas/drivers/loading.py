@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.plugins import load_plugin
-from aerodaas.types.vehicle import Vehicle
+from aerodaas.messages.vehicle import Vehicle
 
 __all__ = ["check_links", "link_of", "load_vehicle"]
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.geometry import is_finite
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry.frames import is_finite
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
 __all__ = ["require_finite", "slowed"]
 

@@ -12,10 +12,21 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.cameras.settings import camera_settings
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite, slowed
+from aerodaas.errors import ClockError, InvalidWaypointError, VehicleError
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.vehicle import (
+    Capabilities,
+    PositionSetpoint,
+    Setpoint,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
 from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
@@ -26,17 +37,6 @@ from aerodaas.simulation.rangefinder import SimulatedRangefinder, Surface
 from aerodaas.simulation.wind import Wind
 from aerodaas.simulation.world import World
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.vehicle import (
-    Capabilities,
-    PositionSetpoint,
-    Setpoint,
-    VehicleMode,
-    VehicleState,
-    VelocitySetpoint,
-)
 
 __all__ = ["SimulatedVehicle"]
 

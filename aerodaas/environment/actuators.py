@@ -5,7 +5,7 @@ from __future__ import annotations
 from aerodaas.config.actuators import actuator_objection
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.graph import NavigationEdge, refusal
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 __all__ = ["require_actuators"]
 

@@ -21,15 +21,15 @@ from aerodaas.environment.offering import Unflown, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
+from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
+from aerodaas.identifiers import find_scoped
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Command, End, initial_commands
 from aerodaas.runtime.checks import check_environment, sensor_properties
 from aerodaas.runtime.placement import Placement
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
-from aerodaas.types.errors import ConfigError, GraphError, MissionError, UnknownIdError
-from aerodaas.types.identifiers import find_scoped
-from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
     from aerodaas.console.view import ConsoleView

@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.waypoints import HeightDatum, Waypoint, WaypointType
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.schedulers.trajectory.fleet import share_out
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.waypoints import HeightDatum, Waypoint, WaypointType
 
 __all__ = ["shared_waypoints"]
 

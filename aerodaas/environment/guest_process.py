@@ -29,10 +29,10 @@ from aerodaas.dataflow.graph import NavigationEdge, Node, application_line
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.application_file import run_file
 from aerodaas.environment.offering import offered, require_no_more, the_only
+from aerodaas.errors import AeroDaaSError, GraphError, failure_line
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.waypoints import SchedulingType
 from aerodaas.recording.encoding import plain
-from aerodaas.types.errors import AeroDaaSError, GraphError, failure_line
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.waypoints import SchedulingType
 
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue

@@ -30,10 +30,10 @@ from aerodaas.config.grants import Catalogue, GuestGrants, parse_grants, reduced
 from aerodaas.config.options import RunOptions
 from aerodaas.dataflow.graph import AeroStreamData, NavigationEdge, Node, Trigger
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Frame
-from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
-from aerodaas.types.identifiers import safe_name
-from aerodaas.types.waypoints import NavigationType, SchedulingType
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
+from aerodaas.identifiers import safe_name
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.waypoints import NavigationType, SchedulingType
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment

@@ -17,10 +17,10 @@ from aerodaas.analytics.guests.works import Works
 from aerodaas.analytics.here.relay import oversize
 from aerodaas.analytics.item_json import ItemError
 from aerodaas.analytics.wire_items import unpack
+from aerodaas.errors import failure_line
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import plain
-from aerodaas.types.errors import failure_line
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from aerodaas.analytics.base import Analytics, ComputeKind

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from aerodaas.environment.mission_run import MissionRun
+from aerodaas.errors import GoesOnError, GraphError
 from aerodaas.mission.commands import Command
-from aerodaas.types.errors import GoesOnError, GraphError
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment

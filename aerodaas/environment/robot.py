@@ -16,6 +16,7 @@ from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.errors import GraphError, UnknownIdError
 from aerodaas.mission.commands import (
     Actuate,
     End,
@@ -27,7 +28,6 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.survey import Survey, SurveySettings, plan_survey
 from aerodaas.mission.survey_photos import survey_camera
-from aerodaas.types.errors import GraphError, UnknownIdError
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from aerodaas.clock import seconds
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import LiveViews, Speed, current_options
@@ -23,12 +24,7 @@ from aerodaas.environment.signals import (
     end_of_application,
     raise_on_signals,
 )
-from aerodaas.mission.commands import Answer, Command, End
-from aerodaas.ros.link import require_dds
-from aerodaas.runtime.checks import check_served
-from aerodaas.runtime.stream_names import is_guest_actor
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import (
+from aerodaas.errors import (
     AeroDaaSError,
     ConfigError,
     GraphError,
@@ -36,8 +32,12 @@ from aerodaas.types.errors import (
     MissionError,
     RecordingError,
 )
-from aerodaas.types.identifiers import told
-from aerodaas.types.status import MissionState
+from aerodaas.identifiers import told
+from aerodaas.messages.mission import MissionState
+from aerodaas.mission.commands import Answer, Command, End
+from aerodaas.ros.link import require_dds
+from aerodaas.runtime.checks import check_served
+from aerodaas.runtime.stream_names import is_guest_actor
 
 if TYPE_CHECKING:
     from aerodaas.actors.run.flight import Flight

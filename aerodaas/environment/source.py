@@ -12,7 +12,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
 from aerodaas.config.overrides import located, overridden
 from aerodaas.environment.provider.address import is_url
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.environment.provider.client import ProviderClient

@@ -10,9 +10,9 @@ import numpy as np
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import place_of, seen_from
-from aerodaas.types.braking import braking_speed
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
+from aerodaas.geometry.braking import braking_speed
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["ApproachLimit", "closing_speed"]
 

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.braking import braking_speed
-from aerodaas.types.data import Detections, Odometry
-from aerodaas.types.depth import METRE
-from aerodaas.types.geometry import rotation_from_rpy
+from aerodaas.geometry.braking import braking_speed
+from aerodaas.geometry.depth import METRE
+from aerodaas.geometry.frames import rotation_from_rpy
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["Clearance", "surfaces"]
 

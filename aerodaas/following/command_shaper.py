@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.messages.waypoints import VelocityCommand
 
 __all__ = ["CommandShaper"]
 

@@ -15,12 +15,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.people_tracker import PeopleTracker, Prediction
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, enu_to_body
+from aerodaas.geometry.frames import Vector, enu_to_body
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["ContactGuard"]
 

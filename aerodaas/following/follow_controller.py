@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from simple_pid import PID
 
+from aerodaas.clock import seconds
 from aerodaas.following.approach import ApproachLimit
 from aerodaas.following.clearance import Clearance
 from aerodaas.following.command_shaper import CommandShaper
@@ -28,9 +29,8 @@ from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion, place_of, seen_from
 from aerodaas.following.upright import Upright
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, VelocityCommand
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
 __all__ = ["LYING", "FollowController", "FollowPhase"]
 

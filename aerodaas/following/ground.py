@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.data import Detections
-from aerodaas.types.geometry import rotation_from_rpy
+from aerodaas.geometry.frames import rotation_from_rpy
+from aerodaas.messages.detections import Detections
 
 __all__ = ["GroundView"]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.frames import Vector, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.data import Detection, Detections
-from aerodaas.types.geometry import Vector, rotation_from_rpy
 
 __all__ = ["EDGE_MARGIN", "SMALLEST_SLOPE", "GroundPoint", "ground_point", "reach", "slope"]
 

@@ -14,17 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.clock import seconds
+from aerodaas.errors import ConfigError
 from aerodaas.following.clearance import Clearance
 from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion
-from aerodaas.types.braking import braking_speed
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import wrap_angle
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, VelocityCommand
+from aerodaas.geometry.braking import braking_speed
+from aerodaas.geometry.frames import wrap_angle
+from aerodaas.messages.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
 __all__ = ["InspectionController", "InspectionPhase", "InspectionPlan"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["Observation"]
 

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from aerodaas.clock import seconds
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["PeopleTracker", "Prediction"]
 

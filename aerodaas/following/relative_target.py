@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerodaas.following.ground_point import EDGE_MARGIN, SMALLEST_SLOPE, reach, slope
-from aerodaas.types.data import Detection, Detections
-from aerodaas.types.geometry import Vector, rotation_from_rpy
+from aerodaas.geometry.frames import Vector, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
 
 __all__ = ["RelativeTarget", "TargetSize", "ends_in_picture", "sight"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from aerodaas.types.clock import seconds
+from aerodaas.clock import seconds
 
 __all__ = ["Upright"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from aerodaas.types.data import Header
-from aerodaas.types.geometry import Vector
-from aerodaas.types.vehicle import Setpoint
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.frames import Header
+from aerodaas.messages.vehicle import Setpoint
 
 __all__ = ["Action", "Fly", "Hold", "Land", "Return", "Supervise", "TakeOff", "Wait"]
 

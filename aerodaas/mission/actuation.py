@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.actuators import (
     RelayConfig,
     ServoConfig,
@@ -17,14 +18,13 @@ from aerodaas.config.actuators import (
     parachute_objection,
 )
 from aerodaas.config.robot import RobotConfig
+from aerodaas.errors import VehicleError, failure_line
+from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.types.actuators import ActuatedVehicle, Actuators, MoveResult
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.errors import VehicleError, failure_line
-from aerodaas.types.geometry import Vector, length
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Actuation"]
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sized
 from dataclasses import replace
 
+from aerodaas.clock import seconds
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import HeightReference, SchedulingType
 from aerodaas.mission.commands import (
     AddNavigation,
     Answer,
@@ -16,10 +20,6 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigator import Navigator
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Header
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.waypoints import HeightReference, SchedulingType
 
 __all__ = ["CommandHandler"]
 

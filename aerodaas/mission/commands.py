@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 from aerodaas.dataflow.graph import NavigationEdge
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Header
-from aerodaas.types.waypoints import SchedulingType, VelocityCommand
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import SchedulingType, VelocityCommand
 
 __all__ = [
     "TRIGGERED",

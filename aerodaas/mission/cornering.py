@@ -13,15 +13,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerodaas.config.robot import LimitsConfig
+from aerodaas.geometry.braking import braking_distance, braking_speed
+from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.leg import Leg
 from aerodaas.mission.navigator import Navigator
 from aerodaas.mission.photographer import Photographer
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
-from aerodaas.types.braking import braking_distance, braking_speed
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Cornering", "corner_speed"]
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerodaas.clock import seconds
+from aerodaas.errors import VehicleError, failure_line
+from aerodaas.messages.payload import VideoCamera
+from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import VehicleError, failure_line
-from aerodaas.types.payload import VideoCamera
-from aerodaas.types.vehicle import PayloadVehicle
 
 __all__ = ["Filming"]
 

@@ -6,16 +6,16 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import LimitsConfig
+from aerodaas.geometry.energy import EnergyMeter
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import BatteryOutlook
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.safety.supervisor import has_position
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.energy import EnergyMeter
-from aerodaas.types.geometry import Vector
-from aerodaas.types.status import BatteryOutlook
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["BatteryForecast"]
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, wrap_angle
-from aerodaas.types.payload import Gimbal, GimbalAttitude, GimbalTarget
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Vector, wrap_angle
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import Gimbal, GimbalAttitude, GimbalTarget
 
 __all__ = ["AIMED", "Gaze", "direction_to", "fresh", "near"]
 

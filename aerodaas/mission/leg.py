@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from aerodaas.clock import seconds
 from aerodaas.config.robot import LimitsConfig
+from aerodaas.geometry.frames import Vector, body_to_enu, length, wrap_angle
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import VelocityCommand
 from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, body_to_enu, length, wrap_angle
-from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import VelocityCommand
 
 __all__ = ["Leg", "LegPhase", "setpoint_towards", "unreachable", "velocity_setpoint"]
 

@@ -7,10 +7,11 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.geometry import Vector, length
-from aerodaas.types.status import RECENT
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import RECENT
+from aerodaas.messages.readings import Alert
 
 __all__ = ["MissionLog", "subject", "words"]
 

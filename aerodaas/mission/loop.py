@@ -7,19 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
-from aerodaas.mission.mission import Mission
-from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
-from aerodaas.mission.safety.neighbours import Neighbour
-from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import traffic_neighbours
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Header
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import is_close
-from aerodaas.types.health import HealthItem, HealthReport
-from aerodaas.types.status import MissionState, SetpointRecord
-from aerodaas.types.vehicle import (
+from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import is_close
+from aerodaas.messages.frames import Header
+from aerodaas.messages.health import HealthItem, HealthReport
+from aerodaas.messages.mission import MissionState, SetpointRecord
+from aerodaas.messages.vehicle import (
     PositionSetpoint,
     Setpoint,
     Vehicle,
@@ -27,6 +21,12 @@ from aerodaas.types.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
+from aerodaas.mission.safety.neighbours import Neighbour
+from aerodaas.mission.safety.setpoint_filter import SetpointFilter
+from aerodaas.mission.safety.traffic import traffic_neighbours
 
 __all__ = ["SetpointLoop"]
 

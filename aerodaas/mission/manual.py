@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.waypoints import VelocityCommand
 from aerodaas.mission.commands import ReleaseControls, Steer, TakeControls
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.waypoints import VelocityCommand
 
 __all__ = ["MANUAL_SECONDS", "ManualControl"]
 

@@ -12,7 +12,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerodaas.clock import seconds
 from aerodaas.config.model import RobotConfig
+from aerodaas.errors import failure_line
+from aerodaas.geometry.braking import stopping_point
+from aerodaas.geometry.energy import EnergyMeter, EnergyModel
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.actuators import ActuatedVehicle
+from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
+from aerodaas.messages.mission_mode import MissionModeVehicle
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import HeightDatum
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.actuation import Actuation
 from aerodaas.mission.command_handler import DONE, CommandHandler
@@ -56,17 +67,6 @@ from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
-from aerodaas.types.actuators import ActuatedVehicle
-from aerodaas.types.braking import stopping_point
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert
-from aerodaas.types.energy import EnergyMeter, EnergyModel
-from aerodaas.types.errors import failure_line
-from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.mission_mode import MissionModeVehicle
-from aerodaas.types.status import RECENT, MissionState, MissionStatus
-from aerodaas.types.vehicle import Setpoint, VehicleMode, VehicleState
-from aerodaas.types.waypoints import HeightDatum
 
 __all__ = ["Mission"]
 

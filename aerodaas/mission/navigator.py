@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import HeightDatum, VelocityCommand, Waypoint
 from aerodaas.mission.planner import Plan, Planner, PlanRequest
 from aerodaas.mission.queue import QueuedWaypoint, WaypointQueue
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Header
-from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.waypoints import (
-    HeightDatum,
-    VelocityCommand,
-    Waypoint,
-)
 
 __all__ = ["LiveCommand", "Navigator"]
 

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length, wrap_angle
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Vector, length, wrap_angle
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["PhotoTrigger"]
 

@@ -12,18 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.errors import VehicleError, failure_line
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import Gimbal, GimbalTarget, LensCamera, LensTarget, Photo
+from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.filming import Filming
 from aerodaas.mission.gaze import Gaze, fresh, near
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.shutter import NO_CAMERA, PhotoRequest, Shutter
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import VehicleError, failure_line
-from aerodaas.types.geometry import Vector
-from aerodaas.types.payload import Gimbal, GimbalTarget, LensCamera, LensTarget, Photo
-from aerodaas.types.vehicle import PayloadVehicle
 
 __all__ = ["Photographer"]
 

@@ -11,8 +11,8 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = [
     "BackgroundPlanner",

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerodaas.clock import seconds
 from aerodaas.config.robot import RobotConfig
+from aerodaas.geometry.energy import EnergyMeter
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigator import Navigator
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.clock import seconds
-from aerodaas.types.energy import EnergyMeter
-from aerodaas.types.geometry import Vector
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["Planning"]
 

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from aerodaas.types.data import Header
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["QueuedWaypoint", "WaypointQueue"]
 

@@ -13,15 +13,15 @@ import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 from aerodaas.mission.commands import AddNavigation, Answer, Command
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import ConfigError, InvalidWaypointError
-from aerodaas.types.geometry import Vector
-from aerodaas.types.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 
 __all__ = ["give", "rehearse"]
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from aerodaas.config.model import LimitsConfig
+from aerodaas.geometry.frames import Vector
 from aerodaas.mission.safety.detour import Detour
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.types.geometry import Vector
 
 __all__ = ["Route"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerodaas.clock import seconds
+from aerodaas.errors import VehicleError, failure_line
+from aerodaas.messages.payload import Photo, PhotoCamera, PhotoOutcome
+from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.log import MissionLog, words
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import VehicleError, failure_line
-from aerodaas.types.payload import Photo, PhotoCamera, PhotoOutcome
-from aerodaas.types.vehicle import PayloadVehicle
 
 __all__ = ["NO_CAMERA", "PhotoRequest", "Shutter"]
 

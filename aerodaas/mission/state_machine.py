@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState
+from aerodaas.errors import MissionError
+from aerodaas.messages.mission import MissionState
 
 __all__ = ["FLYING", "TERMINAL", "TRANSITIONS", "MissionStateMachine", "mermaid"]
 

@@ -11,15 +11,15 @@ import numpy as np
 import shapely
 
 from aerodaas.config.model import LimitsConfig, RobotConfig
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.geometry.frames import Vector
+from aerodaas.geometry.free_path import Place
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.survey_photos import SurveyPhotos, planned_photos
 from aerodaas.schedulers.trajectory.coverage import cover
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.free_path import Place
-from aerodaas.types.geometry import Vector
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["MOST_CORNERS", "MOST_WAYPOINTS", "Survey", "SurveySettings", "plan_survey"]
 

@@ -11,11 +11,11 @@ from statistics import median
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, RobotConfig, SensorConfig
 from aerodaas.config.robot import SIMULATED_INTERVAL
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.free_path import Place
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.photo_trigger import PhotoTrigger
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.free_path import Place
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["MOST_PHOTOS", "SurveyPhotos", "planned_photos", "survey_camera"]
 

@@ -13,12 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
+from aerodaas.errors import RecordingError
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.frames import Frame
 from aerodaas.recording.pictures import detections_by_frame, picture_topics, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.overlay import draw_detections
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detection, Frame
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["Picture", "Pictures", "boxed", "recorded_pictures"]
 

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from aerodaas.clock import seconds as to_seconds
 from aerodaas.config.extras import require_extra
 from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.errors import MissionError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, detections
 from aerodaas.recording.reader import Recording
-from aerodaas.types.clock import seconds as to_seconds
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import MissionError
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.messages.waypoints import VelocityCommand
 from aerodaas.mission.commands import (
     Actuate,
     RearrangeNavigation,
@@ -21,7 +22,6 @@ from aerodaas.mission.commands import (
 from aerodaas.mission.survey import MOST_CORNERS
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.schemas import Number, Word
-from aerodaas.types.waypoints import VelocityCommand
 
 __all__ = [
     "ActuateIn",

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
+from aerodaas.clock import seconds
+from aerodaas.messages.health import HealthItem, HealthReport, Verdict, gravest
 from aerodaas.protocol.bases import AnswerModel
-from aerodaas.types.clock import seconds
-from aerodaas.types.health import HealthItem, HealthReport, Verdict, gravest
 
 __all__ = ["PreflightOut"]
 

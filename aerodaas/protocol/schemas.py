@@ -13,12 +13,12 @@ from pydantic import Field
 
 from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.identifiers import ScopedWord, Word
+from aerodaas.messages.health import Verdict
+from aerodaas.messages.waypoints import LARGEST
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
-from aerodaas.types.health import Verdict
-from aerodaas.types.identifiers import ScopedWord, Word
-from aerodaas.types.waypoints import LARGEST
 
 __all__ = [
     "AccountIn",

@@ -23,9 +23,9 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, DataEnd, Footer, Statistics, SummaryOffset
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.index import BROKEN
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["attach_file"]
 

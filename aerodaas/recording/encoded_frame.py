@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.types.data import Header, Odometry
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["EncodedFrame"]
 

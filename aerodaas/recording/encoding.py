@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from foxglove import Schema
 
-from aerodaas.types.identifiers import INTERNAL, is_internal
-from aerodaas.types.records import secrets_of
+from aerodaas.identifiers import INTERNAL, is_internal
+from aerodaas.messages.records import secrets_of
 
 __all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
 

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import RecordingError
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
 
 if TYPE_CHECKING:
     from av.video.codeccontext import VideoCodecContext

@@ -11,9 +11,9 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 from typing_extensions import Self
 
 from aerodaas.cameras.images import VIDEO_SCHEMAS
+from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.web_gate import WebGate
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["LiveServer"]
 

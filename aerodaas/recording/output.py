@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from aerodaas.types.errors import RecordingError
+from aerodaas.errors import RecordingError
 
 __all__ = ["Output"]
 

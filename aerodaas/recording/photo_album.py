@@ -15,11 +15,11 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
 
 from aerodaas.cameras.simulated import SimulatedCamera
+from aerodaas.clock import seconds
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import AeroDaaSError, RecordingError
-from aerodaas.types.geometry import wrap_angle, yaw_enu_to_ned
-from aerodaas.types.payload import Photo, PhotoPlace
+from aerodaas.errors import AeroDaaSError, RecordingError
+from aerodaas.geometry.frames import wrap_angle, yaw_enu_to_ned
+from aerodaas.messages.payload import Photo, PhotoPlace
 
 __all__ = ["COLUMNS", "PhotoAlbum", "album_folder"]
 

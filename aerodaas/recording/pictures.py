@@ -22,12 +22,14 @@ from aerodaas.cameras.images import (
     picture_bytes,
     picture_field,
 )
+from aerodaas.errors import SourceError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
-from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.errors import SourceError
 
 __all__ = [
     "DETECTIONS_SCHEMA",

@@ -15,6 +15,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Message
 from typing_extensions import Self
 
+from aerodaas.clock import seconds
+from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.index import (
     BROKEN,
     Block,
@@ -25,8 +27,6 @@ from aerodaas.recording.decoding.index import (
 )
 from aerodaas.recording.decoding.limits import MAX_ATTACHMENT, MAX_HELD
 from aerodaas.recording.decoding.messages import BrokenMessageError, MessageDecoder
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["Record", "Recording", "Topic"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.geometry.frames import CameraModel, angles_of_rotation
 from aerodaas.recording.rotation import OPTICAL, Rotation, compose
-from aerodaas.types.geometry import CameraModel, angles_of_rotation
 
 __all__ = ["CALIBRATION_SCHEMA", "MOUNT_SCHEMA", "camera_of"]
 

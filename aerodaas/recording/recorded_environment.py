@@ -14,9 +14,9 @@ from typing import Any, TypeAlias
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, HomeConfig
 from aerodaas.config.plugins import PluginKind, is_built_in
+from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["allowed_content", "left_out", "merged", "recorded_content", "recorded_home"]
 

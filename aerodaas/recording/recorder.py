@@ -21,7 +21,12 @@ from foxglove.messages import LogLevel
 from mcap.writer import Writer
 from typing_extensions import Self
 
+from aerodaas.clock import seconds
 from aerodaas.config.model import GeofenceConfig, RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
 from aerodaas.recording.chunk_indexes import keep_chunk_indexes_on_disk
 from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
@@ -32,11 +37,6 @@ from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Frame
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import Message
 
 __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
 

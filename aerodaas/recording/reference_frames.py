@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, rotation_from_rpy
+from aerodaas.geometry.frames import Vector, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["MAP_FRAME", "base_link", "body_twist"]
 

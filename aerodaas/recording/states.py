@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.payload import GimbalAttitude
+from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.recording.reader import Recording
-from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.payload import GimbalAttitude
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["odometry_of", "state_of", "vehicle_states"]
 

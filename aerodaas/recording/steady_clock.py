@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.types.clock import NANOSECONDS
+from aerodaas.clock import NANOSECONDS
 
 __all__ = ["SteadyClock"]
 

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Detection, GpsFix, Odometry
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import Vector, is_finite, rotation_from_rpy
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import Vector, is_finite, rotation_from_rpy
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 
 __all__ = [
     "battery_of",

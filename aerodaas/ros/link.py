@@ -9,8 +9,8 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.ros.names import dds_topic, ros_topic, ros_type
-from aerodaas.types.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:
     from cyclonedds.pub import DataWriter

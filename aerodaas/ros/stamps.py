@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from aerodaas.types.clock import NANOSECONDS
+from aerodaas.clock import NANOSECONDS
 
 __all__ = ["MessageClock", "StampSource"]
 

@@ -8,11 +8,12 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
 from aerodaas.runtime.node import Outlet
 from aerodaas.runtime.stream_names import alert_stream
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.status import Message
 
 __all__ = ["AlertHandler", "AlertLog"]
 

@@ -14,7 +14,14 @@ from typing import Any
 
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.clock import Clock, host_time_ns
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import failure_line
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command, Reply, Request, StreamItem
 from aerodaas.mission.state_machine import TERMINAL
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
@@ -22,11 +29,6 @@ from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.session import FRAME_DEPTH, Session
 from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.runtime.triggers import TriggerSpec, fire
-from aerodaas.types.clock import Clock, host_time_ns
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import failure_line
-from aerodaas.types.status import Message, MissionStatus
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["AnalysisNode", "AnalysisSpec", "Wake"]
 

@@ -17,16 +17,16 @@ from aerodaas.cameras.base import (
     ToldCamera,
     ZoomingCamera,
 )
+from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import End
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import end_stream
-from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["CameraNode"]
 

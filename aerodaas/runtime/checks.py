@@ -24,8 +24,8 @@ from aerodaas.config.plugins import (
 from aerodaas.config.secrets import SecretUrl, plain, shown_text
 from aerodaas.dataflow.names import snake_case
 from aerodaas.drivers.loading import check_links, load_vehicle
-from aerodaas.types.errors import ConfigError, GraphError
-from aerodaas.types.identifiers import find_scoped
+from aerodaas.errors import ConfigError, GraphError
+from aerodaas.identifiers import find_scoped
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig

@@ -9,8 +9,22 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from aerodaas.clock import Clock, host_time_ns
 from aerodaas.config.model import RobotConfig, SensorConfig
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.errors import AeroDaaSError, failure_line
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionStatus, SetpointRecord
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import (
+    ClockedVehicle,
+    PlayedVehicle,
+    SeaLevelVehicle,
+    SteppedVehicle,
+    VehicleState,
+)
 from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
@@ -39,18 +53,6 @@ from aerodaas.runtime.stream_names import (
 )
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.terrain.ground import agreed_sea_level
-from aerodaas.types.clock import Clock, host_time_ns
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, failure_line
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import Message, MissionStatus, SetpointRecord
-from aerodaas.types.vehicle import (
-    ClockedVehicle,
-    PlayedVehicle,
-    SeaLevelVehicle,
-    SteppedVehicle,
-    VehicleState,
-)
 
 __all__ = ["MakePlanner", "RobotSpec", "VehicleController", "sensor_item"]
 

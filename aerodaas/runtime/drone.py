@@ -6,7 +6,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from aerodaas.clock import Clock, host_time_ns
 from aerodaas.drivers.loading import link_of
+from aerodaas.errors import failure_line
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
@@ -16,10 +20,6 @@ from aerodaas.runtime.reports import RobotReport
 from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, Session, next_due
 from aerodaas.runtime.stream_names import reply_stream, request_stream, whereabouts_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import Clock, host_time_ns
-from aerodaas.types.data import Header
-from aerodaas.types.errors import failure_line
-from aerodaas.types.status import Message
 
 __all__ = ["DroneNode", "failure_of"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from aerodaas.errors import GraphError
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.plan import ActorPlan, FlightPlan
-from aerodaas.types.errors import GraphError
 
 __all__ = ["Growth", "growth"]
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from aerodaas.drivers.loading import link_of
+from aerodaas.errors import ConfigError
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import Session
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["MOST_ALONE", "MOST_TOGETHER", "by_actor"]
 

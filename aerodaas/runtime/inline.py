@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any
 
+from aerodaas.clock import SimulatedClock, seconds
+from aerodaas.errors import AeroDaaSError, as_project_error, failure_line
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.alerts import AlertHandler, AlertLog
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.reports import ActorReport, Phase, merged_values, sent_counts
-from aerodaas.types.clock import SimulatedClock, seconds
-from aerodaas.types.errors import AeroDaaSError, as_project_error, failure_line
-from aerodaas.types.status import Message
 
 __all__ = ["InlineExecutor", "Part", "Tap"]
 

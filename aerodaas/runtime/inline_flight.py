@@ -15,6 +15,10 @@ from typing import Protocol
 from typing_extensions import Self
 
 from aerodaas.config.options import LiveViews
+from aerodaas.errors import AeroDaaSError, failure_line
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vitals import read_vitals
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.planner import InlinePlanner, Planner
 from aerodaas.recording.provenance import Provenance
@@ -33,9 +37,6 @@ from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, failure_line
-from aerodaas.types.vitals import read_vitals
 
 __all__ = ["InlineFlight"]
 

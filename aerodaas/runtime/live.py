@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
 
 __all__ = ["LiveReader", "LiveSource"]
 

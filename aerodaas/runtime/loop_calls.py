@@ -12,7 +12,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 from typing import Any, TypeVar
 
-from aerodaas.types.errors import MissionError
+from aerodaas.errors import MissionError
 
 __all__ = ["LoopCalls", "LoopOverError"]
 

@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from aerodaas.types.clock import Clock, host_time_ns
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message, TraceSpan
+from aerodaas.clock import Clock, host_time_ns
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
 
 __all__ = ["NEVER", "Host", "Node", "Outlet"]
 

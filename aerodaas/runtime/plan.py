@@ -18,6 +18,9 @@ from aerodaas.config.model import (
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, Node
 from aerodaas.dataflow.handles import SENSOR_ITEMS
+from aerodaas.errors import GraphError
+from aerodaas.identifiers import told
+from aerodaas.messages.frames import Frame
 from aerodaas.mission.commands import TRIGGERED, initial_commands
 from aerodaas.runtime.analysis import AnalysisSpec, Wake
 from aerodaas.runtime.camera import CameraNode
@@ -49,9 +52,6 @@ from aerodaas.runtime.triggers import TriggerSpec
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.data import Frame
-from aerodaas.types.errors import GraphError
-from aerodaas.types.identifiers import told
 
 __all__ = ["ActorPlan", "CameraSpec", "DispatchPlan", "FlightPlan", "make_plan"]
 

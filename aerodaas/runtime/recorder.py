@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aerodaas.config.options import LiveViews
+from aerodaas.errors import RecordingError, failure_line
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.payload import Photo
+from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.node import Host, Node
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import vitals_stream
-from aerodaas.types.data import Header
-from aerodaas.types.errors import RecordingError, failure_line
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.payload import Photo
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import Vitals
 
 if TYPE_CHECKING:
     from aerodaas.recording.live import LiveServer

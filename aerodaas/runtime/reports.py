@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.health import HealthReport
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.vitals import Vitals
 from aerodaas.runtime.node import Node, Outlet
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.health import HealthReport
-from aerodaas.types.status import MissionStatus
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.vitals import Vitals
 
 __all__ = [
     "LATENCIES_KEPT",

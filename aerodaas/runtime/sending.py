@@ -11,7 +11,7 @@ from typing import Any
 import cloudpickle
 
 from aerodaas.dataflow.graph import Graph
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 __all__ = ["culprit", "require_sendable"]
 

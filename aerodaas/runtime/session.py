@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, Clock, HostEpoch, ScaledClock, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare
 from aerodaas.runtime.node import NEVER
-from aerodaas.types.clock import NANOSECONDS, Clock, HostEpoch, ScaledClock, SimulatedClock
 
 __all__ = [
     "CONTROL_PERIOD_NS",

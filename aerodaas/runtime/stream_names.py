@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.types.identifiers import INTERNAL, internal
+from aerodaas.identifiers import INTERNAL, internal
 
 __all__ = [
     "DECISIONS",

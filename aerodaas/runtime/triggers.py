@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from aerodaas.clock import host_time_ns
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.node import Node
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.status import Message
 
 __all__ = ["TriggerSpec", "fire"]
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config.plugins import load_plugin
+from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
 from aerodaas.service.access import Principal, sees
 from aerodaas.service.bookings import Bookings
@@ -20,7 +21,6 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import Attached
 from aerodaas.service.mission import ActiveMission
 from aerodaas.service.settings import ServiceSettings
-from aerodaas.types.errors import MissionError
 
 if TYPE_CHECKING:
     from aerodaas.dataflow.mission_document import MissionDocument

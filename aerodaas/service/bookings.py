@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
+from aerodaas.clock import WallOffset
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.private_file import write_private
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
@@ -18,7 +19,6 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook
 from aerodaas.service.store import Lease, Mission, Store
-from aerodaas.types.clock import WallOffset
 
 __all__ = ["Bookings"]
 

@@ -13,6 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
@@ -45,9 +48,6 @@ from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 from aerodaas.service.trouble import TroubleLog
-from aerodaas.types.errors import AeroDaaSError, MissionError
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["MissionDesk"]
 

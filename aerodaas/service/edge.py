@@ -16,10 +16,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import ConfigError
 from aerodaas.schedulers.analytics.fair_queue import FairQueue
 from aerodaas.service.unix_server import UnixServer, fits_a_socket
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["EdgeArbiter"]
 

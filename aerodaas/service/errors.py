@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["RefusedError", "StoreError", "without_folders"]
 

@@ -11,13 +11,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from aerodaas.analytics.remote.guard import address_of
 from aerodaas.console.page import is_page
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Gate"]
 

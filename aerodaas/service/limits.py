@@ -15,9 +15,9 @@ import shapely
 from aerodaas.config.actuators import permitted
 from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, RobotConfig, validated
+from aerodaas.errors import ConfigError
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.protocol.schemas import Positive
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["Outline", "TenantLimits", "limited"]
 

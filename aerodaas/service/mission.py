@@ -16,6 +16,7 @@ from typing import Any
 
 from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseState, MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -24,7 +25,6 @@ from aerodaas.service.flights.starter import start_process
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import FOLLOWING
 from aerodaas.service.store import Lease, Mission
-from aerodaas.types.errors import MissionError
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
 

@@ -13,9 +13,9 @@ import sys
 import threading
 from pathlib import Path
 
+from aerodaas.errors import ConfigError
+from aerodaas.runtime.memory_limit import limit_memory
 from aerodaas.service.flights.starter import service_free_environment
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.memory_limit import limit_memory
 
 __all__ = ["try_model"]
 

@@ -22,8 +22,8 @@ from typing import Any
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.errors import ConfigError
 from aerodaas.service.errors import RefusedError
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["LARGEST_MODEL", "ModelShelf", "require_room"]
 

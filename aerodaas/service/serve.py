@@ -12,11 +12,11 @@ from aerodaas.analytics.remote.listening import listen
 from aerodaas.analytics.remote.serving import web_server
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import link_of
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.service.access import Accounts
 from aerodaas.service.app import build_service
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
-from aerodaas.types.errors import ConfigError, SourceError
 
 __all__ = ["serve"]
 

@@ -11,11 +11,11 @@ import numpy as np
 import typer
 
 from aerodaas.config.model import SimulationConfig
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.geometry import CameraModel
 
 __all__ = ["preview"]
 

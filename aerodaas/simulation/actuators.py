@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.actuators import ActuatorConfig
-from aerodaas.types.actuators import MoveResult
-from aerodaas.types.clock import NANOSECONDS
+from aerodaas.messages.actuators import MoveResult
 
 __all__ = ["SimulatedActuators"]
 
@@ -25,7 +25,7 @@ class _Move(NamedTuple):
 
 
 class SimulatedActuators:
-    """Do as they are told; implement `aerodaas.types.actuators.Actuators`."""
+    """Do as they are told; implement `aerodaas.messages.actuators.Actuators`."""
 
     def __init__(self, actuators: list[ActuatorConfig], fire: Callable[[], None]) -> None:
         """Carry `actuators`; `fire` is called when a parachute opens."""

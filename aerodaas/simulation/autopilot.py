@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.battery import FlightBattery, flight_power
 from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
 from aerodaas.simulation.guidance import velocity_towards, yaw_rate_towards
 from aerodaas.simulation.noise import SensorNoise
-from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["Autopilot", "FlightLimits", "Goto", "Steer"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from aerodaas.messages.odometry import Battery
 from aerodaas.simulation.airframe import AIR_DENSITY, Airframe
 from aerodaas.simulation.dynamics import Triple
-from aerodaas.types.data import Battery
 
 __all__ = ["FlightBattery", "flight_power"]
 

@@ -27,10 +27,10 @@ from panda3d.core import (
     TransparencyAttrib,
 )
 
+from aerodaas.geometry.depth import METRE
+from aerodaas.geometry.frames import CameraModel
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.world import World
-from aerodaas.types.depth import METRE
-from aerodaas.types.geometry import CameraModel
 
 __all__ = ["DepthRenderer", "renderer_for"]
 

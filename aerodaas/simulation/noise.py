@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.geometry.frames import GeodeticOrigin, wrap_angle
+from aerodaas.messages.odometry import GpsFix, Odometry
 from aerodaas.simulation.dynamics import STEP, KinematicState, Triple
-from aerodaas.types.data import GpsFix, Odometry
-from aerodaas.types.geometry import GeodeticOrigin, wrap_angle
 
 __all__ = ["NoiseLevels", "SensorNoise"]
 

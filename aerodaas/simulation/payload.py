@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import CameraConfig, GimbalConfig
 from aerodaas.config.robot import SIMULATED_INTERVAL
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import (
+from aerodaas.errors import VehicleError
+from aerodaas.messages.payload import (
     GimbalAttitude,
     GimbalTarget,
     LensTarget,
@@ -21,13 +21,13 @@ from aerodaas.types.payload import (
     PhotoOutcome,
     PhotoPlace,
 )
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["SimulatedGimbal", "SimulatedPhotoCamera"]
 
 
 class SimulatedGimbal:
-    """A gimbal that turns at a limited rate; implements `aerodaas.types.payload.Gimbal`."""
+    """A gimbal that turns at a limited rate; implements `aerodaas.messages.payload.Gimbal`."""
 
     fault = ""
 

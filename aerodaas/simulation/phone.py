@@ -12,9 +12,9 @@ import numpy as np
 import typer
 
 from aerodaas.config.model import SimulationConfig
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.simulation.world import World
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["write_log"]
 

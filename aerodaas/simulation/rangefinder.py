@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.simulation.airframe import RangefinderSettings
 from aerodaas.simulation.dynamics import KinematicState
 from aerodaas.simulation.scenario import Building
 from aerodaas.simulation.world import ROOF_RISE, Thing, World
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["SimulatedRangefinder", "Surface"]
 

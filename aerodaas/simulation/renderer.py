@@ -24,12 +24,12 @@ from panda3d.core import (
     load_prc_file_data,
 )
 
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scene.light import HAZE
 from aerodaas.simulation.scene.scene import Looks, Scene
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 __all__ = ["Renderer"]
 

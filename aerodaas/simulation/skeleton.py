@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.geometry import rotation_from_rpy
+from aerodaas.geometry.frames import rotation_from_rpy
 
 __all__ = ["JOINTS", "KEYPOINTS", "LIMBS", "Posture", "joints"]
 

@@ -14,14 +14,14 @@ from rich.console import Console
 from rich.status import Status
 from typing_extensions import Self
 
+from aerodaas.clock import seconds
 from aerodaas.config.extras import has_extra
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
+from aerodaas.errors import RecordingError
+from aerodaas.identifiers import is_internal
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.identifiers import is_internal
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import FlightState

@@ -12,10 +12,10 @@ from rich.rule import Rule
 from rich.text import Text
 from typing_extensions import Self
 
+from aerodaas.messages.mission import MissionState
 from aerodaas.terminal.lines import robot_line
 from aerodaas.terminal.panels import alerts_panel, clock_text, robot_panel, streams_panel
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
-from aerodaas.types.status import MissionState
 
 __all__ = ["MissionView"]
 

@@ -11,10 +11,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.terminal.plan import braille_plan
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
-from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = [
     "alerts_panel",

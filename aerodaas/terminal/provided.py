@@ -13,15 +13,15 @@ from rich.console import Console
 from typing_extensions import Self
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.mission import GROUNDED, BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.progress import download_view
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import GROUNDED, BatteryOutlook, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["ProvidedView", "download_view", "phase_text"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.types.status import MissionStatus
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["RobotSnapshot", "Snapshot", "StreamSnapshot"]
 

@@ -17,8 +17,8 @@ from aerodaas.config.extras import require_extra
 from aerodaas.config.json_text import read_text
 from aerodaas.config.printable import printable
 from aerodaas.config.xml_text import XmlError, parse_xml
+from aerodaas.errors import ConfigError
 from aerodaas.terrain.tile import MOST_SAMPLES, Grid, Tile
-from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
     from tifffile import TiffPage

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from aerodaas.config.model import TerrainConfig
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.terrain.terrain import Terrain
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin, Vector
 
 __all__ = ["Ground", "agreed_sea_level"]
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.errors import ConfigError
 from aerodaas.terrain.tile import Grid, Tile
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["hgt_tile"]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.errors import ConfigError
 from aerodaas.terrain.geotiff import geotiff_tile
 from aerodaas.terrain.hgt import hgt_tile
 from aerodaas.terrain.tile import MOST_SAMPLES, Grid, Tile
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["Patch", "Terrain"]
 

@@ -20,6 +20,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import AeroDaaSError, SchedulerError
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -33,8 +35,6 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import AeroDaaSError, SchedulerError
 
 __all__ = ["End", "check_scheduler", "play"]
 

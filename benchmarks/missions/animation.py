@@ -15,11 +15,11 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.overlay import draw_detections, draw_line
-from aerodaas.types.clock import NANOSECONDS
 
 
 def main(

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import psutil
 
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.recording.reader import Recording
 from aerodaas.simulation.phone import write_log
 from aerodaas.simulation.scenario import load_scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.geometry import GeodeticOrigin
 from missions.catalogue import ADDED, Mission
 
 __all__ = ["Flown", "fly"]

@@ -24,11 +24,11 @@ from _ports import free_port
 
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.simulation.phone import write_log
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import GeodeticOrigin
 from missions.catalogue import ADDED, APPS, MISSIONS
 from missions.criteria import Check
 from missions.evidence import Evidence

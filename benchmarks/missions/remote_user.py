@@ -11,7 +11,7 @@ import sys
 import time
 
 from aerodaas.analytics.remote.client import RemoteClient
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 _PATIENCE = 300.0
 """Wall seconds to wait for the mission to come so far."""

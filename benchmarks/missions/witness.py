@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["Witness"]
 

@@ -30,8 +30,8 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 
 __all__ = [
     "MIGRATED",

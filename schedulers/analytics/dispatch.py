@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Decision,
@@ -19,7 +20,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
     WakeAt,
 )
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["EXECUTOR_DOWN", "Dispatch", "Host"]
 

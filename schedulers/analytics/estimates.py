@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import erf, sqrt
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["TimeEstimate", "TimeEstimates", "chance"]
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from math import exp
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     STOLEN,
@@ -50,7 +51,6 @@ from aerodaas.schedulers.analytics.forecast import LATENESS, Forecast
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, Lane, plan
 from aerodaas.schedulers.analytics.quality import QualityWatch
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["Margin"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import log, pi, sqrt
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,
@@ -15,7 +16,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimates, chance
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["CloudOutlook"]
 

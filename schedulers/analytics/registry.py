@@ -15,8 +15,8 @@ from typing import Any, cast
 
 from aerodaas.config.options import current_options
 from aerodaas.config.plugins import load_plugin, plugin_names
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["load_scheduler", "scheduler_names"]
 

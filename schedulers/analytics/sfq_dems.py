@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Decision,
@@ -23,7 +24,6 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.fair_queue import FairQueue
 from aerodaas.schedulers.analytics.published.dems import Dems
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["SfqDems"]
 

@@ -15,12 +15,12 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import Profile
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PUBLISHED
 from aerodaas.schedulers.lab.trace_errors import bad_line
 from aerodaas.schedulers.lab.workload import Arrival, Segments, Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["TRACE", "read_arrivals"]
 

@@ -16,6 +16,8 @@ from functools import partial
 from statistics import fmean
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.lab.metrics import Mean, mean_of
 from aerodaas.schedulers.lab.network import Network
@@ -24,8 +26,6 @@ from aerodaas.schedulers.lab.significance import SIGNIFICANT, compare, holm
 from aerodaas.schedulers.lab.spreading import Spread
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["CASES", "FULL", "QUICK", "SET", "Case", "Extent", "Leaderboard", "run_leaderboard"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab.network_trace import read_bandwidth
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["Network"]
 

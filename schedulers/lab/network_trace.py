@@ -25,10 +25,10 @@ from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab.trace_errors import bad_line
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["read_bandwidth"]
 

@@ -14,11 +14,11 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Result, TaskOutcome, TaskPlace
 from aerodaas.schedulers.lab.run import LabResult
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["plot_bars", "plot_observations", "plot_timeline"]
 

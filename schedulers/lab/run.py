@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
+from aerodaas.errors import SchedulerError, failure_line
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
@@ -19,7 +20,6 @@ from aerodaas.schedulers.lab.simulator import Trace, simulate
 from aerodaas.schedulers.lab.spreading import Spread, over_processes
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.errors import SchedulerError, failure_line
 
 __all__ = ["LabResult", "Wanted", "run_lab", "scheduler_label"]
 

@@ -9,6 +9,8 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler
@@ -19,8 +21,6 @@ from aerodaas.schedulers.lab.significance import SIGNIFICANT, Comparison, compar
 from aerodaas.schedulers.lab.spreading import Spread, over_processes
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["PARAMETERS", "SweepResult", "run_sweep"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal, cast
 
-from aerodaas.types.errors import SchedulerError
+from aerodaas.errors import SchedulerError
 
 __all__ = ["ExecutionTimes"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aerodaas.types.errors import SchedulerError
+from aerodaas.errors import SchedulerError
 
 __all__ = ["bad_line"]
 

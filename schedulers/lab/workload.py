@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import Profile, Task
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["SIX", "Arrival", "Segments", "Workload"]
 

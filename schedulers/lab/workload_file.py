@@ -18,11 +18,11 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.lab.workload import Arrival, Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["load_workload"]
 

@@ -20,10 +20,10 @@ from aerodaas.dataflow.graph import AeroStreamData, application_line
 from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.geometry import Vector
-from aerodaas.types.records import fast_pickle
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 
 __all__ = ["NavigationEntry", "NavigationSink", "PlanningContext", "TrajectoryScheduler"]
 

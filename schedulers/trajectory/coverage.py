@@ -18,10 +18,10 @@ import shapely
 from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.free_path import FreeArea, Place
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.free_path import FreeArea, Place
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Coverage", "cover", "footprint"]
 

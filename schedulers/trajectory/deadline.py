@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.travel import TravelCosts
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["DeadlineScheduler"]
 

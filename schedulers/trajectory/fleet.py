@@ -8,6 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.schedulers.trajectory.greedy import greedy_route
 from aerodaas.schedulers.trajectory.routing import (
@@ -17,9 +20,6 @@ from aerodaas.schedulers.trajectory.routing import (
     solve_routes,
 )
 from aerodaas.schedulers.trajectory.travel import Matrix, TravelCosts
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["share_out"]
 

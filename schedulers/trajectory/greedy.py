@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.schedulers.trajectory.deadline import DeadlineScheduler
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.travel import Matrix, TravelCosts
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["greedy_route", "route_value"]
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["NearestNeighborScheduler"]
 

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.dataflow.interfaces import IEnvironment
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.exact import shortest_order
 from aerodaas.schedulers.trajectory.greedy import greedy_route, route_value
@@ -20,9 +23,6 @@ from aerodaas.schedulers.trajectory.routing import (
     solve_routes,
 )
 from aerodaas.schedulers.trajectory.travel import Matrix, TravelCosts
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["OptimalScheduler"]
 

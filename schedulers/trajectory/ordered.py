@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["OrderedScheduler"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.config.extras import has_extra
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.trajectory.travel import Matrix
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["MOST_PRIZE", "DroneRoute", "RoutingProblem", "require_solver", "solve_routes"]
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from aerodaas.types.errors import SchedulerError
+from aerodaas.errors import SchedulerError
 
 __all__ = ["SurveyCamera"]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["TravelCosts", "tour_length"]
 

@@ -25,10 +25,10 @@ from test_sites import Desk, Mean  # noqa: E402
 from aerodaas.actors.cluster.ray_cluster import options_for  # noqa: E402
 from aerodaas.actors.dispatch.executor import CloudExecutor  # noqa: E402
 from aerodaas.actors.dispatch.remote_executor import Executor  # noqa: E402
+from aerodaas.messages.envelope import Message  # noqa: E402
+from aerodaas.messages.frames import Frame, Header  # noqa: E402
 from aerodaas.runtime.dispatch.frame_codec import Codec  # noqa: E402
 from aerodaas.runtime.placement import Placement  # noqa: E402
-from aerodaas.types.data import Frame, Header  # noqa: E402
-from aerodaas.types.status import Message  # noqa: E402
 
 FRAMES = 12
 

@@ -8,9 +8,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from aerodaas.actors.streams import Publisher
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.node import Outlet
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message
 
 __all__ = ["child_variables", "send"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors.streams import Subscriber
-from aerodaas.types.data import Frame
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
 
 __all__ = ["Reader", "Seen", "digest"]
 

@@ -12,7 +12,7 @@ from flying import FLAT, Flyer, hop, robot
 from aerodaas import Environment
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 _MOST = 3 << 30
 

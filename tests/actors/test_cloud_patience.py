@@ -15,11 +15,11 @@ from aerodaas.actors.dispatch.executor_pool import ExecutorPool
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteExecutor, RemoteResult
 from aerodaas.actors.streams import encode_message
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message, TraceSpan
 
 
 class _Frozen:

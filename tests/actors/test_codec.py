@@ -13,8 +13,8 @@ from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from aerodaas.actors.streams.codec import Encoded, decode
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.status import Message, TraceSpan
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Frame, Header
 
 
 def _message(item: object) -> Message[object]:

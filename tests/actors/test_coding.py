@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
+from aerodaas.errors import SourceError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.runtime.dispatch.frame_codec import Codec, CodedFrame, decoded
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import SourceError
-from aerodaas.types.status import Message
 
 CODECS = [Codec("none"), Codec("jpeg"), Codec("png")]
 

@@ -23,16 +23,16 @@ from aerodaas.actors.base import NodeActor
 from aerodaas.actors.dispatch.dispatcher import LiveDispatcher
 from aerodaas.actors.run.flight import Flight
 from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
+from aerodaas.messages.frames import Header
 from aerodaas.recording.reader import Recording
 from aerodaas.runtime.dispatch.dispatcher import Managed
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import task_stream
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
 from aerodaas.schedulers.analytics.published.dems import Dems
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.data import Header
 
 pytestmark = pytest.mark.wall_clock
 

@@ -17,13 +17,13 @@ from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.drone.change_signal import ChangeSignal
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import MissionError
+from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.runtime.session import Session
 from aerodaas.service.flights.locks import RobotLocks
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState
 
 _READS = 100_000
 _ON_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.TAKING_OFF}

@@ -22,9 +22,9 @@ from aerodaas.actors.dispatch.executor import (
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Context
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.dispatch.frame_codec import Codec
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message
 
 pytestmark = pytest.mark.wall_clock
 

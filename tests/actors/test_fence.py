@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from aerodaas.errors import SchedulerError
 from aerodaas.runtime.dispatch.guarded_scheduler import GuardedDispatch
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
@@ -20,7 +21,6 @@ from aerodaas.schedulers.analytics.base import (
     Task,
 )
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
-from aerodaas.types.errors import SchedulerError
 
 MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND)
 

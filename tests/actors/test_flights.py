@@ -15,8 +15,8 @@ from one_drone import drone_of, long, odometry_of, short, state_of
 
 from aerodaas import Environment, Odometry
 from aerodaas.dataflow.graph import AeroStreamData
-from aerodaas.types.errors import GraphError, MissionError
-from aerodaas.types.status import MissionState
+from aerodaas.errors import GraphError, MissionError
+from aerodaas.messages.mission import MissionState
 
 pytestmark = pytest.mark.wall_clock
 

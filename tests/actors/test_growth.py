@@ -10,8 +10,8 @@ from analyses import Above, Jitter, Weave
 from flying import Flyer, hop, recorded
 
 from aerodaas import Environment, TrajectoryScheduler, Waypoint
+from aerodaas.messages.mission import MissionState
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.status import MissionState
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

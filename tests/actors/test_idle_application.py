@@ -11,7 +11,7 @@ import ray
 from flying import Flyer, hop
 
 from aerodaas import Environment
-from aerodaas.types.status import MissionState
+from aerodaas.messages.mission import MissionState
 
 pytestmark = pytest.mark.wall_clock
 

@@ -11,7 +11,7 @@ from flying import FLAT, Flyer, hop
 
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
-from aerodaas.types.errors import ConfigError, UnknownIdError
+from aerodaas.errors import ConfigError, UnknownIdError
 
 DISTRIBUTION = "aerodaas_conflicting"
 

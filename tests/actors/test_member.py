@@ -11,8 +11,8 @@ from aerodaas.actors.base import ActorInfo
 from aerodaas.actors.run import flight, member
 from aerodaas.actors.run.flight import Flight
 from aerodaas.actors.run.member import require_clock
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import MissionError
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import MissionError
 
 
 def _info(clock: float) -> ActorInfo:

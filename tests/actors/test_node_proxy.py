@@ -12,8 +12,9 @@ from flying import FLAT, Flyer, hop, recorded, robot
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
 from aerodaas.environment.run import Run
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert, Readings
 from aerodaas.recording.reader import Recording
-from aerodaas.types.data import Alert, Header, Readings
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 5, "settings": {"width": 64, "height": 36}}
 ODOMETRY = {"id": "odom", "type": "odometry", "rate": 10}

@@ -18,11 +18,11 @@ from aerodaas.analytics.base import Context
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
 from aerodaas.dataflow.graph import Node
 from aerodaas.environment.run import Run
+from aerodaas.errors import GraphError
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.recording.reader import Recording
 from aerodaas.runtime.dispatch.offload import allowed, cloud_processes, priced
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
-from aerodaas.types.data import Detection, Detections
-from aerodaas.types.errors import GraphError
 
 pytestmark = pytest.mark.wall_clock
 

@@ -41,7 +41,7 @@ def test_what_is_imported_comes_along(folder: Path) -> None:
 def test_what_is_everywhere_stays(folder: Path) -> None:
     """Python's own, the project's, and what is installed."""
     assert (
-        own_modules(["json", "numpy", "aerodaas.types", "ray", "no_such_module"], [str(folder)])
+        own_modules(["json", "numpy", "aerodaas.messages", "ray", "no_such_module"], [str(folder)])
         == {}
     )
     assert is_installed("pytest")

@@ -14,7 +14,8 @@ from aerodaas.actors.streams import Publisher, Subscriber
 from aerodaas.cameras.base import PlacingCamera
 from aerodaas.cameras.simulated import SimulatedCamera
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.types.data import Frame, Header, Odometry
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 
 _HEIGHT, _WIDTH = 180, 320
 

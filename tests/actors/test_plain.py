@@ -21,9 +21,13 @@ from numpy.typing import NDArray
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.streams.codec import decode, encode
 from aerodaas.actors.streams.plain import NotPlainError, flatten, rebuild
-from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message, MissionState
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
 
 
 class Colour(enum.Enum):

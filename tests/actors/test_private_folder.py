@@ -10,7 +10,7 @@ import pytest
 from required import needs_root
 
 from aerodaas.actors.private_folder import private_folder
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 
 def top(base: Path) -> Path:

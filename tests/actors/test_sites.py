@@ -20,11 +20,11 @@ from aerodaas.actors.dispatch.executor import FRAMES_KEPT, CloudExecutor
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.analytics.base import Context, TimedContext
+from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.dispatch.frame_codec import Codec
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message
 
 pytestmark = pytest.mark.wall_clock
 _JPEG = Codec()

@@ -10,7 +10,7 @@ from publishing import send
 from required import needs
 
 from aerodaas.actors.streams import MAX_DEPTH, Publisher, Subscriber, shared_memory_available
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 
 pytestmark = [
     needs(shared_memory_available(), "needs shared memory: `aerodaas doctor`"),

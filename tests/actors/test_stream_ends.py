@@ -35,8 +35,8 @@ from aerodaas.actors.streams.completion import Publication
 from aerodaas.actors.streams.local_publisher import MAX_BORROWED, LocalPublisher, _ReaderLink
 from aerodaas.actors.streams.slots import Slot, SlotPool
 from aerodaas.actors.streams.wire import IN_SLOT, LONGEST, SLOT, TRAILER, packet, send_descriptors
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 
 pytestmark = needs(shared_memory_available(), "needs shared memory: `aerodaas doctor`")
 
@@ -204,7 +204,7 @@ import sys
 import numpy as np
 from publishing import send
 from aerodaas.actors.streams import Publisher
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 publisher, number = Publisher(sys.argv[1], "s"), 0
 while True:
     send(publisher, np.full(20_000, number), Header(number, number, "camera"), 0)
@@ -241,7 +241,7 @@ import sys, time
 import numpy as np
 from publishing import send
 from aerodaas.actors.streams import Publisher
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 state, frames = Publisher(sys.argv[1], "state"), Publisher(sys.argv[1], "frames")
 for number in range(100_000):
     for publisher, size in ((state, 1), (frames, 1 + number % 2000)):
@@ -426,7 +426,7 @@ _STARVED = """
 import os, resource, sys
 from publishing import send
 from aerodaas.actors.streams import Publisher, Subscriber
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 publisher, old = Publisher(sys.argv[1], "s"), Subscriber(sys.argv[1], {"s": 1})
 new = Subscriber(sys.argv[1], {"s": 1})
 def publish(number):

@@ -28,8 +28,8 @@ from aerodaas.actors.streams import (
     decode_message,
     shared_memory_available,
 )
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 
 pytestmark = [
     needs(shared_memory_available(), "needs shared memory: `aerodaas doctor`"),
@@ -291,7 +291,7 @@ _PUBLISHER = """
 import sys, time
 from publishing import send
 from aerodaas.actors.streams import Publisher
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 publisher = Publisher(sys.argv[1], "s")
 sys.stdin.readline()
 for stamp in range(5):

@@ -23,7 +23,7 @@ from ray.cluster_utils import Cluster  # noqa: E402
 from aerodaas import Analytics, Environment, Frame  # noqa: E402
 from aerodaas.actors.run.flight import Flight  # noqa: E402
 from aerodaas.analytics.base import Context  # noqa: E402
-from aerodaas.types.errors import AeroDaaSError  # noqa: E402
+from aerodaas.errors import AeroDaaSError  # noqa: E402
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 5, "settings": {"width": 64, "height": 36}}
 PLACES = {

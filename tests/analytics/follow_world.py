@@ -10,11 +10,14 @@ import numpy as np
 
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.follow.analytics import FollowAnalytics
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Battery, Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, Vector, body_to_enu, enu_to_body
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import CameraModel, Vector, body_to_enu, enu_to_body
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import VelocityCommand
 
 TELLO = CameraModel.from_fov(1280, 720, math.radians(82.6), mount=(0.1, 0.0, 0.0))
 Path = Callable[[float], tuple[float, float]]

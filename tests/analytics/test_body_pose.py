@@ -16,12 +16,15 @@ from hypothesis import strategies as st
 from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics, fallen, hand_raised
 from aerodaas.analytics.people.debounce import Debounce
 from aerodaas.analytics.people.gestures import GESTURES, GestureClassifier, normalised
+from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.errors import ConfigError, GraphError, ModelError
+from aerodaas.geometry.frames import enu_to_body
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.types.errors import ConfigError, GraphError, ModelError
-from aerodaas.types.geometry import enu_to_body
 
 RATE = 10
 

@@ -13,10 +13,13 @@ from aerodaas.analytics import CarFollowAnalytics, PersonFollowAnalytics, VipFol
 from aerodaas.analytics.boxes import shipped_detector
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.follow.analytics import FollowAnalytics, _is_near
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.waypoints import VelocityCommand
 
 RATE = 10.0
 POSE = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)

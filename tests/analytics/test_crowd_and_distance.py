@@ -13,11 +13,14 @@ from hypothesis import strategies as st
 
 from aerodaas.analytics.monitoring.distance import DistanceAnalytics
 from aerodaas.analytics.people.crowd_density import CrowdDensityAnalytics
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import ConfigError
 from aerodaas.following.ground import GroundView
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import CameraModel, Vector, rotation_from_rpy
+from aerodaas.geometry.frames import CameraModel, Vector, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
 
 DOWN = replace(TELLO, pitch=math.radians(40))
 

@@ -12,10 +12,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.people.falls import FallDetector
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import CameraModel, enu_to_body, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, enu_to_body, rotation_from_rpy
 
 TELLO = CameraModel.from_fov(640, 480, math.radians(55.2), pitch=math.radians(12))
 WIDE = CameraModel.from_fov(640, 360, math.radians(82.6), pitch=math.radians(12))

@@ -22,12 +22,14 @@ from aerodaas.analytics.follow.followers import (
 from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import ConfigError, GraphError
 from aerodaas.following.relative_target import sight
-from aerodaas.types.data import Alert, Detection, Detections, Frame, Odometry
-from aerodaas.types.errors import ConfigError, GraphError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.target import FollowedTarget, TargetState
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.waypoints import FollowedTarget, TargetState, VelocityCommand
 
 
 def circle(speed: float, radius: float = 6.0) -> Path:

@@ -9,7 +9,8 @@ import pytest
 from follow_world import Snapshot, frame
 
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
-from aerodaas.types.data import Detection, Odometry
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.odometry import Odometry
 
 
 def test_a_wall_that_looks_like_a_vest_for_a_moment_is_not_followed() -> None:

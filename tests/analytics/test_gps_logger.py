@@ -19,10 +19,11 @@ from hypothesis import strategies as st
 from aerodaas import Environment
 from aerodaas.analytics.monitoring.gps_logger import GpsLoggerAnalytics
 from aerodaas.analytics.monitoring.gps_rows import parse_track
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.messages.odometry import GpsFix
+from aerodaas.messages.readings import Alert
 from aerodaas.recording.reader import Recording
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, GpsFix
-from aerodaas.types.errors import ConfigError, SourceError
 
 GPX = """<?xml version="1.0"?>
 <gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>

@@ -7,10 +7,10 @@ import numpy as np
 from aerodaas.analytics.detection.box_filter import BoxFilter
 from aerodaas.analytics.detection.tracking import Track
 from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
-from aerodaas.types.appearance import ZONE_BYTES, ZONES
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection
-from aerodaas.types.geometry import Box
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.appearance import ZONE_BYTES, ZONES
+from aerodaas.messages.detections import Detection
 
 HERE, BESIDE, TOUCHING = 300.0, 450.0, 330.0
 """Left edges of boxes 60 pixels wide."""

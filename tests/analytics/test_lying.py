@@ -10,9 +10,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.people.lying import lies
+from aerodaas.geometry.frames import CameraModel, enu_to_body
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
-from aerodaas.types.data import Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, enu_to_body
 
 CAMERA = CameraModel.from_fov(640, 360, math.radians(75), pitch=math.radians(12))
 LEGS_ONLY = slice(0, 11)

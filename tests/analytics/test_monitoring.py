@@ -7,13 +7,15 @@ import pytest
 
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.monitoring.analytics import MonitoringAnalytics
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Battery, Frame, GpsFix, Header, Odometry
-from aerodaas.types.errors import UnknownIdError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import UnknownIdError
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 
 
 class Desk:

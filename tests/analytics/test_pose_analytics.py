@@ -16,8 +16,9 @@ from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
 from aerodaas.analytics.people.crop import GREY, cut_region, square_around
 from aerodaas.analytics.people.pose import PoseAnalytics, body_around
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.errors import ConfigError, GraphError, ModelError
+from aerodaas.errors import ConfigError, GraphError, ModelError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
 from tools.training.labelling import LabellingRenderer
 from tools.training.looks import VariousLooks
 from tools.training.pose_evaluate import PARTS

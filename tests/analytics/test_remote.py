@@ -25,13 +25,13 @@ from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.cli.app import app as cli
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import ConfigError, MissionError, SourceError
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, Command, StreamItem
 from aerodaas.recording.provenance import Provenance
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import ConfigError, MissionError, SourceError
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 pytestmark = pytest.mark.wall_clock
 

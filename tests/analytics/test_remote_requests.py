@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from aerodaas.analytics.remote.app import build_app
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import Answer, Command, StreamItem
-from aerodaas.types.data import Alert
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 STREAM = "drone/remote"
 LIMITS = LimitsConfig(

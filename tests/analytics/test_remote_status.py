@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 
 SHARES = st.floats(0, 1)
 

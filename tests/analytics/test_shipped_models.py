@@ -13,7 +13,7 @@ from required import needs_peer, peer
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.models import DETECTOR, DETECTOR_CLASSES, POSE
-from aerodaas.types.data import Frame, Header
+from aerodaas.messages.frames import Frame, Header
 from tools.training.evaluate import rankings, sightings
 from tools.training.rendering import HELD_OUT, render_world
 

@@ -11,7 +11,7 @@ import pytest
 from aerodaas import AeroData, Alert, Analytics, Detections, Frame, Header
 from aerodaas.analytics import BodyPoseEmergencyAnalytics, TowerInspectionAnalytics
 from aerodaas.analytics.base import Context
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 _FRAME = Frame(Header(3, 7_000, "camera"), np.full((4, 6, 3), 9, np.uint8))
 

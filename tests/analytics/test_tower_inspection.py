@@ -14,13 +14,16 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.inspection.tower_inspection import TowerInspectionAnalytics, inspection_over
+from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.errors import ConfigError, GraphError
 from aerodaas.following.inspection import InspectionPhase
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.errors import ConfigError, GraphError
-from aerodaas.types.geometry import Vector, body_to_enu, enu_to_body
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.geometry.frames import Vector, body_to_enu, enu_to_body
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.waypoints import VelocityCommand
 
 HALF = 1.5
 

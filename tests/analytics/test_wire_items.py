@@ -21,27 +21,19 @@ from hypothesis.extra import numpy as hnp
 
 from aerodaas.analytics.item_json import KNOWN_CLASSES
 from aerodaas.analytics.wire_items import ItemError, pack, unpack
+from aerodaas.cameras.picture_size import MAX_PIXELS
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.appearance import ZONE_BYTES, ZONES
-from aerodaas.types.data import (
-    Alert,
-    Battery,
-    Detection,
-    Detections,
-    Frame,
-    GpsFix,
-    Header,
-    Odometry,
-    Readings,
-)
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.payload import GimbalAttitude
-from aerodaas.types.picture_size import MAX_PIXELS
-from aerodaas.types.status import BatteryOutlook, Decision, MissionState, MissionStatus
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
-from aerodaas.types.waypoints import (
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.appearance import ZONE_BYTES, ZONES
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.mission import BatteryOutlook, Decision, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.payload import GimbalAttitude
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import (
     NavigationType,
     SchedulingType,
     VelocityCommand,

@@ -13,10 +13,10 @@ import pytest
 from flying import Flyer
 from onnx import TensorProto, helper, numpy_helper, save
 
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.recording.report.report import write_report
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "benchmarks"))

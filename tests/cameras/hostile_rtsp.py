@@ -26,8 +26,8 @@ import numpy as np
 
 from aerodaas.cameras.live import LiveSource
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.errors import SourceError
-from aerodaas.types.memory_limit import limit_memory
+from aerodaas.errors import SourceError
+from aerodaas.runtime.memory_limit import limit_memory
 
 _OK = b"RTSP/1.0 200 OK\r\nCSeq: %s\r\nSession: 1\r\n"
 _SDP = (

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.folder import FolderCamera
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 
 ENVIRONMENT = EnvironmentConfig(robots=[RobotConfig(id="drone")])
 PERIOD = NANOSECONDS // 10

@@ -17,7 +17,7 @@ from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 _MEMORY = 400 * 2**20
 _SERVER = Path(__file__).with_name("hostile_rtsp.py")

@@ -12,7 +12,7 @@ import pytest
 
 from aerodaas.cameras.folder import FolderCamera
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 
 def _png(width: int, height: int) -> bytes:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from aerodaas.cameras.base import Camera
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
 from aerodaas.config.plugins import load_plugin
+from aerodaas.errors import SourceError
 from aerodaas.recording.replay.mcap_camera import McapCamera
-from aerodaas.types.errors import SourceError
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000

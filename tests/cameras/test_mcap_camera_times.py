@@ -14,13 +14,14 @@ from mcap.writer import Writer
 
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.replay.mcap_camera import McapCamera
-from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import ConfigError, SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000

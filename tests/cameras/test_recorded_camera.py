@@ -10,7 +10,7 @@ from aerodaas.cameras.folder import FolderCamera
 from aerodaas.cameras.recorded import recorded_camera
 from aerodaas.cameras.video import VideoCamera
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 

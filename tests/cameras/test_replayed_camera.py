@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.replay.mcap_camera import ReplayedCamera
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.status import Message
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 MS = 1_000_000

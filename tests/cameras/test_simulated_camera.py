@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from aerodaas.cameras.base import Camera, ZoomingCamera
 from aerodaas.cameras.simulated import SimulatedCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.messages.odometry import Odometry
 
 POSE = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.8)
 

@@ -18,7 +18,7 @@ from aerodaas.cameras.base import Camera
 from aerodaas.cameras.h264 import FrameAssembler, FrameDecoder
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.drivers.tello.camera import TelloCamera
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 from tools.tello_vehicle.video import packets
 
 pytestmark = pytest.mark.wall_clock

@@ -24,10 +24,10 @@ from aerodaas.cameras import live
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 
 pytestmark = pytest.mark.wall_clock
 
@@ -65,7 +65,7 @@ def test_a_damaged_file_is_told_by_us_alone(tmp_path: Path) -> None:
     code = (
         "from aerodaas.cameras.video_file import VideoFile\n"
         "from aerodaas.config.secrets import SecretUrl\n"
-        "from aerodaas.types.errors import SourceError\n"
+        "from aerodaas.errors import SourceError\n"
         f"try: VideoFile(SecretUrl({str(broken)!r}), 5.0, loop=False).open()\n"
         "except SourceError: print('told')"
     )

@@ -12,8 +12,8 @@ import pytest
 from aerodaas.cli.app import main
 from aerodaas.cli.shipped import TEMPLATES, find_application, purpose, shipped_applications
 from aerodaas.environment.document.flying import compile_application
+from aerodaas.errors import ConfigError, MissionError
 from aerodaas.testing.flight import fly
-from aerodaas.types.errors import ConfigError, MissionError
 
 Command = Callable[..., tuple[int, str, str]]
 TEMPLATE_NAMES = sorted(path.parent.name for path in TEMPLATES.glob("*/my_app.py"))

@@ -17,7 +17,7 @@ import math
 from dataclasses import replace
 from aerodaas import *
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.types.data import Battery
+from aerodaas.messages.odometry import Battery
 
 class Mine(Analytics[int]):
     accepts = (Odometry,)

@@ -16,9 +16,9 @@ from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.health import MeasuredVehicle
-from aerodaas.types.vehicle import Vehicle, VehicleMode
+from aerodaas.errors import VehicleError
+from aerodaas.messages.health import MeasuredVehicle
+from aerodaas.messages.vehicle import Vehicle, VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 from tools.tello_vehicle import EmulatedTello
 

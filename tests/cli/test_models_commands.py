@@ -17,7 +17,7 @@ from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.models.registry import REGISTRY
 from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.cli.app import app
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 
 @pytest.fixture

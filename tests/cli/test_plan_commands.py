@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from aerodaas.cli.app import app
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.dataflow.plans.reading import read_plan
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 LINES = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t488.0\t1

@@ -16,8 +16,8 @@ from provider_stub import MISSION, TOKEN, Stub, mission
 from aerodaas.cli.app import main
 from aerodaas.environment.provider import pauses
 from aerodaas.environment.provider.logins import Logins
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.types.errors import AeroDaaSError
 
 APP = """
 import sys

@@ -19,7 +19,7 @@ from aerodaas.cli.app import app
 from aerodaas.cli.sim import _home
 from aerodaas.drivers.mavlink.sitl.process import SitlProcess
 from aerodaas.drivers.mavlink.sitl.programs import PROGRAMS, SimulatedHome, SitlOptions
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 
 SPEAKS = """#!{python}
 import json, os, pathlib, socket, subprocess, sys, time

@@ -12,7 +12,7 @@ from aerodaas import Analytics, Frame, Odometry
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
 
 __all__ = ["Glance", "NoiseCamera"]
 

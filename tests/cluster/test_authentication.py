@@ -18,7 +18,7 @@ from aerodaas.actors.cluster.authentication import (
     require_token,
 )
 from aerodaas.actors.cluster.ray_variables import UNAUTHENTICATED, set_variables
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 
 NAMES = ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH", UNAUTHENTICATED)
 NOBODY = 65534

@@ -18,8 +18,8 @@ from required import needs, needs_root
 
 from aerodaas.actors.cluster.authentication import UNAUTHENTICATED
 from aerodaas.actors.cluster.probe import clock_offset
+from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
-from aerodaas.types.errors import ConfigError
 from tools.namespaces import EdgeCloud, Shape
 from tools.namespaces.ray_node import environment
 from tools.namespaces.trace import TracePlayer

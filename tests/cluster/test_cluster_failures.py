@@ -16,8 +16,8 @@ from flying import Flyer
 from required import needs_root
 
 from aerodaas.actors.cluster import ray_cluster as cluster
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState
+from aerodaas.errors import MissionError
+from aerodaas.messages.mission import MissionState
 from tools.namespaces import EdgeCloud, Shape
 
 pytestmark = [

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.namespaces.relay import RelayDirection
 from tools.namespaces.shape import Shape, parse_bandwidth, parse_time
 

@@ -15,7 +15,7 @@ from certificates import make_certificates, tls_variables
 from required import needs
 
 from aerodaas.actors.cluster.encryption import require_same_encryption
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 
 pytestmark = needs(shutil.which("openssl"), "install openssl")
 HERE, ELSEWHERE = "127.0.0.1", "127.0.0.2"

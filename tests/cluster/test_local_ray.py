@@ -14,7 +14,7 @@ import pytest
 from aerodaas.actors.cluster import local_ray
 from aerodaas.actors.cluster.head_watch import answers
 from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 
 @pytest.mark.slow

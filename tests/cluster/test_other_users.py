@@ -25,7 +25,7 @@ _STREAM = """
 import numpy as np
 from aerodaas.actors.streams import Publisher, Subscriber, shared_memory_obstacle
 from aerodaas.runtime.node import Outlet
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 print(shared_memory_obstacle() or "available")
 if not shared_memory_obstacle():
     subscriber = Subscriber("of-a-second-user", {"frames": 4})

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from aerodaas.config.annotations import is_subclass
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig, validated
 from aerodaas.config.overrides import located, overridden, parse_setting
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 ROOT = Path(__file__).parents[2]
 names = st.from_regex(r"[A-Za-z][A-Za-z0-9_\-]{0,10}", fullmatch=True)

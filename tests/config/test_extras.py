@@ -8,8 +8,8 @@ import pytest
 
 from aerodaas.analytics import RemoteAnalytics
 from aerodaas.config.extras import has_extra, require_extra
+from aerodaas.errors import ConfigError, SchedulerError
 from aerodaas.schedulers.trajectory.routing import require_solver
-from aerodaas.types.errors import ConfigError, SchedulerError
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.overrides import parse_setting
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 ROBOT = '{"robots": [{"id": "d", "settings": {"x": %s}}]}'
 

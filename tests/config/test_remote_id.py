@@ -15,7 +15,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.traffic import TrafficConfig
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 EXAMPLE = "FIN87astrdge12k8-xyz"
 """EN 4709-002's own."""

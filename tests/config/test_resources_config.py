@@ -9,7 +9,7 @@ import pytest
 
 from aerodaas.config.model import ComputeConfig, validated
 from aerodaas.config.overrides import located, overridden
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 FN = {"id": "fn", "kind": "http", "endpoint": {"url": "https://example.org/detect"}}
 

@@ -20,9 +20,9 @@ from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, validated
 from aerodaas.config.overrides import parse_setting
 from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name, shown_text
+from aerodaas.errors import ConfigError
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.errors import ConfigError
 
 SECRETS = st.text(
     string.ascii_letters + string.digits + "/:@?&=+%-_~", min_size=16, max_size=40

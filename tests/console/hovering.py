@@ -12,14 +12,14 @@ import numpy as np
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.console.server import ConsoleServer
 from aerodaas.dataflow.graph import Graph
+from aerodaas.errors import MissionError
+from aerodaas.messages.health import HealthReport
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import Traffic, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.types.data import Alert, Battery, GpsFix, Odometry
-from aerodaas.types.errors import MissionError
-from aerodaas.types.health import HealthReport
-from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Run", "console"]
 

@@ -14,10 +14,10 @@ from hovering import console
 
 from aerodaas.console.server import ConsoleServer
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.status import Message
-from aerodaas.types.target import FollowedTarget, TargetState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
 
 __all__ = ["SHOWN", "Reader", "camera_console", "require_own_frames"]
 

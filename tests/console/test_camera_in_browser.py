@@ -9,7 +9,7 @@ from camera_pages import COUNT_DECODED, DECODES, opened_camera
 from required import needs_peer
 from scripted_camera import SHOWN, Reader, camera_console, require_own_frames
 
-from aerodaas.types.target import TargetState
+from aerodaas.messages.waypoints import TargetState
 from tools.browser import Browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

@@ -17,13 +17,13 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.console.access import bearer
 from aerodaas.console.server import ConsoleServer
+from aerodaas.errors import ConfigError
+from aerodaas.messages.health import HealthItem, HealthReport, Verdict
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.health import HealthItem, HealthReport, Verdict
-from aerodaas.types.waypoints import Waypoint
 
 HOVER = {"robot": "drone", "command": "pause"}
 

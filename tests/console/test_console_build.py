@@ -13,11 +13,12 @@ from scripted_camera import camera_console
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.console.viewer import RecordingServer
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message, MissionState, MissionStatus
 from tools.browser import Browser, Page
 from tools.wire_schema import SCHEMA, schema_text
 

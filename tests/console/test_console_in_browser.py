@@ -13,10 +13,11 @@ from hovering import console
 from pages import button, click_map, passed, until_done, until_state
 from required import needs_peer
 
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.health import HealthItem, HealthReport, Verdict
-from aerodaas.types.traffic import Traffic
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.frames import Header
+from aerodaas.messages.health import HealthItem, HealthReport, Verdict
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import Traffic
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

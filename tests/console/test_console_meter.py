@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from aerodaas.console.meter import FlightMeter
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import AnalyticsOut
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import ActorReport, FlightState

@@ -23,6 +23,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.console import controls, surveys
 from aerodaas.console.controls import Freshness
 from aerodaas.console.server import ConsoleServer
+from aerodaas.errors import ConfigError, SchedulerError
 from aerodaas.mission.commands import (
     Answer,
     Command,
@@ -31,7 +32,6 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.types.errors import ConfigError, SchedulerError
 
 FIELD = [[0, 0], [20, 0], [20, 10], [0, 10]]
 SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"}

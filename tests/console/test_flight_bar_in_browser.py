@@ -12,8 +12,9 @@ from hovering import Run, console
 from pages import button, until_done, until_state
 from required import needs_peer
 
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.status import MissionState
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.readings import Alert
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

@@ -20,7 +20,7 @@ from map_archives import archive_bytes, colour_of, tiles_around, write_archive
 from pages import click_map, until_state
 from required import needs_peer
 
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.geometry.frames import GeodeticOrigin
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

@@ -18,11 +18,13 @@ from played import served
 from required import needs_peer
 from standing_person import PERSON, write_flight
 
-from aerodaas.types import data
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages import frames as data
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

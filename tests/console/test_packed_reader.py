@@ -16,13 +16,14 @@ from aerodaas.analytics.wire_items import unpack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.console.packed_reader import PackedReader, ground_of
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
-from aerodaas.types.target import FollowedTarget, TargetState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
 SOURCE = "drone/cam"
 SECOND = 10**9

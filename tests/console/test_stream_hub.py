@@ -16,10 +16,10 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.console import packed_reader
 from aerodaas.console.hub import StreamHub, Watcher
 from aerodaas.console.packed_reader import PackedReader
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.recording.h264 import H264Encoder
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.status import Message
 
 GROUP = 30
 """Pictures from one key frame to the next."""

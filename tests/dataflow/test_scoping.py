@@ -14,12 +14,12 @@ from aerodaas import AeroListData, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.config.model import validated
 from aerodaas.config.overrides import overridden
+from aerodaas.errors import AmbiguousIdError, ConfigError, GraphError, UnknownIdError
+from aerodaas.identifiers import find_scoped, short, told
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.runtime.plan import FlightPlan, make_plan
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.registry import load_scheduler
-from aerodaas.types.errors import AmbiguousIdError, ConfigError, GraphError, UnknownIdError
-from aerodaas.types.identifiers import find_scoped, short, told
 
 CAMERA = {"id": "cam", "rate": 5, "settings": {"width": 64, "height": 36}}
 FLEET: dict[str, Any] = {

@@ -9,19 +9,21 @@ import pytest
 
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, RobotConfig
 from aerodaas.config.plugins import load_plugin
-from aerodaas.recording.provenance import Provenance
-from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.replay.vehicle import ReplayedVehicle
-from aerodaas.types.data import Battery, GpsFix, Header, Odometry
-from aerodaas.types.errors import ConfigError, RecordingError, VehicleError
-from aerodaas.types.status import Message, MissionState, MissionStatus
-from aerodaas.types.vehicle import (
+from aerodaas.errors import ConfigError, RecordingError, VehicleError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.vehicle import (
     FlightEnd,
     PlayedVehicle,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.replay.vehicle import ReplayedVehicle
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 STEP = 50_000_000

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig, HomeConfig, RobotConfig, SimulationConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.types.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.vehicle import (
+from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.messages.vehicle import (
     FlightEnd,
     PositionSetpoint,
     SteppedVehicle,

@@ -10,7 +10,7 @@ import pytest
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.dataflow.mission_document import WaypointEntry
-from aerodaas.types.errors import ConfigError, GraphError, InvalidWaypointError
+from aerodaas.errors import ConfigError, GraphError, InvalidWaypointError
 
 CARRIED: list[dict[str, Any]] = [
     {"id": "hook", "type": "gripper"},

@@ -10,8 +10,8 @@ from flying import FLAT, Flyer, hop, recorded, robot
 from required import needs_python
 
 from aerodaas import AeroNavigation, Environment, Waypoint
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.status import MissionState
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.messages.mission import MissionState
 
 _TWO = {**FLAT, "robots": [robot("west", start=[-20, 0, 0]), robot("east", start=[20, 0, 0])]}
 

@@ -22,15 +22,15 @@ from aerodaas.config.grants import parse_words
 from aerodaas.config.options import current_options
 from aerodaas.environment.guests import admit_guests
 from aerodaas.environment.run import Run
+from aerodaas.errors import ConfigError
+from aerodaas.messages.readings import Readings
 from aerodaas.recording.reader import Recording
-from aerodaas.types.data import Readings
-from aerodaas.types.errors import ConfigError
 
 HEAD = """
 import os, sys, time
 from aerodaas import AeroListData, AeroNavigation, Analytics, Environment, Odometry, Waypoint
 from aerodaas.analytics import NavigableAnalytics, RemoteAnalytics
-from aerodaas.types.data import Readings
+from aerodaas.messages.readings import Readings
 
 env = Environment("environment.json")
 drone = env.get_robot_by_id("drone")

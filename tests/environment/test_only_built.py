@@ -14,7 +14,7 @@ from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.document.flying import compile_application
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.guests import admit_guests
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 APPLICATION = """
 from pathlib import Path

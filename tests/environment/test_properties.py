@@ -12,8 +12,8 @@ from flying import FLAT, robot
 from pydantic import BaseModel
 
 from aerodaas import AeroNavigation, Environment, NearestNeighborScheduler
-from aerodaas.types.errors import ConfigError, SchedulerError, UnknownIdError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError, SchedulerError, UnknownIdError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 CAMERA = {"id": "cam", "rate": 5, "settings": {"width": 64}}
 COMPUTE = [

@@ -24,10 +24,10 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.mission.rehearsal import rehearse
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
 
 CAMERA = {"id": "cam", "rate": 5, "settings": {"width": 64, "height": 36}}
 FENCE = {"geofence": {"polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]]}}

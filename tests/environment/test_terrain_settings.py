@@ -13,10 +13,10 @@ from aerodaas import AeroNavigation, Waypoint
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.overrides import located
 from aerodaas.environment.fleet import shared_waypoints
+from aerodaas.errors import ConfigError, InvalidWaypointError
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.mission.rehearsal import rehearse
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.errors import ConfigError, InvalidWaypointError
 
 HOME = {"latitude": 47.5, "longitude": 8.5, "altitude": 590.0}
 HIGH: dict[str, Any] = {"limits": {"takeoff_height": 10.0}}

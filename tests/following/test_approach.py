@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from aerodaas.following.approach import ApproachLimit, closing_speed
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 LIMITS = FollowLimits()
 GAPS = st.floats(-3.0, 30.0)

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from aerodaas.following.clearance import Clearance, surfaces
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.data import Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 
 LIMITS = FollowLimits()
 CAMERA = CameraModel.from_fov(640, 360, math.radians(80), mount=(0.1, 0.05, 0.08), pitch=0.2)

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following import contact_guard
 from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.target_motion import seen_from
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, body_to_enu, enu_to_body
+from aerodaas.geometry.frames import Vector, body_to_enu, enu_to_body
+from aerodaas.messages.odometry import Odometry
 
 LIMITS = FollowLimits()
 INTERVAL = 0.1

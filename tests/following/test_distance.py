@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from flights import KinematicVehicle, add, flight, length, square
 
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VehicleState
 
 
 class TremblingVehicle(KinematicVehicle):

@@ -11,15 +11,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following import follow_controller
 from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_controller import FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
 from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.waypoints import VelocityCommand
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.waypoints import VelocityCommand
 
 LIMITS = FollowLimits()
 

@@ -12,9 +12,11 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from aerodaas.following.ground_point import GroundPoint, ground_point
+from aerodaas.geometry.frames import CameraModel, Vector, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, Vector, rotation_from_rpy
 
 WIDE, TALL = 1280, 720
 FULL = math.tau / 2

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following.inspection import InspectionController, InspectionPlan
 from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 TOWER, WALL = 30.0, 12.0
 """Metres ahead of where it begins."""

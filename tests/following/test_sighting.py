@@ -11,8 +11,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.following.relative_target import TargetSize, sight
-from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import Box, CameraModel, rotation_from_rpy
+from aerodaas.geometry.frames import Box, CameraModel, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 
 PERSON = TargetSize(1.7, 0.5)
 WIDE, TALL = 1280, 720

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion, seen_from
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 
 STOP = 25
 

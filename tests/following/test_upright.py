@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.following.upright import Upright
-from aerodaas.types.clock import NANOSECONDS
 
 
 def looks(heights: list[float], rate: float, distance: float = 2.0) -> list[bool]:

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from aerodaas.drivers.pin import Peer, Pin
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.types.geometry import Vector
-from aerodaas.types.status import MissionState
 from tools.fuzz.flight import ViolationError
 from tools.fuzz.records import record
 from tools.fuzz.targets import http, mavlink, tello

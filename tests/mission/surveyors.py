@@ -8,16 +8,11 @@ from dataclasses import dataclass, field
 
 from flights import PERIOD, Flight, KinematicVehicle
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.mission.commands import AddNavigation, Start
-from aerodaas.mission.loop import SetpointLoop
-from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
-from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.payload import (
+from aerodaas.messages.payload import (
     GimbalAttitude,
     GimbalTarget,
     LensTarget,
@@ -25,8 +20,13 @@ from aerodaas.types.payload import (
     PhotoFailure,
     PhotoOutcome,
 )
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 __all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated", "surveying"]
 

@@ -18,12 +18,12 @@ from aerodaas.config.actuators import (
     ServoConfig,
 )
 from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.errors import VehicleError
+from aerodaas.messages.actuators import MoveResult
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Actuate, Pause, ReleaseParachute, Resume, ReturnHome
-from aerodaas.types.actuators import MoveResult
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import Waypoint
 
 CARRIED: list[ActuatorConfig] = [
     GripperConfig(id="hook", type="gripper"),

@@ -6,10 +6,10 @@ import pytest
 from flights import Flight, KinematicVehicle, add, flight
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.messages.mission import BatteryOutlook
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Pause, ReturnHome
-from aerodaas.types.status import BatteryOutlook
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import Waypoint
 
 _LIMITS = LimitsConfig(endurance=300.0, battery_return=0.15, battery_land=0.1)
 

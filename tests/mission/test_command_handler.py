@@ -8,9 +8,14 @@ from typing import Any
 import pytest
 from flights import Flight, add, flight, live, navigation, square
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import LimitsConfig
 from aerodaas.dataflow.graph import AeroStreamData, Graph
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import (
     AddNavigation,
     Answer,
@@ -20,11 +25,6 @@ from aerodaas.mission.commands import (
     StreamItem,
 )
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Header
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 SEEN = Header(7, 3, "drone/camera")
 

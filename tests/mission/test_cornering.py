@@ -13,10 +13,15 @@ from flights import PERIOD, Flight, KinematicVehicle, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.actuators import ServoConfig
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.geometry.braking import braking_distance, braking_speed
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause, Resume, Start
 from aerodaas.mission.cornering import corner_speed, passing_speed
 from aerodaas.mission.loop import SetpointLoop
@@ -24,11 +29,6 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner, Plan
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.braking import braking_distance, braking_speed
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint
-from aerodaas.types.waypoints import Waypoint
 
 LIMITS = LimitsConfig(cruise_speed=2.0, arrival_radius=0.5)
 ROW = [Waypoint(f"w{number}", 10.0 * number, 0.0, 2.0) for number in range(1, 4)]

@@ -8,12 +8,12 @@ from flights import Flight, flight, live
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand
 from aerodaas.mission.commands import Pause, Resume, ReturnHome, StreamItem
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.types.data import Odometry
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
 LIMITS = LimitsConfig(max_speed=4.0, max_climb=1.5, max_acceleration=3.0)
 STEP = 0.05

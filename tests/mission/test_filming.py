@@ -8,19 +8,19 @@ import pytest
 from flights import PERIOD, Flight, KinematicVehicle, add, flight
 from surveyors import Camera, Surveyor, surveying
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, MissionConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.errors import VehicleError
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.payload import PhotoOutcome, VideoCamera
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, End, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import PhotoOutcome, VideoCamera
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
 
 BEGIN = Waypoint("north", 0, 5, 2, video=True)
 FINISH = Waypoint("east", 5, 5, 2, video=False)

@@ -11,15 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from surveyors import Gimbal, Surveyor, lost, simulated
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import MissionConfig
+from aerodaas.geometry.frames import rotation_from_rpy, wrap_angle
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import GimbalTarget
+from aerodaas.messages.vehicle import PositionSetpoint
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.gaze import Gaze, direction_to
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import rotation_from_rpy, wrap_angle
-from aerodaas.types.payload import GimbalTarget
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import PositionSetpoint
-from aerodaas.types.waypoints import Waypoint
 
 coordinate = st.floats(-500.0, 500.0)
 place = st.tuples(coordinate, coordinate, coordinate)

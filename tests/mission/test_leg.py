@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.robot import LimitsConfig
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable
 from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 
 def stop(

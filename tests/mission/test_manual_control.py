@@ -7,6 +7,9 @@ import pytest
 from flights import Flight, add, flight
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
+from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from aerodaas.mission.commands import (
     End,
     Pause,
@@ -17,9 +20,6 @@ from aerodaas.mission.commands import (
     TakeControls,
 )
 from aerodaas.mission.manual import MANUAL_SECONDS
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
-from aerodaas.types.waypoints import VelocityCommand, Waypoint
 
 ASHA = TakeControls("asha", 7)
 BINA = TakeControls("bina", 8)

@@ -8,10 +8,10 @@ from flights import add, flight, length, live, navigation, square
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import ClearNavigation, Command, StreamItem
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 FARM = LimitsConfig(cruise_speed=0.5)
 

@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from flights import Flight, KinematicVehicle, add, flight, live, square
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
 from aerodaas.mission.planner import BackgroundPlanner
 from aerodaas.mission.queue import WaypointQueue
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 
 def alerts(one: Flight, kind: str) -> list[str]:

@@ -15,6 +15,12 @@ from hypothesis import strategies as st
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import MissionError, VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import (
     AddNavigation,
     End,
@@ -29,12 +35,6 @@ from aerodaas.mission.planner import BackgroundPlanner
 from aerodaas.mission.state_machine import TERMINAL, TRANSITIONS, MissionStateMachine, mermaid
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.types.data import Header
-from aerodaas.types.errors import MissionError, VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 FENCE = LimitsConfig(
     geofence=GeofenceConfig(polygon=[(-5, -5), (25, -5), (25, 25), (-5, 25)], ceiling=10.0)

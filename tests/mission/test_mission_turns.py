@@ -11,6 +11,10 @@ from flights import PERIOD, KinematicVehicle, add, flight, live, square
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import VehicleError
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import (
     Answer,
     End,
@@ -23,10 +27,6 @@ from aerodaas.mission.commands import (
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 
 class Asked(TrajectoryScheduler):

@@ -12,16 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from surveyors import Surveyor, lost, simulated
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import Photo
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
 from aerodaas.mission.shutter import Shutter
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.payload import Photo
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
 
 TURN = NANOSECONDS // 20
 

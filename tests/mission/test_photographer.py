@@ -9,10 +9,10 @@ from flights import Flight, KinematicVehicle, add, flight
 from surveyors import Surveyor, lost
 
 from aerodaas.config.model import MissionConfig
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import GimbalTarget, LensTarget
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.errors import VehicleError
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.payload import GimbalTarget, LensTarget
+from aerodaas.messages.waypoints import Waypoint
 
 DOWN = -math.pi / 2
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.queue import WaypointQueue
-from aerodaas.types.errors import InvalidWaypointError
-from aerodaas.types.waypoints import Waypoint
 
 
 def waypoint(name: str, priority: int = 5, hover: float = 0.0) -> Waypoint:

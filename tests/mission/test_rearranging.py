@@ -7,11 +7,11 @@ from flights import Flight, add, flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import RearrangeNavigation, ReturnHome
 from aerodaas.mission.queue import WaypointQueue
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import Waypoint
 
 
 def row(*names: str, hover: float = 0.0, priority: int = 5) -> list[Waypoint]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.errors import MissionError
+from aerodaas.messages.mission import MissionState
 from aerodaas.mission.state_machine import TRANSITIONS, MissionStateMachine, mermaid
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState
 
 
 def test_a_change_is_dated_and_has_its_reason() -> None:

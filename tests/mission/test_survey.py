@@ -11,10 +11,10 @@ import shapely
 from flights import add, flight, length
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.mission import MissionState as S
 from aerodaas.mission.survey import MOST_CORNERS, SurveySettings, plan_survey
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.status import MissionState as S
 
 FENCE = GeofenceConfig(polygon=[(-20, -20), (40, -20), (40, 40), (-20, 40)], ceiling=20)
 ZONE = [(8.0, 8.0), (12.0, 8.0), (12.0, 12.0), (8.0, 12.0)]

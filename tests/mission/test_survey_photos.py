@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from surveyors import simulated, surveying
 
+from aerodaas.errors import ConfigError, SchedulerError
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.survey import SurveySettings, plan_survey
 from aerodaas.mission.survey_photos import SurveyPhotos, planned_photos, survey_camera
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
-from aerodaas.types.errors import ConfigError, SchedulerError
-from aerodaas.types.waypoints import Waypoint
 
 FIELD = [(0.0, 0.0), (50.0, 0.0), (60.0, 30.0), (0.0, 30.0)]
 DOWN = {"pitch": 90, "horizontal_fov": 60, "width": 4000, "height": 3000}

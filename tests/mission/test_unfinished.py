@@ -8,9 +8,9 @@ import pytest
 from flights import Flight, KinematicVehicle, add, flight, live, square
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Command, End, ReturnHome
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import Waypoint
 
 FAR = Waypoint("far", 40, 0, 1.5)
 

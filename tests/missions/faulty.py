@@ -19,8 +19,8 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics.base import Context
+from aerodaas.clock import seconds
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.clock import seconds
 
 __all__ = ["DyingScheduler", "Forward", "HangingScheduler", "Mortal", "RaisingScheduler", "Stuck"]
 

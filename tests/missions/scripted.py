@@ -23,8 +23,8 @@ from aerodaas import (
 )
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.remote.client import RemoteClient
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.clock import seconds
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["Drift", "RemoteUser", "ScriptedDetector", "free_port"]
 

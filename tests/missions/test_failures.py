@@ -26,9 +26,9 @@ from aerodaas import AeroNavigation, Environment, NavigationType, TrajectorySche
 from aerodaas.actors.cluster.ray_process import VARIABLE
 from aerodaas.analytics import RemoteAnalytics
 from aerodaas.environment.run import Run
+from aerodaas.errors import MissionError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.errors import MissionError
 
 pytestmark = pytest.mark.wall_clock
 

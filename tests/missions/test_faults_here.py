@@ -28,10 +28,10 @@ from aerodaas.actors.run import flight
 from aerodaas.actors.run.member import ask
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.environment.run import Run
+from aerodaas.errors import MissionError
+from aerodaas.messages.mission import MissionState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState
 from tools.namespaces.machine import run
 
 pytestmark = pytest.mark.wall_clock

@@ -10,12 +10,12 @@ from flying import FLAT, Flyer, recorded, robot
 from numpy.typing import NDArray
 
 from aerodaas import AeroNavigation, Environment, Waypoint
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
 from aerodaas.terrain.ground import Ground
 from aerodaas.terrain.terrain import Terrain
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.vehicle import VehicleMode
 
 Array = NDArray[np.float64]
 

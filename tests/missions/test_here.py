@@ -23,9 +23,9 @@ from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.document.building import build_mission
+from aerodaas.errors import MissionError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.errors import MissionError
 
 USER = Path(__file__).with_name("here_user.py")
 APPLICATION = '''

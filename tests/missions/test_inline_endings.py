@@ -17,10 +17,10 @@ from flying import FLAT, Flyer, hop
 
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
+from aerodaas.errors import MissionError
+from aerodaas.messages.readings import Readings
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.data import Readings
-from aerodaas.types.errors import MissionError
 
 _APP = """
 import sys

@@ -14,8 +14,8 @@ from aerodaas.analytics.remote.app import _COMMANDS
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.plugins import plugin_names
 from aerodaas.environment.run import Run
+from aerodaas.messages.mission import MissionState
 from aerodaas.mission.state_machine import mermaid
-from aerodaas.types.status import MissionState
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")

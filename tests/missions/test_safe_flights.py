@@ -9,7 +9,7 @@ import pytest
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import AeroNavigation, Environment, VelocityCommand, Waypoint
-from aerodaas.types.errors import InvalidWaypointError, MissionError
+from aerodaas.errors import InvalidWaypointError, MissionError
 
 
 def test_two_drones_keep_their_distance(flyer: Flyer) -> None:

@@ -17,7 +17,7 @@ from aerodaas import Environment
 from aerodaas.config.options import RunOptions
 from aerodaas.console.server import ConsoleServer
 from aerodaas.environment.run import Run
-from aerodaas.types.errors import ConfigError, MissionError
+from aerodaas.errors import ConfigError, MissionError
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))

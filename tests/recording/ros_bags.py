@@ -10,9 +10,9 @@ import numpy as np
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.ros.typestore import ros_types
-from aerodaas.types.data import Odometry
 
 EPOCH = 1_750_000_000_000_000_000
 SECOND = 1_000_000_000

@@ -13,31 +13,24 @@ import numpy as np
 
 from aerodaas.config.model import GeofenceConfig, RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.recording.outcome import RecordingSummary
-from aerodaas.recording.provenance import Provenance
-from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import (
-    Alert,
-    Battery,
-    Detection,
-    Detections,
-    Frame,
-    GpsFix,
-    Header,
-    Odometry,
-)
-from aerodaas.types.geometry import CameraModel, GeodeticOrigin
-from aerodaas.types.status import (
+from aerodaas.geometry.frames import CameraModel, GeodeticOrigin
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import (
     BatteryOutlook,
     Decision,
-    Message,
     MissionState,
     MissionStatus,
     SetpointRecord,
-    TraceSpan,
 )
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
+from aerodaas.recording.outcome import RecordingSummary
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.recorder import FlightRecorder
 
 MILLISECOND = 1_000_000
 HOME = GeodeticOrigin(12.97, 77.59, 900.0)

@@ -14,10 +14,10 @@ from mcap.reader import SeekingReader
 from mcap.writer import Writer
 from mcap_files import END, KINDS, Said, write_file
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording import attaching as module
 from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import RecordingError
 
 SAID = [Said(f"/{number % 3}", number * 1000 + 10, number) for number in range(300)]
 LOG = os.urandom(3_000_000)

@@ -10,9 +10,10 @@ from mcap.reader import make_reader
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Header, Odometry
-from aerodaas.types.status import Message
 
 _CHUNKS = 300
 

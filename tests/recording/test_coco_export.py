@@ -12,16 +12,17 @@ import pytest
 from pycocotools.coco import COCO
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.export.coco import write_coco
 from aerodaas.recording.pictures import detections, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
 
 
 @pytest.mark.parametrize("images", ["jpeg", "h264"])

@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+from aerodaas.messages.frames import Header
 from aerodaas.recording.pictures import Shot, decoded_ahead
 from aerodaas.recording.reader import Record
-from aerodaas.types.data import Header
 
 
 class Stuck:

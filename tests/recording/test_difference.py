@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.mission import Decision
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.detection_diff import box_shift
 from aerodaas.recording.report.difference import difference
-from aerodaas.types.data import Detections
-from aerodaas.types.status import Decision, Message
 
 
 def write(path: Path, messages: list[Message[Any]]) -> Path:

@@ -19,12 +19,12 @@ from mcap.writer import Writer
 from synthetic_flight import HOME, PLAN, SyntheticFlight, record
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.export.tabular import table_of, write_csv, write_parquet
 from aerodaas.recording.export.track import write_gpx, write_kml
 from aerodaas.recording.export.video import write_videos
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import RecordingError
 
 GPX = "{http://www.topografix.com/GPX/1/1}"
 KML = "{http://www.opengis.net/kml/2.2}"

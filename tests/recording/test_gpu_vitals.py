@@ -11,13 +11,12 @@ import pytest
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.vitals import _nvml, read_vitals
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.data import Header
-from aerodaas.types.gpu import _nvml
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import read_vitals
 
 
 class Nvml:

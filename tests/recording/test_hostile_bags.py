@@ -12,14 +12,15 @@ import pytest
 import zstandard
 from ros_bags import EPOCH, SECOND, TYPES, Sent, odometry, write
 
+from aerodaas.errors import RecordingError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
 from aerodaas.recording.ros import sqlite_part
 from aerodaas.recording.ros.bag import RosBag
 from aerodaas.recording.ros.importing import ImportedBag, import_bag
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.recording.ros.typestore import DETECTIONS, ODOMETRY, ros_decoder
-from aerodaas.types.data import Detection, Detections, Header
-from aerodaas.types.errors import RecordingError
 
 TOPICS = BagTopics(odometry={"odometry": "/odom"})
 

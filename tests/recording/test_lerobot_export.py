@@ -18,22 +18,24 @@ from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 from aerodaas.config.model import RecordingConfig
-from aerodaas.recording.export.lerobot import ACTION, STATE, write_lerobot
-from aerodaas.recording.pictures import frames
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.states import vehicle_states
-from aerodaas.types.data import Battery, Frame, Header, Odometry
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message, SetpointRecord
-from aerodaas.types.vehicle import (
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import SetpointRecord
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import (
     PositionSetpoint,
     Setpoint,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.recording.export.lerobot import ACTION, STATE, write_lerobot
+from aerodaas.recording.pictures import frames
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.states import vehicle_states
 
 TASK = "survey the field"
 CAMERA = "observation.images.camera"

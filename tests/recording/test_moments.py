@@ -9,13 +9,14 @@ import pytest
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import Band, RecordedDetection, RecordedFlight, RobotFlight
 from aerodaas.recording.report.moments import Moment, MomentPicture, key_moments, picture_moments
 from aerodaas.recording.report.overlay import draw_detections
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.status import Message
 
 SECOND = 1_000_000_000
 CAMERA = "tello/cam"

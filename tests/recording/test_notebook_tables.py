@@ -19,12 +19,15 @@ from aerodaas import notebook
 from aerodaas.config import extras
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.graph import AeroStreamData, Graph
+from aerodaas.errors import ConfigError, GraphError, MissionError, RecordingError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
 from aerodaas.recording.pictures import detections
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.errors import ConfigError, GraphError, MissionError, RecordingError
-from aerodaas.types.status import MissionState, MissionStatus
 
 HEAD = Header(7, 1_500_000_000, "drone/camera")
 BOXES = (Detection((10, 20, 30, 60), "vest", 0.9, 4), Detection((1, 2, 3, 4), "person", 0.5))

@@ -11,6 +11,8 @@ import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.messages.envelope import Message
 from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
@@ -19,8 +21,6 @@ from aerodaas.recording.replay.timetables import read_timetables
 from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.report import read_report, write_report
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.status import Message
 
 Messages = list[Message[Any]]
 

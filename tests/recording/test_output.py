@@ -12,10 +12,10 @@ import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
 from aerodaas.recording import recorder
 from aerodaas.recording.output import Output
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.errors import RecordingError
 
 
 class FullDisk(io.FileIO):

@@ -12,10 +12,10 @@ from PIL import Image
 from PIL.ExifTags import GPS, IFD
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import RecordingError
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoPlace
 from aerodaas.recording.photo_album import COLUMNS, PhotoAlbum
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.payload import GimbalAttitude, Photo, PhotoPlace
 
 HERE = Odometry(np.array([10.0, 4.0, 12.0]), np.zeros(3), math.radians(30), 0.1, -0.1)
 ENVIRONMENT = EnvironmentConfig.model_validate(

@@ -16,15 +16,15 @@ from mcap.writer import Writer
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
 from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.status import Message
-from aerodaas.types.target import FollowedTarget, TargetState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand
 
 COUNT = 200
 SOURCE = "tello/camera"

@@ -12,6 +12,8 @@ from mcap.writer import Writer
 from rewritten import rewritten
 from synthetic_flight import SyntheticFlight, record
 
+from aerodaas.clock import seconds
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import RecordedOut
 from aerodaas.protocol.scenery import ShapeOut
 from aerodaas.recording.pictures import shots
@@ -20,8 +22,6 @@ from aerodaas.recording.playback.decisions import DecisionSums
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
-from aerodaas.types.clock import seconds
-from aerodaas.types.vehicle import VehicleState
 
 FLIGHT = SyntheticFlight(frames=2.0)
 FLIGHT_END = [step.status for step in FLIGHT.steps()][-1]

@@ -13,11 +13,12 @@ from played import served
 from required import needs_peer
 from synthetic_flight import SyntheticFlight, record
 
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.data import Detections, Frame
-from aerodaas.types.status import Message
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]

@@ -20,10 +20,10 @@ from aerodaas.cli.app import app
 from aerodaas.console import playback
 from aerodaas.console.playback import Player, Players
 from aerodaas.console.viewer import RecordingServer
+from aerodaas.errors import ConfigError, RecordingError
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.schemas import MissionOut
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import ConfigError, RecordingError
 
 PLAYBACK = "/v1/missions/own/playback"
 PICTURE = f"{PLAYBACK}/picture?stream=tello/camera&at="

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import FollowedTarget, TargetState
 from aerodaas.recording.playback.target import target_of
-from aerodaas.types.data import Header
-from aerodaas.types.target import FollowedTarget, TargetState
 
 HEADER = Header(3, 10**9, "drone/cam")
 BOX = [1.0, 2.0, 30.0, 40.0]

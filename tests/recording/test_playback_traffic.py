@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from aerodaas.analytics.remote.schemas import TrafficOut
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.vehicle import Traffic
 from aerodaas.recording.playback.track import Room, TrackBuilder
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.traffic import Traffic
 
 NOWHERE = {"x": 0.0, "y": 0.0, "z": 0.0}
 ONE: dict[str, Any] = {

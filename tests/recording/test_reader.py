@@ -15,10 +15,10 @@ from mcap.exceptions import InvalidMagic
 from mcap.writer import Writer
 from mcap_files import END, KINDS, Said, write_file
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording import reader
 from aerodaas.recording.decoding.index import read_index
 from aerodaas.recording.reader import Record, Recording, Topic
-from aerodaas.types.errors import RecordingError
 
 EPOCH = 1_000
 FLIGHT = [Said("/a", 1_100, 0), Said("/b", 1_200, 1), Said("/a", 1_300, 2), Said("/a", 1_400, 3)]

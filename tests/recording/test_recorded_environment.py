@@ -24,10 +24,10 @@ from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.tello.settings import TelloSettings
+from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.recorded_environment import allowed_content, left_out
 from aerodaas.recording.replay.environment import replay_environment
-from aerodaas.types.errors import AeroDaaSError, ConfigError, RecordingError
 
 GOOD: dict[str, Any] = {
     "home": {"latitude": 12.97, "longitude": 77.59, "altitude": 900},

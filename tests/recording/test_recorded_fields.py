@@ -15,18 +15,22 @@ from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.payload import Photo
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.messages.vitals import Vitals
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.pictures import detections, detections_of, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Alert, Battery, Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.payload import Photo
-from aerodaas.types.status import Decision, Message, MissionStatus, SetpointRecord
-from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
-from aerodaas.types.vitals import Vitals
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 HEADER = Header(4, 5, "drone/cam")
 NOWHERE = ""

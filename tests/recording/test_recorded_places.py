@@ -11,15 +11,17 @@ import numpy as np
 import pytest
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.playback.page_items import packed_places
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
 
 SOURCE, FOUND = "drone/cam", "drone/people"
 COUNT = 24

@@ -14,18 +14,19 @@ from rewritten import fields, rewritten, with_field
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.payload import GimbalAttitude
+from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
-from aerodaas.types.data import Battery, GpsFix, Header, Odometry
-from aerodaas.types.payload import GimbalAttitude
-from aerodaas.types.status import RECENT, Message, MissionState, MissionStatus
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
 TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)

@@ -16,30 +16,18 @@ from synthetic_flight import CAMERA, FENCE, HOME, PROVENANCE, SyntheticFlight, r
 
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import RecordingError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import Decision, MissionState, MissionStatus, SetpointRecord
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from aerodaas.recording.pictures import detections, frames
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import (
-    Alert,
-    Battery,
-    Detection,
-    Detections,
-    Frame,
-    GpsFix,
-    Header,
-    Odometry,
-)
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.status import (
-    Decision,
-    Message,
-    MissionState,
-    MissionStatus,
-    SetpointRecord,
-    TraceSpan,
-)
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import VelocityCommand, Waypoint
 
 HEADER = Header(41, 2_000_000_000, "tello/camera")
 ODOMETRY = Odometry(

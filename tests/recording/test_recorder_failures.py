@@ -13,13 +13,13 @@ import pytest
 from synthetic_flight import FENCE, PROVENANCE
 
 from aerodaas.config.model import GeofenceConfig, RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.recording import recorder as module
 from aerodaas.recording.output import Output
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Header
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.status import Message
 
 SECOND = 1_000_000_000
 LONG = "x" * (2 << 20)

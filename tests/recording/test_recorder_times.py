@@ -10,14 +10,16 @@ from mcap.reader import make_reader
 from synthetic_flight import FENCE, PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Battery
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Battery, Detection, Detections, Header
-from aerodaas.types.status import Message, TraceSpan
 
 SECOND = 1_000_000_000
 EPOCH = PROVENANCE.started_ns

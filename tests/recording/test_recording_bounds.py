@@ -22,6 +22,8 @@ from mcap.writer import CompressionType, Writer
 from mcap_files import Said, write_file
 
 from aerodaas.cameras.images import check_picture, decode_image
+from aerodaas.cameras.picture_size import MAX_PIXELS, picture_format, picture_size
+from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.limits import (
     MAX_ATTACHMENT,
     MAX_CHANNELS,
@@ -33,8 +35,6 @@ from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.picture_size import MAX_PIXELS, picture_format, picture_size
 
 MAGIC = b"\x89MCAP0\r\n"
 COMPRESSED = "foxglove.CompressedImage"

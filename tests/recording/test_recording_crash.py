@@ -20,10 +20,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_flight import SyntheticFlight, record
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.errors import RecordingError
 
 pytestmark = pytest.mark.wall_clock
 
@@ -36,7 +36,7 @@ PROGRAM = """
 import sys, time
 from pathlib import Path
 from aerodaas.config.model import RecordingConfig
-from aerodaas.types.errors import RecordingError
+from aerodaas.errors import RecordingError
 from aerodaas.recording.recorder import FlightRecorder
 from synthetic_flight import PROVENANCE, SyntheticFlight
 recorder = FlightRecorder(Path(sys.argv[1]), config=RecordingConfig(), provenance=PROVENANCE)

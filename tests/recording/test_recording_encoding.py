@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import json_bytes, json_schema, plain, stream_of, topic
 from aerodaas.recording.rotation import OPTICAL, Rotation, compose, from_rpy
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
-from aerodaas.types.vehicle import VehicleState
 
 ANGLES = st.floats(-math.pi, math.pi)
 ANYTHING = st.recursive(

@@ -14,9 +14,9 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import ConfigError
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.errors import ConfigError
 
 pytestmark = pytest.mark.wall_clock
 

@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.vitals import Vitals, read_vitals
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.comparison import write_comparison
@@ -21,10 +25,6 @@ from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import key_moments, picture_moments
 from aerodaas.recording.report.page.document import document, paragraph, section, table
 from aerodaas.recording.report.report import write_report
-from aerodaas.types.data import Header
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import Vitals, read_vitals
 
 
 class Page(HTMLParser):

@@ -13,6 +13,7 @@ import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig
+from aerodaas.errors import RecordingError
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
@@ -20,7 +21,6 @@ from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.recording.report.page.document import paragraph, table
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 from aerodaas.recording.report.report import write_report
-from aerodaas.types.errors import RecordingError
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
+from aerodaas.errors import SourceError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.export.video import write_videos
 from aerodaas.recording.h264 import H264Encoder, is_key_frame
 from aerodaas.recording.pictures import frames, shots
@@ -24,9 +27,6 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.replay.mcap_camera import McapCamera
 from aerodaas.recording.report.report import write_report
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import SourceError
-from aerodaas.types.status import Message
 
 RATE = 10
 SIZE = (177, 321)

@@ -18,6 +18,11 @@ from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 from aerodaas.config.model import RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.pictures import detections, frames, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
@@ -28,10 +33,6 @@ from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.recording.states import vehicle_states
 from aerodaas.ros.incoming import odometry_of
-from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
-from aerodaas.types.status import Message
 
 STORAGES = ("mcap", "sqlite3")
 OURS = BagTopics(

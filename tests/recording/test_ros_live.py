@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from ros_domain import DOMAIN, wait_for
 
 from aerodaas.cameras.images import decode_depth, decode_image
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.recording.ros.live import RosGraph
 from aerodaas.ros import messages as ros
 from aerodaas.ros.incoming import battery_of, detection_items, fix_of, odometry_of, stamp_of
 from aerodaas.ros.link import RosLink
-from aerodaas.types.data import Battery, Detection, Detections, Frame, GpsFix, Header, Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 EPOCH = 1_700_000_000_000_000_000
 STAMP = 5_250_000_000

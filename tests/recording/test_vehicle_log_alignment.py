@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from vehicle_logs import Flown, dataflash, record_flown
 
+from aerodaas.errors import RecordingError, UnknownIdError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.vehicle_log.alignment import (
     RecordedClock,
@@ -19,7 +20,6 @@ from aerodaas.recording.vehicle_log.alignment import (
 from aerodaas.recording.vehicle_log.clock_line import fit_clock_line, starts_of
 from aerodaas.recording.vehicle_log.dataflash import read_dataflash
 from aerodaas.recording.vehicle_log.log import VehicleLog
-from aerodaas.types.errors import RecordingError, UnknownIdError
 
 FLOWN = Flown()
 

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from pymavlink import DFReader
 from vehicle_logs import Flown, dataflash, ulog
 
+from aerodaas.errors import ConfigError, RecordingError
 from aerodaas.recording.vehicle_log import reading
 from aerodaas.recording.vehicle_log.log import VehicleLog
 from aerodaas.recording.vehicle_log.reading import read_vehicle_log
-from aerodaas.types.errors import ConfigError, RecordingError
 
 FLOWN = Flown()
 Write = Callable[..., bytes]

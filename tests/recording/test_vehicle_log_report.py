@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
 
+from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.page.figures import log_plots
@@ -16,7 +17,6 @@ from aerodaas.recording.report.plots.vehicle_log import log_figures
 from aerodaas.recording.report.report import read_report, write_report
 from aerodaas.recording.vehicle_log.attachment import attach_log, attached_logs, flight_of
 from aerodaas.recording.vehicle_log.log import Series
-from aerodaas.types.errors import AeroDaaSError, RecordingError
 
 FLOWN = Flown()
 PLOTS = ("battery", "attitude", "position", "gps", "vibration", "motors")

@@ -20,10 +20,10 @@ from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.ros2.camera import Ros2Camera
 from aerodaas.drivers.ros2.vehicle import Ros2Vehicle
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode
 from aerodaas.ros import messages as ros
 from aerodaas.ros.link import RosLink
 from aerodaas.simulation.dynamics import KinematicState
-from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, VehicleMode
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_FASTDDS")]
 

@@ -7,9 +7,9 @@ import importlib.util
 import pytest
 from ros_domain import DOMAIN, wait_for
 
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.ros import messages as ros
 from aerodaas.ros.link import RosLink, domain_of, require_dds
-from aerodaas.types.errors import ConfigError, SourceError
 
 
 def test_messages_reach_subscribers(ros_link: RosLink, topics: str) -> None:

@@ -12,7 +12,14 @@ from hosts import Hand, published
 from aerodaas import Analytics, Frame
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.commands import Answer, End, Reply, Request
 from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec, Wake
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame
@@ -20,10 +27,6 @@ from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.runtime.triggers import TriggerSpec
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.data import Alert, Battery, Header, Odometry
-from aerodaas.types.status import Message, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 _NODE, _INPUT, _STATE, _WAKE = "drone/double", "drone/number", "drone/@state", "drone/@wake"
 _SESSION = Session(EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]}), None)

@@ -10,16 +10,17 @@ import pytest
 from hosts import Hand, item_of, published
 
 from aerodaas.cameras.base import Picture
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.errors import SourceError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.commands import End
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import end_stream
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.data import Battery, Frame, Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 _STREAM, _STATE = "drone/cam", "drone/@state"
 

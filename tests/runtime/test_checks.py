@@ -19,9 +19,9 @@ from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import LimitsConfig, validated
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, UnknownIdError
 from aerodaas.runtime.checks import check_served
 from aerodaas.simulation.airframe import Airframe
-from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError, UnknownIdError
 
 CAMERA = {"id": "cam1", "rate": 5, "settings": {"width": 64, "height": 36}}
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.schedulers.analytics.base import MILLISECOND
-from aerodaas.types.data import Header
-from aerodaas.types.status import Message, TraceSpan
 
 _FAR = 10_000 * MILLISECOND
 

@@ -12,6 +12,8 @@ from flying import hop, robot
 from hosts import item_of
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
+from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import (
     AddNavigation,
     ClearNavigation,
@@ -21,8 +23,6 @@ from aerodaas.mission.commands import (
     StreamItem,
 )
 from aerodaas.runtime.stream_names import reply_stream, request_stream, setpoint_stream
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.status import MissionState
 
 _STREAM = "drone/evil"
 _ANALYSIS = "drone/analysis"

@@ -14,8 +14,8 @@ from rewritten import rewritten
 
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
+from aerodaas.errors import UnknownIdError
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import UnknownIdError
 
 pytestmark = pytest.mark.slow
 

@@ -22,9 +22,9 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.errors import GraphError, MissionError
+from aerodaas.messages.mission import MissionState
 from aerodaas.schedulers.trajectory.base import PlanningContext
-from aerodaas.types.errors import GraphError, MissionError
-from aerodaas.types.status import MissionState
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
 

@@ -8,10 +8,10 @@ import pytest
 from drone_nodes import robot_spec
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.errors import ConfigError
 from aerodaas.runtime.hosting import MOST_ALONE, by_actor
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import Session
-from aerodaas.types.errors import ConfigError
 
 LINK = "udpin:127.0.0.1:14550"
 

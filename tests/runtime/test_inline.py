@@ -14,14 +14,14 @@ from hosts import item_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS, Clock
+from aerodaas.errors import AeroDaaSError, SourceError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
 from aerodaas.runtime.inline import InlineExecutor, Tap
 from aerodaas.runtime.node import NEVER, Node
 from aerodaas.runtime.session import next_due
 from aerodaas.runtime.stream_names import alert_stream
-from aerodaas.types.clock import NANOSECONDS, Clock
-from aerodaas.types.data import Header
-from aerodaas.types.errors import AeroDaaSError, SourceError
-from aerodaas.types.status import Message
 
 Steps = list[tuple[str, int, list[Any]]]
 """Node, mission time and items of each step of a flight."""

@@ -12,10 +12,10 @@ from flying import FLAT, Flyer, hop, recorded, robot
 from one_drone import drone_of, long, odometry_of, short, state_of
 
 from aerodaas import AeroListData, Environment, Odometry, Waypoint
+from aerodaas.errors import GraphError, MissionError
+from aerodaas.messages.mission import MissionState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.errors import GraphError, MissionError
-from aerodaas.types.status import MissionState
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
+from aerodaas.errors import MissionError
 from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
-from aerodaas.types.errors import MissionError
 
 
 def _serve_until(calls: LoopCalls, count: int) -> None:

@@ -12,11 +12,11 @@ from flying import FLAT, Flyer, hop, robot
 from aerodaas import Environment
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.errors import GraphError, SchedulerError
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.plan import FlightPlan, make_plan
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.registry import load_scheduler
-from aerodaas.types.errors import GraphError, SchedulerError
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
 ODOMETRY = {"id": "odom", "type": "odometry", "rate": 10}

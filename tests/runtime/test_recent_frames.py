@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas import Frame, Header
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, FrameReferences, RecentFrames
 from aerodaas.runtime.session import FRAME_DEPTH
-from aerodaas.types.status import Message
 
 _PIXELS = np.zeros((2, 2, 3), np.uint8)
 

@@ -18,7 +18,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from aerodaas import Analytics, Detections, Environment, Frame
 from aerodaas.analytics.base import Context
-from aerodaas.types.data import Detection
+from aerodaas.messages.detections import Detection
 
 SENSORS = [
     {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}},

@@ -9,18 +9,19 @@ from pathlib import Path
 import pytest
 from hosts import Hand, published
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import RecordingError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vitals import read_vitals
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import alert_stream
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import read_vitals
 
 _STREAM = alert_stream("part")
 _PROVENANCE = Provenance(name="test", config="{}")

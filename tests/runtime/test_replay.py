@@ -31,12 +31,12 @@ from aerodaas import (
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.environment.run import Run
+from aerodaas.errors import RecordingError
+from aerodaas.messages.detections import Detection
 from aerodaas.recording.pictures import detections, frames, picture_topics
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.replay.timetables import read_timetables
 from aerodaas.recording.report.difference import difference
-from aerodaas.types.data import Detection
-from aerodaas.types.errors import RecordingError
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 7, "settings": {"width": 64, "height": 36}}
 

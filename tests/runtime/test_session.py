@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS, ScaledClock, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session, next_due
-from aerodaas.types.clock import NANOSECONDS, ScaledClock, SimulatedClock
 
 rates = st.floats(0.1, 240.0) | st.integers(1, 240).map(float)
 stamps = st.integers(-1, 10_000 * NANOSECONDS)

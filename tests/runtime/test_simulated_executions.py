@@ -19,8 +19,14 @@ from aerodaas import (
     VelocityCommand,
 )
 from aerodaas.analytics.base import Context
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import Decision
+from aerodaas.messages.readings import Readings
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.summary import FlightSummary
@@ -44,10 +50,6 @@ from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Header, Readings
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.status import Decision, Message
 
 _CAMERA = {"driver": "simulated", "rate": 4, "settings": {"width": 64, "height": 36}}
 

@@ -19,9 +19,9 @@ from aerodaas import (
 )
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.errors import MissionError
+from aerodaas.messages.odometry import Odometry
 from aerodaas.service.rehearsal import rehearsal_config
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import MissionError
 
 __all__ = ["FIELD", "Eastwards", "OtherLease", "Rehearsal", "rehearse", "survey", "to_the_east"]
 

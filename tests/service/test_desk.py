@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig, SimulationConfig
+from aerodaas.errors import MissionError
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     LeaseIn,
@@ -38,7 +39,6 @@ from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
-from aerodaas.types.errors import MissionError
 
 PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
 

@@ -13,9 +13,9 @@ import pytest
 from aerodaas.actors.dispatch import edge_turns
 from aerodaas.actors.dispatch.edge_turns import EdgeTurns
 from aerodaas.config.options import EdgeShare
+from aerodaas.errors import ConfigError
 from aerodaas.service import edge as edges
 from aerodaas.service.edge import EdgeArbiter
-from aerodaas.types.errors import ConfigError
 
 
 @pytest.fixture

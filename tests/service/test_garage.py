@@ -13,11 +13,11 @@ import pytest
 from desks import PILOT, Provider
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service import garage as garages
 from aerodaas.service.errors import RefusedError
-from aerodaas.types.health import HealthItem, Verdict
 
 T0 = 1_800_000_000.0
 """Unix seconds."""

@@ -12,6 +12,7 @@ import pytest
 from desks import PILOT, Link, Monitor, Provider
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
 from aerodaas.service.access import Principal
 from aerodaas.service.desk import MissionDesk
@@ -20,7 +21,6 @@ from aerodaas.service.mission import ActiveMission
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.types.errors import MissionError
 
 OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(Scope), "t")
 

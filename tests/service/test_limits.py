@@ -13,12 +13,12 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, validated
+from aerodaas.errors import ConfigError
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.service.limits import TenantLimits, limited
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
 
 SQUARE = [(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)]
 NOTHING = TenantLimits()

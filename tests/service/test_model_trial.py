@@ -12,9 +12,9 @@ from onnx import TensorProto, helper, numpy_helper
 from synthetic_models import constant_model
 
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.errors import ConfigError
 from aerodaas.service.model_trial import try_model
 from aerodaas.service.models import ModelShelf
-from aerodaas.types.errors import ConfigError
 
 
 def greedy_model(path: Path, *axes: int, from_input: bool = False) -> Path:

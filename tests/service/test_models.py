@@ -14,11 +14,11 @@ from served import document
 
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.service import models
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import ModelShelf
-from aerodaas.types.errors import ConfigError
 
 DAY = 86400.0
 

@@ -12,7 +12,7 @@ from served import Served, document, fleet, robot
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,12 @@ from rehearsed import OtherLease, rehearse, to_the_east
 
 from aerodaas.config.model import validated
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.errors import ConfigError
+from aerodaas.messages.health import Verdict
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.service.rehearsal import judge, rehearsal_config
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.simulation.airframe import Airframe
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.health import Verdict
 
 AHEAD = OtherLease("b7", [(5.0, 4.0), (9.0, 4.0), (9.0, 9.0), (5.0, 9.0)])
 """Another's area around the second waypoint."""

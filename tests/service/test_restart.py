@@ -15,6 +15,7 @@ import pytest
 from served import document, fleet, robot
 from test_desk import PILOT, Desk
 
+from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
 from aerodaas.service.access import Principal
 from aerodaas.service.errors import RefusedError
@@ -22,7 +23,6 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.store import Account, Mission, Tenant
-from aerodaas.types.errors import MissionError
 
 CROWD = Principal("crowd", "crowd", Role.PILOT, frozenset(Scope), "t")
 ROWS = 3000

@@ -12,11 +12,11 @@ from served import document
 
 from aerodaas.cli.serve import _actuators
 from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.types.errors import ConfigError
 
 CARRIED: dict[str, Any] = {
     "actuators": [

@@ -17,10 +17,11 @@ from served import Served, fleet, quick, robot
 
 from aerodaas import AeroNavigation, Analytics, Environment, NavigationType, Waypoint
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
+from aerodaas.errors import MissionError
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Readings
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.types.data import Odometry, Readings
-from aerodaas.types.errors import MissionError
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -175,5 +176,5 @@ def test_what_the_provider_refuses_is_told_at_the_line(campus: Served, tmp_path:
     drone.navigate(hop((0, 3)))
     with pytest.raises(Exception, match="none") as raised:
         drone.start_mission()
-    assert type(raised.value).__module__ == "aerodaas.types.errors"
+    assert type(raised.value).__module__ == "aerodaas.errors"
     assert not (tmp_path / "out").exists()

@@ -13,7 +13,7 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.types.health import Verdict
+from aerodaas.messages.health import Verdict
 from tools.browser import Browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import ConfigError
 from aerodaas.service.serve import serve
 from aerodaas.service.settings import ServiceSettings
-from aerodaas.types.errors import ConfigError
 
 
 def test_drones_on_one_link_are_not_leased_one_by_one(tmp_path: Path) -> None:

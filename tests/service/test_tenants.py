@@ -12,12 +12,12 @@ from desks import PILOT, Provider
 from served import Served, document, fleet, robot
 
 from aerodaas.environment.provider.logins import client_for
+from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn, MissionPhase, TenantChange
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.mission import ActiveMission, LostFlightError
 from aerodaas.service.store import Tenant, Usage
-from aerodaas.types.errors import ConfigError
 
 
 @pytest.mark.slow

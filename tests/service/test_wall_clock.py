@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from desks import PILOT, Provider
 
+from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.schemas import AccountIn, LeaseIn, LeaseState, LinkState, TokenIn
 from aerodaas.service.access import Access, Accounts, Audit, Quotas
 from aerodaas.service.bookings import Bookings
@@ -17,7 +18,6 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.store import Store
-from aerodaas.types.health import HealthItem, Verdict
 
 HOUR = 3600.0
 STEPS = [HOUR, -HOUR, 56 * 365 * 24 * HOUR]

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.depth import renderer_for
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 CAMERAS = {
     "plain": CameraModel.from_fov(320, 180, math.radians(80)),

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from panda3d.core import TransformState
 
 from aerodaas.config.model import SimulationConfig
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 POST = 0.3
 """Metres: height of the short posts used as markers."""

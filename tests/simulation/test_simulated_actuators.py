@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.types.actuators import ActuatedVehicle, MoveResult
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.actuators import ActuatedVehicle, MoveResult
+from aerodaas.messages.vehicle import VehicleMode
 
 CARRIED = [
     {"id": "hook", "type": "gripper"},

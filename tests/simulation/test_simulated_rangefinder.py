@@ -12,13 +12,13 @@ import pytest
 
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.errors import ConfigError
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode
 from aerodaas.simulation.airframe import RangefinderSettings
 from aerodaas.simulation.dynamics import KinematicState
 from aerodaas.simulation.rangefinder import Floats, SimulatedRangefinder, Surface
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode
 
 SECOND = 1_000_000_000
 THINGS: list[dict[str, Any]] = [

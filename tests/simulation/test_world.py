@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from aerodaas.config.model import SimulationConfig
+from aerodaas.errors import ConfigError
 from aerodaas.simulation.scenario import Motion, Scenario, scenario_names
 from aerodaas.simulation.skeleton import JOINTS, LIMBS, Posture, joints
 from aerodaas.simulation.track import Track
 from aerodaas.simulation.world import World
-from aerodaas.types.errors import ConfigError
 
 Place = tuple[float, float]
 place = st.tuples(st.floats(-50, 50), st.floats(-50, 50))

@@ -10,21 +10,21 @@ from typing import Any
 
 from typing_extensions import Self
 
+from aerodaas.clock import ScaledClock
 from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, Command, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.clock import ScaledClock
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 from sitl.relay import Relay
 
 __all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]

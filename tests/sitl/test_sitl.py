@@ -22,11 +22,11 @@ from aerodaas.drivers.mavlink.microservices.fence import upload_fence
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import HeightReference, NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import HeightReference, NavigationType, VelocityCommand, Waypoint
 from sitl.autopilot import Autopilot
 from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 

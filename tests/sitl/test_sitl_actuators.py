@@ -12,9 +12,9 @@ import pytest
 
 from aerodaas.config.actuators import ActuatorConfig, GripperConfig, RelayConfig, ServoConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Actuate, AddNavigation
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import Waypoint
 from sitl.autopilot import Autopilot
 from sitl.flights import SitlFlight
 

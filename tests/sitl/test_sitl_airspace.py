@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleState
 from sitl.autopilot import Autopilot
 from sitl.flights import SitlFlight, survey
 from tools.mavlink_vehicle.transmitter import EmulatedTransmitter

@@ -12,9 +12,9 @@ import pytest
 from required import needs_peer
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState as S
 from aerodaas.mission.commands import End
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.status import MissionState as S
 from sitl.autopilot import Autopilot
 from sitl.flights import FAR, FARM, SitlFlight
 

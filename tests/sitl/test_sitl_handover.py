@@ -9,10 +9,10 @@ import pytest
 
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, HandOver, ReturnHome, TakeBack
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 from sitl.autopilot import Autopilot
 from sitl.flights import SitlFlight
 

@@ -17,9 +17,9 @@ from aerodaas.drivers.mavlink.sitl.process import SitlProcess
 from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle_log import LogEntry
 from sitl.flights import robot_at
 from sitl.relay import Relay
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.geometry.frames import GeodeticOrigin, rotation_from_rpy
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation
-from aerodaas.types.geometry import GeodeticOrigin, rotation_from_rpy
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.waypoints import Waypoint
 from sitl.autopilot import Autopilot
 from sitl.flights import SitlFlight
 

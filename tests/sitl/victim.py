@@ -10,9 +10,9 @@ import sys
 from typing import Any
 
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.waypoints import NavigationType, Waypoint
 from aerodaas.mission.commands import AddNavigation
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import NavigationType, Waypoint
 from sitl.flights import SitlFlight
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["Witness"]
 

@@ -12,9 +12,10 @@ import pytest
 
 from aerodaas.actors.streams import UnreadableError
 from aerodaas.actors.streams.codec import Encoded, UnsendableError, decode
-from aerodaas.types.data import Detection, Header
-from aerodaas.types.status import Message, TraceSpan
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import Waypoint
 
 READER = """
 import pickle, sys
@@ -30,9 +31,9 @@ import pickle, subprocess, sys
 from aerodaas.actors.run.application import capture
 from aerodaas.actors.streams import encode_message
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.types.data import Header
+from aerodaas.messages.frames import Header
 from aerodaas.dataflow.graph import Graph
-from aerodaas.types.status import Message
+from aerodaas.messages.envelope import Message
 class Known:
     def __init__(self, value):
         self.value = value

@@ -16,8 +16,8 @@ pytestmark = pytest.mark.slow
 HOVERBOT = '''
 import numpy as np
 
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.vehicle import Capabilities, PositionSetpoint, VehicleMode, VehicleState
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import Capabilities, PositionSetpoint, VehicleMode, VehicleState
 from bot_settings import SPEED
 
 

@@ -14,7 +14,8 @@ from typing import Generic, NamedTuple, TypeVar
 
 import pydantic
 
-from aerodaas.types.data import Detection, Header
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.frames import Header
 from kit import Oblong
 from shapes import Round
 

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
+from aerodaas.messages.frames import Header
+from aerodaas.messages.readings import Alert
 from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.terminal.console import FlightView, StartupView, show_left, show_results
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Alert, Header
 
 CONFIG = EnvironmentConfig.model_validate({"name": "flat", "robots": [{"id": "drone"}]})
 

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.plan import braille_plan
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 
 PLACES = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from provider_stub import mission, status
 
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.terminal.provided import ProvidedView, phase_text
-from aerodaas.types.waypoints import Waypoint
 
 
 def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -> None:

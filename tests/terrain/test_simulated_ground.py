@@ -10,7 +10,7 @@ from elevation_files import hgt
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VehicleState
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VehicleState
 
 SECOND = 1_000_000_000
 START = 3.0

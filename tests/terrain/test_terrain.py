@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from aerodaas.config.model import TerrainConfig
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.terrain.ground import Ground, agreed_sea_level
 from aerodaas.terrain.terrain import Terrain
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from required import needs_peer, peer
 
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 from tools.tello_vehicle import EmulatedTello, TelloOptions, VideoOptions
 
 PYTHON = peer("AERODAAS_DJITELLOPY")

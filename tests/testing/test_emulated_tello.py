@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.testing.channel import Channel
-from aerodaas.types.vehicle import VehicleMode
 from tools.tello_vehicle import EmulatedTello, Impairment, TelloOptions, VideoOptions
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.sdk import TelloSdk

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.app import run_typer
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.containers.containerfile import Instruction, Stage, expanded, read
 
 app = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)

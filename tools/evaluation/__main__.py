@@ -18,10 +18,10 @@ from aerodaas.cli.app import run_typer
 from aerodaas.cli.rows import write_csv
 from aerodaas.config.extras import require_extra
 from aerodaas.config.printable import printable
+from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import plain
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
-from aerodaas.types.errors import ConfigError
 from tools.evaluation.errors import draw_mistakes
 from tools.evaluation.figures import LEAST_SCORE, ClassFigures, Evaluation, evaluate
 

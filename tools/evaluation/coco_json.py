@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation.dataset import (
     MOST_SIDE,
     MOST_THINGS,

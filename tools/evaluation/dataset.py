@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.cameras.picture_size import picture_fits, picture_size
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Box
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Box
 
 __all__ = [
     "MOST_SIDE",

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Box
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Box
 from tools.evaluation.dataset import AnnotatedPicture, read_picture
 from tools.evaluation.figures import Mistake
 

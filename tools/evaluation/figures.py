@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.config.extras import require_extra
-from aerodaas.types.data import Detection, Frame, Header
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Box
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.detections import Detection
+from aerodaas.messages.frames import Frame, Header
 from tools.evaluation.dataset import AnnotatedPicture, Dataset, read_picture, read_size
 
 __all__ = ["LEAST_SCORE", "Bin", "ClassFigures", "Evaluation", "Mistake", "evaluate", "measure"]

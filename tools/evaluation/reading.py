@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation.coco_json import read_coco
 from tools.evaluation.dataset import Dataset
 from tools.evaluation.voc_xml import read_voc

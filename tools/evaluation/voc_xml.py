@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from aerodaas.config.xml_text import XmlError, parse_xml
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation.dataset import (
     AnnotatedPicture,
     Dataset,

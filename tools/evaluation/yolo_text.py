@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation.dataset import (
     PICTURE_SUFFIXES,
     AnnotatedPicture,

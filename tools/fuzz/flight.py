@@ -13,15 +13,15 @@ import numpy as np
 
 from aerodaas.config.model import LimitsConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, Vehicle, VehicleState
+from aerodaas.messages.waypoints import VelocityCommand, Waypoint, WaypointType
 from aerodaas.mission.commands import AddNavigation, Start, Steer, TakeControls
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.geometry import Vector
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, Vehicle, VehicleState
-from aerodaas.types.waypoints import VelocityCommand, Waypoint, WaypointType
 from tools.fuzz.records import LONGEST_REST
 
 __all__ = [

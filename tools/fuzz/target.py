@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerodaas.types.errors import UnknownIdError
+from aerodaas.errors import UnknownIdError
 
 __all__ = ["CORPUS", "Target", "load_target", "target_names"]
 

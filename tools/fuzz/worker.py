@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from aerodaas.types.memory_limit import limit_memory
+from aerodaas.runtime.memory_limit import limit_memory
 from tools.fuzz.blackbox import BlackBox
 from tools.fuzz.coverage import Coverage
 from tools.fuzz.finding import Finding, by_exception

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.recording.reader import Recording
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["differences", "milestones", "summary"]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle.firmware import Firmware, Result
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions

@@ -11,9 +11,9 @@ from typing import Any, TypeAlias
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
+from aerodaas.geometry.frames import Vector
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
-from aerodaas.types.geometry import Vector
 from tools.emulated import LONGEST_LEAP, EmulatedVehicle
 from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.geometry import enu_to_ned, yaw_enu_to_ned
+from aerodaas.geometry.frames import enu_to_ned, yaw_enu_to_ned
 
 if TYPE_CHECKING:
     from tools.mavlink_vehicle.firmware import Firmware

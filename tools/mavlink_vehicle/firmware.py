@@ -11,8 +11,8 @@ import numpy as np
 import shapely
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.geometry import enu_to_ned, ned_to_enu, yaw_enu_to_ned, yaw_ned_to_enu
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.geometry.frames import enu_to_ned, ned_to_enu, yaw_enu_to_ned, yaw_ned_to_enu
+from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle.actuators import EmulatedActuators
 from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras

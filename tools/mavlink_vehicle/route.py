@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.geometry import Vector
+from aerodaas.geometry.frames import Vector
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 
 __all__ = ["Route"]

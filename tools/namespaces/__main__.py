@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.table import Table
 
 from aerodaas.cli.app import run_typer
+from aerodaas.clock import NANOSECONDS
 from aerodaas.environment.signals import raise_on_signals
 from aerodaas.schedulers.lab.network import Network
-from aerodaas.types.clock import NANOSECONDS
 from tools.namespaces.edge_cloud import EdgeCloud
 from tools.namespaces.shape import Shape, parse_bandwidth, parse_time
 from tools.namespaces.trace import TracePlayer

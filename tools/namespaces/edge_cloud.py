@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 from typing_extensions import Self
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.namespaces.network import LocalNetwork, RemoteMachine
 from tools.namespaces.ray_node import restart_control_service, start_head, start_worker
 from tools.namespaces.shape import Shape

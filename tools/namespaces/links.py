@@ -12,7 +12,7 @@ import subprocess
 import sys
 from abc import ABC, abstractmethod
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.namespaces import relay
 from tools.namespaces.machine import Machine, run
 from tools.namespaces.shape import Shape

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import psutil
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["Machine", "run"]
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing_extensions import Self
 
 from aerodaas.actors.private_folder import private_folder
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 from tools.namespaces.links import BRIDGE, NetemLink, RelayLink, ShapedLink, has_netem, plug
 from tools.namespaces.machine import Machine, run
 from tools.namespaces.shape import Shape

@@ -14,7 +14,7 @@ import aerodaas
 from aerodaas.actors.cluster.authentication import make_token, require_authentication
 from aerodaas.actors.cluster.ray_process import RAY
 from aerodaas.actors.cluster.ray_variables import VARIABLES
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.namespaces.machine import Machine
 
 __all__ = ["environment", "restart_control_service", "start_head", "start_worker"]

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from typing_extensions import Self
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.lab.network import Network
-from aerodaas.types.clock import NANOSECONDS
 from tools.namespaces.edge_cloud import EdgeCloud
 
 __all__ = ["TracePlayer"]

@@ -9,7 +9,7 @@ import typer
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.emulated import watch
 from tools.tello_vehicle import EmulatedTello, Impairment, TelloOptions, VideoOptions
 

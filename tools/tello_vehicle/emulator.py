@@ -8,10 +8,10 @@ import selectors
 import time
 
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import VehicleMode
 from tools.emulated import LONGEST_LEAP, EmulatedVehicle
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.options import TelloOptions

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.cameras.simulated import SimulatedCamera
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Odometry
+from aerodaas.messages.odometry import Odometry
 from tools.tello_vehicle.options import VideoOptions
 from tools.tello_vehicle.stamp import write_stamp
 

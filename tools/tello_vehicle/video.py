@@ -14,8 +14,8 @@ from fractions import Fraction
 import av
 from av.video.codeccontext import VideoCodecContext
 
+from aerodaas.messages.odometry import Odometry
 from aerodaas.testing.channel import Channel
-from aerodaas.types.data import Odometry
 from tools.tello_vehicle.options import TelloOptions, VideoOptions
 from tools.tello_vehicle.pictures import picture_source
 

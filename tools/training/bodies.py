@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.simulation.skeleton import JOINTS, KEYPOINTS, Posture, joints
-from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["keypoints_of", "sample_body"]
 

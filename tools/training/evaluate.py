@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.types.data import Detections, Frame, Header
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 from tools.training.dataset import Sample
 from tools.training.metrics import Floats, Ranking, overlap, strays
 

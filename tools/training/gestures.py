@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.people.gestures import GESTURE_MODEL, GESTURES, normalised
 from aerodaas.analytics.people.joints import POINTS
-from aerodaas.types.geometry import CameraModel, enu_to_body
+from aerodaas.geometry.frames import CameraModel, enu_to_body
 from tools.training.bodies import keypoints_of, sample_body
 
 __all__ = ["main", "sample_keypoints", "train"]

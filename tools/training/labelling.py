@@ -19,13 +19,13 @@ from panda3d.core import (
 )
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.scene.layers import LABEL
 from aerodaas.simulation.scene.scene import Looks
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 __all__ = ["Label", "LabellingRenderer", "box_of", "mask_of", "project", "visibility"]
 

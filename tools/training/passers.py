@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.simulation.skeleton import JOINTS, Posture, joints
 from aerodaas.simulation.world import State, Thing
-from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["ParkedCar", "Passer"]
 

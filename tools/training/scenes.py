@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scenario import Car, Person, Scenario
 from aerodaas.simulation.world import Thing, World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel
 from tools.training.passers import ParkedCar, Passer
 
 __all__ = ["View", "draw_camera", "draw_view", "draw_world"]

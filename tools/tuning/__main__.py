@@ -47,7 +47,7 @@ def follow(
     from rich.console import Console  # noqa: PLC0415 - only here
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn  # noqa: PLC0415
 
-    from aerodaas.types.errors import ConfigError  # noqa: PLC0415
+    from aerodaas.errors import ConfigError  # noqa: PLC0415
     from tools.tuning.plot import plot_tuned  # noqa: PLC0415
     from tools.tuning.search import FollowTask, tune_follow  # noqa: PLC0415
 

@@ -17,18 +17,21 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SimulationConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import OpenStream, Start, StreamItem
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.simulation.world import Thing
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Alert, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.vehicle import VehicleState
 from tools.tuning.perception import Perception, box_in_picture
 
 __all__ = ["TELLO", "Chase", "ChaseResult"]

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerodaas.following.contact_guard import ContactGuard
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import Thing, World
-from aerodaas.types.data import Odometry
 from tools.tuning.walk import PERSON
 
 __all__ = ["CONTACT", "STRANGER", "Nearest", "NoGuard", "crossing", "returning", "stranger"]

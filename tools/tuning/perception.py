@@ -8,12 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.appearance import ZONE_BYTES, ZONES
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scenario import Person
 from aerodaas.simulation.world import Thing, World
-from aerodaas.types.appearance import ZONE_BYTES, ZONES
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 __all__ = ["DetectorPerception", "Perception", "TruthPerception", "box_in_picture"]
 

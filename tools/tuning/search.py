@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.errors import ConfigError
 from aerodaas.following.follow_settings import FollowGains
-from aerodaas.types.errors import ConfigError
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.perception import TruthPerception
 from tools.tuning.walk import PERSON, walk

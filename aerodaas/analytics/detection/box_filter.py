@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.geometry import Box
+from aerodaas.geometry.frames import Box
 
 __all__ = ["BoxFilter"]
 

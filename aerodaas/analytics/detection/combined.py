@@ -7,8 +7,9 @@ from typing import ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Detections, Frame
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame
 
 __all__ = ["CombinedDetector"]
 

@@ -25,8 +25,9 @@ from aerodaas.analytics.detection.suppression import strongest, suppress
 from aerodaas.analytics.detection.trial import Trial, preprocessing_for, try_out
 from aerodaas.analytics.endpoint.tensors import TensorSpec
 from aerodaas.analytics.models import DETECTOR
-from aerodaas.types.data import Detection, Detections, Frame
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
 
 __all__ = ["OnnxDetector"]
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from aerodaas.analytics.detection.model_file import ModelFile
 from aerodaas.analytics.people.crop import GREY, Region, square_around
 from aerodaas.analytics.people.joints import POINTS
-from aerodaas.types.geometry import Box
+from aerodaas.geometry.frames import Box
 
 __all__ = ["CropHead", "KeypointHead", "SimccHead", "keypoint_head"]
 

@@ -15,8 +15,8 @@ from aerodaas.analytics.detection.providers import open_session
 from aerodaas.analytics.models import POSE
 from aerodaas.analytics.people.crop import cut_region
 from aerodaas.analytics.people.joints import MIRRORED
-from aerodaas.types.errors import ModelError
-from aerodaas.types.geometry import Box
+from aerodaas.errors import ModelError
+from aerodaas.geometry.frames import Box
 
 __all__ = ["KeypointModel"]
 

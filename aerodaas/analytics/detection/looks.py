@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from aerodaas.types.appearance import unlikeness
-from aerodaas.types.geometry import Box
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.appearance import unlikeness
 
 __all__ = ["Looks", "touches"]
 

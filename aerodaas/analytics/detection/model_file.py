@@ -19,7 +19,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from aerodaas.analytics.models.cache import model_named, require_fetched
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 __all__ = ["ModelFile", "PixelType", "Tensor", "read_model"]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aerodaas.types.data import Detection
+from aerodaas.messages.detections import Detection
 
 __all__ = ["one_for_each"]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import onnxruntime as ort
 
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 __all__ = ["default_providers", "default_threads", "open_session"]
 

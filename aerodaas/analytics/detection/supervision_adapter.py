@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerodaas.config.extras import require_extra
-from aerodaas.types.data import Detection, Detections, Frame
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
 
 if TYPE_CHECKING:
     import supervision

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.detection.box_filter import BoxFilter
 from aerodaas.analytics.detection.looks import Looks, touches
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detection, Detections
-from aerodaas.types.geometry import rotation_from_rpy
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import rotation_from_rpy
+from aerodaas.messages.detections import Detection, Detections
 
 __all__ = ["Track", "Tracker", "TrackingAnalytics"]
 

@@ -17,8 +17,9 @@ from aerodaas.analytics.endpoint.function import FunctionUrl
 from aerodaas.analytics.endpoint.model import EndpointModel
 from aerodaas.analytics.endpoint.tensors import TensorSpec
 from aerodaas.config.model import ComputeConfig, EndpointConfig
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import EndpointError, GraphError
+from aerodaas.errors import EndpointError, GraphError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 
 __all__ = ["TensorAnalysis", "endpoint_analysis"]
 

@@ -16,7 +16,7 @@ from urllib3.exceptions import TimeoutError as NoTimeLeft
 
 from aerodaas.config.model import EndpointConfig
 from aerodaas.config.secrets import SecretUrl, cleaned
-from aerodaas.types.errors import ConfigError, EndpointError
+from aerodaas.errors import ConfigError, EndpointError
 
 __all__ = ["Connection", "Reply"]
 

@@ -19,8 +19,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.analytics.endpoint.connection import Connection, Reply
 from aerodaas.analytics.endpoint.model import refuse_denied
-from aerodaas.types.data import Detection, Detections, Frame
-from aerodaas.types.errors import ConfigError, EndpointError
+from aerodaas.errors import ConfigError, EndpointError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
 
 __all__ = ["FunctionUrl"]
 

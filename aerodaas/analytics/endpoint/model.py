@@ -19,7 +19,7 @@ from aerodaas.analytics.endpoint.tensors import (
     encode_request,
 )
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.types.errors import ConfigError, EndpointError, ModelError
+from aerodaas.errors import ConfigError, EndpointError, ModelError
 
 __all__ = ["EndpointModel", "refuse_denied"]
 

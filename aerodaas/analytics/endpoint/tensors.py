@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.errors import EndpointError
+from aerodaas.errors import EndpointError
 
 __all__ = [
     "DATATYPES",

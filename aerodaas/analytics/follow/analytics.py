@@ -18,16 +18,21 @@ from aerodaas.analytics.detection.tracking import Tracker
 from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.clock import seconds
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import ConfigError
 from aerodaas.following.follow_controller import LYING, FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.following.relative_target import RelativeTarget, TargetSize, ends_in_picture, sight
 from aerodaas.following.target_motion import TargetMotion, place_of
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert, Detection, Detections
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.target import FollowedTarget, TargetState
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.waypoints import (
+    DEFAULT_PRIORITY,
+    FollowedTarget,
+    NavigationType,
+    TargetState,
+)
 
 __all__ = ["FollowAnalytics"]
 

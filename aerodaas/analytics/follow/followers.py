@@ -11,7 +11,7 @@ from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.following.relative_target import TargetSize
 from aerodaas.following.target_motion import TargetMotion
-from aerodaas.types.waypoints import DEFAULT_PRIORITY
+from aerodaas.messages.waypoints import DEFAULT_PRIORITY
 
 __all__ = ["CarFollowAnalytics", "PersonFollowAnalytics", "VipFollowAnalytics"]
 

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Sequence
 
 from aerodaas.analytics.detection.looks import touches
 from aerodaas.analytics.detection.tracking import Track
-from aerodaas.types.appearance import unlikeness
-from aerodaas.types.clock import seconds
+from aerodaas.clock import seconds
+from aerodaas.messages.appearance import unlikeness
 
 __all__ = ["Certainty", "TargetIdentity"]
 

@@ -6,7 +6,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.following.clearance import surfaces
 from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.data import Detections
+from aerodaas.messages.detections import Detections
 
 __all__ = ["observation"]
 

@@ -18,8 +18,8 @@ from aerodaas.analytics.guests.payload import require_no_moves
 from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import GuestQuota
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.errors import ModelError
-from aerodaas.types.records import without_secrets
+from aerodaas.errors import ModelError
+from aerodaas.messages.records import without_secrets
 
 __all__ = ["GuestAnalysis"]
 

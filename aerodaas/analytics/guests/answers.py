@@ -7,9 +7,10 @@ from typing import Any
 
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.item_json import ItemError, decoded
-from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import ModelError
-from aerodaas.types.guest_item import GuestItem
+from aerodaas.errors import ModelError
+from aerodaas.messages.frames import Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.readings import Alert
 
 __all__ = ["AnswerReader", "AnsweredCondition"]
 

@@ -8,7 +8,7 @@ import struct
 import time
 from typing import Any
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["HEAD", "LARGEST_BLOB", "LARGEST_TEXT", "Channel", "GuestError"]
 

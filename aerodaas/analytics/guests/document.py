@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.config.checked import explained
-from aerodaas.types.errors import GraphError
-from aerodaas.types.identifiers import ScopedWord
+from aerodaas.errors import GraphError
+from aerodaas.identifiers import ScopedWord
 
 __all__ = ["GuestDocument", "GuestNavigation", "GuestNode", "GuestTrigger", "read_document"]
 

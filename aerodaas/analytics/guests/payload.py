@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 __all__ = ["require_no_moves"]
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from aerodaas.analytics.item_json import encoded
-from aerodaas.types.errors import failure_line
-from aerodaas.types.guest_item import GuestItem
+from aerodaas.errors import failure_line
+from aerodaas.messages.guest_item import GuestItem
 
 if TYPE_CHECKING:
     from aerodaas.analytics.base import Analytics, ComputeKind
-    from aerodaas.types.data import Alert
-    from aerodaas.types.vehicle import VehicleState
+    from aerodaas.messages.readings import Alert
+    from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["Condition", "Works"]
 

@@ -16,8 +16,8 @@ from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.guests.answers import AnswerReader
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.wire_items import pack
-from aerodaas.types.data import Readings
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
+from aerodaas.messages.readings import Readings
 
 __all__ = ["HERE", "HereAnalysis", "HereConditions", "HereSite"]
 

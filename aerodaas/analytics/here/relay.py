@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["LARGEST_ANSWER", "HereRelay", "HereTimes", "HereUser", "Send", "oversize"]
 

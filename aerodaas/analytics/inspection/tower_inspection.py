@@ -17,12 +17,14 @@ from aerodaas.analytics.follow.observation import observation
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import ConfigError, GraphError
 from aerodaas.following.ground import GroundView
 from aerodaas.following.inspection import InspectionController, InspectionPhase, InspectionPlan
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.types.data import Alert, Detection, Detections, Frame
-from aerodaas.types.errors import ConfigError, GraphError
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.waypoints import DEFAULT_PRIORITY, NavigationType
 
 __all__ = ["InspectionOver", "TowerInspectionAnalytics", "inspection_over"]
 

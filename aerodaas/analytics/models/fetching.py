@@ -25,7 +25,7 @@ from urllib.parse import urlsplit
 from aerodaas.analytics.models.cache import fetched_path, require_fetched
 from aerodaas.analytics.models.registry import RegisteredModel, registered
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError, ModelError, SourceError
+from aerodaas.errors import ConfigError, ModelError, SourceError
 
 __all__ = ["fetch_model"]
 

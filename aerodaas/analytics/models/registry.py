@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from aerodaas.types.errors import UnknownIdError
+from aerodaas.errors import UnknownIdError
 
 __all__ = ["REGISTRY", "Archive", "RegisteredModel", "registered"]
 

@@ -9,13 +9,15 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.clock import seconds
 from aerodaas.dataflow.interfaces import IMonitoringAnalytics
+from aerodaas.errors import UnknownIdError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.safety.reconcile import Reconciler
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert, Battery, Frame, GpsFix, Header, Odometry, Readings
-from aerodaas.types.errors import UnknownIdError
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["MonitoringAnalytics"]
 

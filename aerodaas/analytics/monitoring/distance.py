@@ -9,9 +9,10 @@ from typing import ClassVar
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.errors import ConfigError
 from aerodaas.following.relative_target import RelativeTarget, TargetSize, sight
-from aerodaas.types.data import Alert, Detections, Readings
-from aerodaas.types.errors import ConfigError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.readings import Alert, Readings
 
 __all__ = ["SIZES", "DistanceAnalytics"]
 

@@ -13,9 +13,11 @@ from typing import ClassVar
 
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert, GpsFix, Header
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.clock import seconds
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import GpsFix
+from aerodaas.messages.readings import Alert
 
 __all__ = ["GpsLoggerAnalytics"]
 

@@ -18,8 +18,8 @@ from datetime import datetime, timezone
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from aerodaas.types.data import GpsFix
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
+from aerodaas.messages.odometry import GpsFix
 
 __all__ = ["GpsTrack", "TimedFix", "parse_track"]
 

@@ -19,12 +19,14 @@ from aerodaas.analytics.people.falls import FallDetector
 from aerodaas.analytics.people.gestures import GESTURE_MODEL, GestureClassifier
 from aerodaas.analytics.people.joints import POINTS
 from aerodaas.analytics.people.lying import lies
+from aerodaas.clock import seconds
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
 from aerodaas.dataflow.interfaces import ICompute, IEnvironment
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Alert, Detection, Detections, Frame
-from aerodaas.types.errors import ConfigError, GraphError
+from aerodaas.errors import ConfigError, GraphError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.readings import Alert
 
 __all__ = ["BodyPoseEmergencyAnalytics", "fallen", "hand_raised"]
 

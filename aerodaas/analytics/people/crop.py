@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.geometry import Box
+from aerodaas.geometry.frames import Box
 
 __all__ = ["GREY", "MARGIN", "Region", "cut_region", "square_around"]
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.errors import ConfigError
 from aerodaas.following.ground import GroundView
-from aerodaas.types.data import Alert, Detections, Readings
-from aerodaas.types.errors import ConfigError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.readings import Alert, Readings
 
 __all__ = ["CrowdDensityAnalytics"]
 

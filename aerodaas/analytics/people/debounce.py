@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import ConfigError
+from aerodaas.clock import seconds
+from aerodaas.errors import ConfigError
 
 __all__ = ["Debounce"]
 

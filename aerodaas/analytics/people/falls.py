@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.people.lying import feet_below
+from aerodaas.clock import seconds
 from aerodaas.following.ground import GroundView
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detection, Detections
-from aerodaas.types.geometry import body_to_enu, enu_to_body
+from aerodaas.geometry.frames import body_to_enu, enu_to_body
+from aerodaas.messages.detections import Detection, Detections
 
 __all__ = ["FallDetector"]
 

@@ -14,7 +14,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from aerodaas.analytics.people.joints import HIPS, POINTS, SHOULDERS, visible
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 __all__ = ["GESTURES", "GESTURE_MODEL", "GestureClassifier", "normalised"]
 

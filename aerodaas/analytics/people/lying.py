@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.people.joints import ANKLES, HIPS, KNEES, UPPER, visible
 from aerodaas.following.ground import GroundView
-from aerodaas.types.data import Detections
+from aerodaas.messages.detections import Detections
 
 __all__ = ["feet_below", "lies"]
 

@@ -13,9 +13,10 @@ from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import POSE
-from aerodaas.types.data import Detection, Detections, Frame
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Box
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
 
 __all__ = ["PoseAnalytics", "body_around"]
 

@@ -19,8 +19,9 @@ from aerodaas.analytics.remote.guard import Guard, is_loopback
 from aerodaas.analytics.remote.listening import listen
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
-from aerodaas.types.data import Alert, Frame, Header
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.readings import Alert
 
 if TYPE_CHECKING:
     import uvicorn

@@ -15,6 +15,9 @@ from starlette.exceptions import HTTPException as AnyHTTPException
 from aerodaas.analytics.commanding import MissionLink
 from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
@@ -25,8 +28,6 @@ from aerodaas.mission.commands import (
     ReturnHome,
 )
 from aerodaas.mission.state_machine import TERMINAL
-from aerodaas.types.data import Alert, Frame, Header
-from aerodaas.types.errors import InvalidWaypointError
 
 __all__ = ["build_app"]
 

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aerodaas.config.extras import require_extra
-from aerodaas.types.errors import ConfigError, MissionError, SourceError, UnreachableError
+from aerodaas.errors import ConfigError, MissionError, SourceError, UnreachableError
 
 __all__ = ["TOKEN_VARIABLE", "RemoteClient"]
 

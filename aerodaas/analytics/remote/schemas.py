@@ -9,14 +9,13 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
+from aerodaas.clock import seconds
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.vehicle import Traffic, VehicleState
+from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import Answer
-from aerodaas.types.clock import seconds
-from aerodaas.types.status import MissionStatus
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
 __all__ = ["AnswerOut", "OutlookOut", "StatusOut", "WaypointsIn"]
 

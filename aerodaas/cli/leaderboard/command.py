@@ -17,6 +17,7 @@ from aerodaas.cli.leaderboard.markdown import markdown_page
 from aerodaas.cli.leaderboard.origin import Origin
 from aerodaas.cli.leaderboard.page import html_page
 from aerodaas.cli.rows import write_csv
+from aerodaas.errors import ConfigError
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.leaderboard import (
     FULL,
@@ -29,7 +30,6 @@ from aerodaas.schedulers.lab.leaderboard import (
 from aerodaas.schedulers.lab.metrics import Mean
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["leaderboard"]
 

@@ -14,8 +14,8 @@ from aerodaas.cli.seeds.figures import rows, show
 from aerodaas.cli.seeds.runs import ApplicationRun, SeededRun, fly_seeds
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.mission_run import recording_folder
+from aerodaas.errors import ConfigError, MissionError
 from aerodaas.terminal.progress import show_progress
-from aerodaas.types.errors import ConfigError, MissionError
 
 __all__ = ["run_seeds"]
 

@@ -23,8 +23,8 @@ from aerodaas.cli.application import run_application
 from aerodaas.cli.failure import Failure, failure_of, show_failure
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.signals import heed_interrupts, raise_on_signals
+from aerodaas.errors import ConfigError, IncompleteError, RecordingError
 from aerodaas.recording.report.report import SUMMARY
-from aerodaas.types.errors import ConfigError, IncompleteError, RecordingError
 
 __all__ = ["ApplicationRun", "SeededRun", "fly_seeds"]
 

@@ -12,7 +12,7 @@ from aerodaas.dataflow.plans.commands import (
     FRAME_MISSION,
 )
 from aerodaas.dataflow.plans.plan import PlanItem
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["MOVES", "move_item", "move_of"]
 

@@ -13,8 +13,8 @@ from aerodaas.dataflow.plans.geojson import parse_geojson
 from aerodaas.dataflow.plans.kml import parse_kml
 from aerodaas.dataflow.plans.numbers import LatLon
 from aerodaas.dataflow.plans.rings import AreaReader
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["Area", "read_areas"]
 

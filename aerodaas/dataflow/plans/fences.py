@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.dataflow.plans.numbers import LatLon
 from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["geofence_of"]
 

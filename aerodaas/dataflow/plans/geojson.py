@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.dataflow.plans.rings import AreaReader
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["parse_geojson"]
 

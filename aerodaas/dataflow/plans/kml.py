@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 
 from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.dataflow.plans.rings import AreaReader
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["parse_kml"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["LatLon", "finite", "finite_or_none", "place", "whole"]
 

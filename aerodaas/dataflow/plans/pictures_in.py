@@ -36,9 +36,9 @@ from aerodaas.dataflow.plans.commands import (
 )
 from aerodaas.dataflow.plans.numbers import LatLon, place
 from aerodaas.dataflow.plans.plan import PlanItem
-from aerodaas.types.errors import ConfigError, InvalidWaypointError
-from aerodaas.types.geometry import wrap_angle
-from aerodaas.types.waypoints import LEAST_TRIGGER, HeightReference, Waypoint
+from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.geometry.frames import wrap_angle
+from aerodaas.messages.waypoints import LEAST_TRIGGER, HeightReference, Waypoint
 
 __all__ = ["Height", "PictureItems", "same_place"]
 

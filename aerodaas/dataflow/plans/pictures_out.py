@@ -21,7 +21,7 @@ from aerodaas.dataflow.plans.commands import (
     VIDEO_STOP_CAPTURE,
 )
 from aerodaas.dataflow.plans.plan import PlanItem
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["PictureWriter"]
 

@@ -23,7 +23,7 @@ from aerodaas.dataflow.plans.plan import (
     PlanItem,
 )
 from aerodaas.dataflow.plans.structure_scan import structure_scan
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["parse_qgroundcontrol"]
 

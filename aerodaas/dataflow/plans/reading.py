@@ -13,8 +13,8 @@ from aerodaas.dataflow.plans.plan import Notice, Plan
 from aerodaas.dataflow.plans.qgroundcontrol import parse_qgroundcontrol
 from aerodaas.dataflow.plans.waypoint_file import HEADER, parse_waypoint_file
 from aerodaas.dataflow.plans.waypoints_in import Ground, waypoints_of
-from aerodaas.types.errors import ConfigError, InvalidWaypointError
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["flown_plan", "read_plan", "warn_of"]
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from aerodaas.dataflow.plans.numbers import LatLon, finite, place
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["AreaReader"]
 

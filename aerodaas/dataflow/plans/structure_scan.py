@@ -23,8 +23,8 @@ from aerodaas.dataflow.plans.commands import (
 )
 from aerodaas.dataflow.plans.numbers import LatLon, finite, place
 from aerodaas.dataflow.plans.plan import MOST_ITEMS, PlanItem
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["structure_scan"]
 

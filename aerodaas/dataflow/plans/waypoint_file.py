@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from aerodaas.dataflow.plans.commands import FRAME_ABOVE_SEA, NAV_WAYPOINT, command_name
 from aerodaas.dataflow.plans.numbers import finite
 from aerodaas.dataflow.plans.plan import MOST_ITEMS, Plan, PlanHome, PlanItem
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["HEADER", "parse_waypoint_file"]
 

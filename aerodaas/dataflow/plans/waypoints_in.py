@@ -30,9 +30,9 @@ from aerodaas.dataflow.plans.commands import (
 from aerodaas.dataflow.plans.numbers import LatLon, finite, place
 from aerodaas.dataflow.plans.pictures_in import PictureItems, same_place
 from aerodaas.dataflow.plans.plan import Notice, Plan, PlanItem
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import yaw_ned_to_enu
-from aerodaas.types.waypoints import HeightReference, Waypoint, WaypointType
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import yaw_ned_to_enu
+from aerodaas.messages.waypoints import HeightReference, Waypoint, WaypointType
 
 __all__ = ["Ground", "waypoints_of"]
 

@@ -27,9 +27,9 @@ from aerodaas.dataflow.plans.commands import (
 from aerodaas.dataflow.plans.pictures_out import PictureWriter
 from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon, Notice, Plan, PlanHome, PlanItem
 from aerodaas.dataflow.plans.waypoint_file import HEADER
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin, yaw_enu_to_ned
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin, yaw_enu_to_ned
+from aerodaas.messages.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = ["planned", "write_plan"]
 

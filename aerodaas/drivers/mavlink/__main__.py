@@ -12,7 +12,7 @@ from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 _SETTLING = 2.0
 """Seconds within which its slowest messages arrive."""

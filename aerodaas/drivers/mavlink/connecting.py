@@ -26,8 +26,8 @@ from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin, Vector, ned_to_enu
 
 __all__ = ["CHECKS", "Connection", "establish", "require_answer"]
 

@@ -17,7 +17,7 @@ from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
 from aerodaas.drivers.mavlink.wire.transport import Transport, open_transport
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["LISTENED", "HeardVehicle", "MavlinkDiscovery", "hear_vehicles"]
 

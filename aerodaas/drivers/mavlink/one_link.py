@@ -7,7 +7,7 @@ from itertools import combinations
 
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["check_links", "link_of"]
 

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from aerodaas.clock import Clock, ScaledClock
 from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
@@ -44,12 +45,11 @@ from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.wire.rates import RateKeeper
 from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
-from aerodaas.types.clock import Clock, ScaledClock
-from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.payload import Gimbal, PhotoCamera
-from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
-from aerodaas.types.vehicle_log import LogEntry
+from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.payload import Gimbal, PhotoCamera
+from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
+from aerodaas.messages.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
 

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.images import decode_image
 from aerodaas.cameras.settings import camera_model
+from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
 from aerodaas.drivers.ros2.settings import Ros2CameraSettings, ros2_camera_settings
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 from aerodaas.ros.incoming import stamp_of
 from aerodaas.ros.link import RosLink, domain_of, require_dds
 from aerodaas.ros.stamps import MessageClock
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
 
 __all__ = ["Ros2Camera"]
 

@@ -7,12 +7,12 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.drivers.ros2.frames import Alignment
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.ros.incoming import battery_of, fix_of, odometry_of, stamp_of
 from aerodaas.ros.stamps import MessageClock, StampSource
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["RosFeed"]
 

@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, body_to_enu, enu_to_body, rotation_from_rpy, wrap_angle
+from aerodaas.geometry.frames import Vector, body_to_enu, enu_to_body, rotation_from_rpy, wrap_angle
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["Alignment", "VelocityFrame", "velocity_in"]
 

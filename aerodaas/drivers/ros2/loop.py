@@ -12,15 +12,10 @@ import numpy as np
 
 from aerodaas.drivers.ros2.touchdown import Touchdown
 from aerodaas.drivers.setpoints import slowed
-from aerodaas.types.braking import limit_length, stopping_point, velocity_towards
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length, wrap_angle
-from aerodaas.types.vehicle import (
-    FlightEnd,
-    PositionSetpoint,
-    VehicleMode,
-    VelocitySetpoint,
-)
+from aerodaas.geometry.braking import limit_length, stopping_point, velocity_towards
+from aerodaas.geometry.frames import Vector, length, wrap_angle
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
 
 __all__ = ["STANDS_STILL", "Limits", "VelocityLoop"]
 

@@ -8,9 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.errors import ConfigError
 from aerodaas.ros.names import Domain, TopicName
 from aerodaas.ros.stamps import StampSource
-from aerodaas.types.errors import ConfigError
 
 __all__ = ["Ros2CameraSettings", "Ros2Settings", "ros2_camera_settings", "ros2_settings"]
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.drivers.ros2.frames import Alignment, velocity_in
 from aerodaas.drivers.ros2.settings import Ros2Settings
+from aerodaas.geometry.frames import is_finite
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VelocitySetpoint
 from aerodaas.ros.link import RosLink
-from aerodaas.types.clock import NANOSECONDS, host_time_ns
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import is_finite
-from aerodaas.types.vehicle import VelocitySetpoint
 
 __all__ = ["Steering"]
 

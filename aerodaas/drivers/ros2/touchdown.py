@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections import deque
 
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import FlightEnd
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import FlightEnd
 
 __all__ = ["Touchdown"]
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.ros2.feed import RosFeed
 from aerodaas.drivers.ros2.frames import Alignment
@@ -18,18 +19,17 @@ from aerodaas.drivers.ros2.loop import STANDS_STILL, Limits, VelocityLoop
 from aerodaas.drivers.ros2.settings import Ros2Settings, ros2_settings
 from aerodaas.drivers.ros2.steering import Steering
 from aerodaas.drivers.setpoints import require_finite
-from aerodaas.ros.link import RosLink, domain_of, require_dds
-from aerodaas.types.clock import NANOSECONDS, Clock, ScaledClock
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import InvalidWaypointError, SourceError, VehicleError
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.vehicle import (
+from aerodaas.errors import InvalidWaypointError, SourceError, VehicleError
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import (
     Capabilities,
     Setpoint,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.ros.link import RosLink, domain_of, require_dds
 
 __all__ = ["Ros2Vehicle"]
 
@@ -40,7 +40,7 @@ _LAST_WORDS = 5
 
 
 class Ros2Vehicle:
-    """A drone on ROS 2 topics; implements `aerodaas.types.vehicle.Vehicle`.
+    """A drone on ROS 2 topics; implements `aerodaas.messages.vehicle.Vehicle`.
 
     All motion is by velocities: those of setpoints, and a loop of our own at 20 Hz for take-off,
     hold and landing. Without setpoints for half a second it stops; without odometry it is told to

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from collections import deque
 
-from aerodaas.types.data import Battery
+from aerodaas.messages.odometry import Battery
 
 __all__ = ["BatteryGauge"]
 

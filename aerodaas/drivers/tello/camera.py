@@ -14,6 +14,7 @@ from av.video.frame import VideoFrame
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.h264 import FrameAssembler, FrameDecoder, bgr_image
 from aerodaas.cameras.settings import camera_model
+from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.drivers.pin import Pin
 from aerodaas.drivers.tello.settings import (
@@ -22,10 +23,9 @@ from aerodaas.drivers.tello.settings import (
     tello_settings,
 )
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import ConfigError, SourceError
-from aerodaas.types.geometry import CameraModel
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["TelloCamera", "VideoCounts"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.types.geometry import Vector
+from aerodaas.geometry.frames import Vector
 
 __all__ = [
     "ENTER",

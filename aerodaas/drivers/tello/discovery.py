@@ -15,7 +15,7 @@ from aerodaas.drivers.tello.commands import ENTER, Command
 from aerodaas.drivers.tello.settings import STATE_PORT, TelloSettings
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.drivers.tello.state import parse_state
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["TelloDiscovery", "find_tello"]
 

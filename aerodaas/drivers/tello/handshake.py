@@ -8,7 +8,7 @@ import time
 from aerodaas.drivers.tello.commands import ENTER, STREAM_ON, VERSION, Command, ports
 from aerodaas.drivers.tello.link import TelloLink
 from aerodaas.drivers.tello.settings import STATE_PORT, VIDEO_PORT, TelloSettings
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["explain_no_states", "greet", "meaning"]
 

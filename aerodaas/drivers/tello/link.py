@@ -19,7 +19,7 @@ from aerodaas.drivers.tello.dead_man import DeadMan
 from aerodaas.drivers.tello.settings import TelloSettings
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.drivers.tello.state import TelloState, parse_state
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["LinkCounts", "TelloLink"]
 

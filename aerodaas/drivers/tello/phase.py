@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.types.vehicle import FlightEnd, VehicleMode
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["LIFTED", "FlightPhase"]
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from aerodaas.drivers.tello.commands import BodyMotion
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, body_to_enu, wrap_angle
+from aerodaas.geometry.frames import Vector, body_to_enu, wrap_angle
+from aerodaas.messages.odometry import Odometry
 
 __all__ = ["DeadReckoning"]
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, RobotConfig, SensorConfig
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = [
     "STATE_PORT",

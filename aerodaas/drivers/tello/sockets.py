@@ -6,7 +6,7 @@ import errno
 import os
 import socket
 
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["bound_socket", "datagrams"]
 

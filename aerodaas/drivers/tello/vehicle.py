@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite, slowed
 from aerodaas.drivers.tello.battery import BatteryGauge
@@ -28,12 +29,11 @@ from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.settings import TelloSettings, tello_settings, video_port
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.types.braking import limit_length, velocity_towards
-from aerodaas.types.clock import NANOSECONDS, Clock, ScaledClock
-from aerodaas.types.errors import InvalidWaypointError, VehicleError
-from aerodaas.types.geometry import Vector, enu_to_body, wrap_angle
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.vehicle import (
+from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.geometry.braking import limit_length, velocity_towards
+from aerodaas.geometry.frames import Vector, enu_to_body, wrap_angle
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -73,7 +73,7 @@ _CLIMB_MARGIN = 3.0
 
 
 class TelloVehicle:
-    """A DJI Ryze Tello; implements `aerodaas.types.vehicle.Vehicle`.
+    """A DJI Ryze Tello; implements `aerodaas.messages.vehicle.Vehicle`.
 
     All motion is by `rc`: velocities directly, positions by our own loop on dead reckoning, so that
     a target can change at any time and has no minimum distance. Each `send` is one `rc`: when the

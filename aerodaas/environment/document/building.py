@@ -24,8 +24,8 @@ from aerodaas.dataflow.mission_document import (
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueReader
 from aerodaas.environment.environment import Environment
-from aerodaas.types.errors import AeroDaaSError, GraphError
-from aerodaas.types.waypoints import NavigationType, SchedulingType
+from aerodaas.errors import AeroDaaSError, GraphError
+from aerodaas.messages.waypoints import NavigationType, SchedulingType
 
 __all__ = ["build_mission"]
 

@@ -26,9 +26,9 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueWriter, registered_name
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.offering import require_no_more
-from aerodaas.types.data import Frame
-from aerodaas.types.errors import GraphError
-from aerodaas.types.waypoints import SchedulingType
+from aerodaas.errors import GraphError
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.waypoints import SchedulingType
 
 __all__ = ["WrittenMission", "compile_mission", "write_mission"]
 

@@ -12,9 +12,9 @@ from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.offering import offered, the_only
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
 
 __all__ = ["compile_application", "fly_mission", "recorded_document"]
 

@@ -21,7 +21,7 @@ from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.models.cache import fetched_path, model_folder, model_named
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.environment.environment import Environment
-from aerodaas.types.errors import AeroDaaSError, GraphError
+from aerodaas.errors import AeroDaaSError, GraphError
 
 __all__ = ["ValueReader", "ValueWriter", "registered_name"]
 

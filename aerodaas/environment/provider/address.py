@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from aerodaas.config.secrets import shown_text
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["INSECURE_VARIABLE", "ServiceAddress", "is_url"]
 

@@ -19,6 +19,7 @@ from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
@@ -41,7 +42,6 @@ from aerodaas.protocol.schemas import (
     TokenOut,
     UsageOut,
 )
-from aerodaas.types.errors import ConfigError, SourceError
 
 __all__ = ["LARGEST_MODEL", "ProviderClient"]
 

@@ -7,6 +7,8 @@ from pydantic import ValidationError
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.errors import GraphError, InvalidWaypointError
+from aerodaas.messages.waypoints import SchedulingType
 from aerodaas.mission.commands import (
     Actuate,
     AddNavigation,
@@ -21,8 +23,6 @@ from aerodaas.mission.commands import (
 from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.schemas import CommandIn, NavigationIn
-from aerodaas.types.errors import GraphError, InvalidWaypointError
-from aerodaas.types.waypoints import SchedulingType
 
 __all__ = ["send_command"]
 

@@ -14,7 +14,7 @@ from urllib3.exceptions import HTTPError, MaxRetryError
 
 from aerodaas.config.printable import printable
 from aerodaas.environment.provider.address import ServiceAddress
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
 
 __all__ = ["Exchange", "Method", "printed"]
 

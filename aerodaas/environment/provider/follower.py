@@ -10,8 +10,8 @@ from collections.abc import Callable
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
+from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.protocol.schemas import MissionOut
-from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 __all__ = ["MissionFollower"]
 

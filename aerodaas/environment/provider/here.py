@@ -14,7 +14,7 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
-from aerodaas.types.errors import AeroDaaSError, SourceError
+from aerodaas.errors import AeroDaaSError, SourceError
 
 __all__ = ["HereLink"]
 

@@ -13,7 +13,7 @@ from aerodaas.config.private_file import write_private
 from aerodaas.config.user_folders import config_folder
 from aerodaas.environment.provider.address import INSECURE_VARIABLE, ServiceAddress
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["TOKEN_VARIABLE", "URL_VARIABLE", "Logins", "client_for", "default_url"]
 

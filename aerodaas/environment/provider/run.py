@@ -22,10 +22,7 @@ from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals
-from aerodaas.mission.commands import Answer, Command, initial_commands
-from aerodaas.protocol.schemas import MissionOut, MissionPhase
-from aerodaas.runtime.checks import check_graph
-from aerodaas.types.errors import (
+from aerodaas.errors import (
     AeroDaaSError,
     ConfigError,
     GraphError,
@@ -33,7 +30,10 @@ from aerodaas.types.errors import (
     RecordingError,
     SourceError,
 )
-from aerodaas.types.waypoints import HeightDatum, Waypoint
+from aerodaas.messages.waypoints import HeightDatum, Waypoint
+from aerodaas.mission.commands import Answer, Command, initial_commands
+from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.runtime.checks import check_graph
 
 if TYPE_CHECKING:
     from aerodaas.environment.document.compiling import WrittenMission

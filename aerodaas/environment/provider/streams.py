@@ -14,7 +14,7 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.live import ReceivedItem
 from aerodaas.environment.provider.pauses import pauses
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, failure_line
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, failure_line
 
 __all__ = ["WireReader"]
 

@@ -9,8 +9,8 @@ from typing import Any
 from aerodaas.config.options import RunOptions
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.errors import ConfigError, UnreachableError
 from aerodaas.protocol.schemas import MissionIn, MissionOut
-from aerodaas.types.errors import ConfigError, UnreachableError
 
 __all__ = ["submit"]
 

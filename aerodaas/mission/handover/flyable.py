@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 
 from aerodaas.config.robot import LimitsConfig
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission_mode import PlannedPlace
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
 from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.types.geometry import Vector
-from aerodaas.types.mission_mode import PlannedPlace
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["planned_places", "unflyable"]
 

@@ -14,7 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.config.robot import RobotConfig
+from aerodaas.errors import VehicleError
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission_mode import MissionMode, MissionModePhase, MissionModeVehicle
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.commands import Answer, HandOver, TakeBack
 from aerodaas.mission.handover.flyable import planned_places, unflyable
 from aerodaas.mission.log import MissionLog
@@ -22,11 +27,6 @@ from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.route import Route
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.supervisor import has_position
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.mission_mode import MissionMode, MissionModePhase, MissionModeVehicle
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["HANDED_OVER", "Handover"]
 

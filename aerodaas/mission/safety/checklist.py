@@ -9,14 +9,20 @@ from dataclasses import replace
 
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.preflight import PreflightConfig, PreflightLevel
+from aerodaas.errors import VehicleError
+from aerodaas.messages.health import (
+    OWN_CHECKS,
+    HealthItem,
+    HealthReadings,
+    MeasuredVehicle,
+    Verdict,
+)
+from aerodaas.messages.payload import CameraStatus
+from aerodaas.messages.vehicle import Vehicle, VehicleState
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.sun import sun_elevation
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
 from aerodaas.mission.safety.traffic import DEMANDS, encounters
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.health import OWN_CHECKS, HealthItem, HealthReadings, MeasuredVehicle, Verdict
-from aerodaas.types.payload import CameraStatus
-from aerodaas.types.sun import sun_elevation
-from aerodaas.types.vehicle import Vehicle, VehicleState
 
 __all__ = ["Checklist", "concerns", "refusals"]
 

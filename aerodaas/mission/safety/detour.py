@@ -9,9 +9,9 @@ import shapely
 import shapely.ops
 from shapely.geometry.base import BaseGeometry
 
+from aerodaas.geometry.frames import Vector
+from aerodaas.geometry.free_path import Place, free_path
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.types.free_path import Place, free_path
-from aerodaas.types.geometry import Vector
 
 __all__ = ["Detour"]
 

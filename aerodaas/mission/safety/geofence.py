@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from aerodaas.config.model import GeofenceConfig
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Vector, length
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Vector, length
 
 __all__ = ["Geofence"]
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig
+from aerodaas.geometry.braking import braking_speed
+from aerodaas.geometry.frames import Vector, wrap_angle
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.braking import braking_speed
-from aerodaas.types.geometry import Vector, wrap_angle
 
 __all__ = ["GroundClearance", "GroundView", "climb_speed"]
 

@@ -11,19 +11,19 @@ from collections import deque
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import LimitsConfig
-from aerodaas.mission.actions import Action, Land, TakeOff
-from aerodaas.types.braking import velocity_towards
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, length
-from aerodaas.types.vehicle import (
+from aerodaas.geometry.braking import velocity_towards
+from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import (
     PositionSetpoint,
     Setpoint,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.mission.actions import Action, Land, TakeOff
 
 __all__ = ["STANDS_AFTER", "MotionWatch"]
 

@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.mission.safety.supervisor import has_position
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.geometry import Vector
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["MotorWatch", "Motors", "Standstill"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from aerodaas.types.clock import seconds
-from aerodaas.types.geometry import Vector, is_finite
-from aerodaas.types.records import fast_pickle
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import Vector, is_finite
+from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["SILENT", "Neighbour", "Neighbours", "Whereabouts"]
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import GpsFix, Odometry
-from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.odometry import GpsFix, Odometry
 
 __all__ = ["Reconciler"]
 

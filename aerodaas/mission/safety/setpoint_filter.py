@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aerodaas.config.model import LimitsConfig
+from aerodaas.geometry.braking import braking_speed, limit_length, velocity_towards
+from aerodaas.geometry.frames import Vector, is_close, is_finite, length
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView, climb_speed
 from aerodaas.mission.safety.neighbours import Neighbour
-from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, is_close, is_finite, length
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
 __all__ = ["FilteredSetpoint", "SetpointFilter"]
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import LimitsConfig
+from aerodaas.geometry.energy import EnergyMeter
+from aerodaas.geometry.frames import Vector, is_finite, length
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.log import subject
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motion import STANDS_AFTER, MotionWatch
 from aerodaas.mission.safety.traffic import TrafficWatch
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.energy import EnergyMeter
-from aerodaas.types.geometry import Vector, is_finite, length
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = [
     "CALM",

@@ -6,14 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from aerodaas.clock import seconds
 from aerodaas.config.robot import LimitsConfig
 from aerodaas.config.traffic import TrafficConfig
+from aerodaas.geometry.frames import Vector, is_finite
+from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.neighbours import Neighbour
-from aerodaas.types.clock import seconds
-from aerodaas.types.geometry import Vector, is_finite
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["DEMANDS", "Encounter", "TrafficWatch", "encounters", "meets_in", "traffic_neighbours"]
 

@@ -9,14 +9,14 @@ from typing import Any
 
 from foxglove.messages import Quaternion, Timestamp, Vector3
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import RecordingConfig
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.guest_item import GuestItem
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.rotation import Rotation
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.status import Message
 
 __all__ = ["Session", "convert", "quaternion", "vector", "xyz"]
 

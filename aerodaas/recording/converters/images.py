@@ -23,6 +23,10 @@ from foxglove.messages import (
 from numpy.typing import NDArray
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame, odometry_json
 from aerodaas.recording.encoded_frame import EncodedFrame
@@ -31,9 +35,6 @@ from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.report.overlay import VISIBLE
 from aerodaas.recording.report.palette import label_colour, rgb
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.status import Message
 
 __all__: list[str] = []
 

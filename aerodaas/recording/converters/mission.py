@@ -8,12 +8,13 @@ from typing import Any
 from foxglove.messages import LogLevel
 
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.mission import Decision, MissionStatus
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import plan_entries
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
-from aerodaas.types.status import Decision, Message, MissionStatus
-from aerodaas.types.waypoints import Waypoint
 
 __all__: list[str] = []
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from foxglove.messages import Log, LogLevel
 
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.readings import Alert
 from aerodaas.recording.converters.base import Session, convert
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema
-from aerodaas.types.data import Alert
-from aerodaas.types.status import Message
 
 __all__ = ["log_entry"]
 

@@ -23,14 +23,14 @@ from foxglove.messages import (
 )
 
 from aerodaas.config.model import GeofenceConfig
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.identifiers import internal
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.reference_frames import MAP_FRAME
 from aerodaas.recording.report.palette import OKABE_ITO, rgb
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.identifiers import internal
-from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["fence_entries", "plan_entries"]
 

@@ -13,15 +13,15 @@ from foxglove.messages import (
 )
 from foxglove.messages import Odometry as FoxgloveOdometry
 
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.mission import SetpointRecord
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.payload import Photo
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, Setpoint, Traffic, VehicleState
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector, xyz
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.payload import Photo
-from aerodaas.types.status import Message, SetpointRecord
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
 __all__ = ["body_frame", "odometry_json"]
 

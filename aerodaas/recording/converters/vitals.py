@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from aerodaas.clock import seconds
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.converters.base import Session, convert
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema
-from aerodaas.types.clock import seconds
-from aerodaas.types.status import Message
-from aerodaas.types.vitals import Vitals
 
 __all__: list[str] = []
 

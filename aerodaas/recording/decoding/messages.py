@@ -19,14 +19,14 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, with_confi
 from typing_extensions import NotRequired, TypedDict
 
 from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from aerodaas.recording.decoding.limits import (
     MAX_DEPTH,
     MAX_JSON,
     MAX_PROTOBUF_FIELDS,
 )
 from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["BrokenMessageError", "MessageDecoder", "decode_json", "plain_fields"]
 

@@ -14,14 +14,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.errors import RecordingError
+from aerodaas.messages.detections import Detection
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.pictures import Shot, detections_by_frame, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.overlay import VISIBLE
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Detection
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["write_coco"]
 

@@ -17,6 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
 from aerodaas.recording.export.lerobot_tables import write_tables
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.export.video import VideoFile
@@ -24,8 +26,6 @@ from aerodaas.recording.pictures import frames, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.recording.states import state_of
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["ACTION", "STATE", "write_lerobot"]
 

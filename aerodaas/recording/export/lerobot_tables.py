@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.errors import RecordingError
+from aerodaas.errors import RecordingError
 
 __all__ = ["write_tables"]
 

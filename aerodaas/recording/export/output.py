@@ -6,7 +6,7 @@ import re
 from hashlib import blake2b
 from pathlib import Path
 
-from aerodaas.types.errors import RecordingError
+from aerodaas.errors import RecordingError
 
 __all__ = ["file_name", "new_file"]
 

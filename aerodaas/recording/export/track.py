@@ -9,12 +9,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_environment import recorded_home
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["write_gpx", "write_kml"]
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.errors import RecordingError
+from aerodaas.messages.frames import Frame
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.overlay import draw_detections, draw_line
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.data import Frame
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["VideoFile", "write_videos"]
 

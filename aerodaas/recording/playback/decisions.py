@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
+from aerodaas.clock import seconds
 from aerodaas.protocol.schemas import AnalyticsOut
-from aerodaas.types.clock import seconds
 
 __all__ = ["DecisionSums"]
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.depth import METRE
+from aerodaas.geometry.depth import METRE
 
 __all__ = ["depth_picture"]
 

@@ -10,6 +10,10 @@ from typing import Any
 
 from aerodaas.analytics.wire_items import ItemError, pack
 from aerodaas.cameras.images import VIDEO_SCHEMAS, picture_bytes
+from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_size
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.pictures import Shot, detections, shots
 from aerodaas.recording.playback.page_items import (
@@ -21,10 +25,6 @@ from aerodaas.recording.playback.page_items import (
 from aerodaas.recording.playback.target import target_of
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 
 __all__ = ["Captures", "Film", "Packed"]
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.redaction import catalogue
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.playback import AlertOut, RecordedOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import StreamKind
@@ -20,8 +22,6 @@ from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_camera import CALIBRATION_SCHEMA, MOUNT_SCHEMA
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
 from aerodaas.simulation.scenario import scenario_names
-from aerodaas.types.clock import NANOSECONDS, seconds
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["read_flight"]
 

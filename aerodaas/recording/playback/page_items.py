@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.following.ground_point import ground_point
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import FollowedTarget
 from aerodaas.recording.playback.depth_picture import depth_picture
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.data import Detection, Detections, Header
-from aerodaas.types.target import FollowedTarget
 
 __all__ = ["packed_depth", "packed_picture", "packed_places", "packed_target"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from aerodaas.types.data import Header
-from aerodaas.types.target import FollowedTarget, TargetState
+from aerodaas.messages.frames import Header
+from aerodaas.messages.waypoints import FollowedTarget, TargetState
 
 __all__ = ["NAVIGATION_SCHEMA", "target_of"]
 

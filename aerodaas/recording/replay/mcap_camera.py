@@ -9,12 +9,12 @@ from dataclasses import replace
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.errors import RecordingError, SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.pictures import Shot, decoded_ahead, picture_topics, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.steady_clock import SteadyClock
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import RecordingError, SourceError
-from aerodaas.types.geometry import CameraModel
 
 __all__ = ["McapCamera", "ReplayedCamera"]
 

@@ -9,11 +9,11 @@ from typing import ClassVar
 from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.errors import ConfigError, VehicleError
+from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
 from aerodaas.simulation.actuators import SimulatedActuators
-from aerodaas.types.errors import ConfigError, VehicleError
-from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 
 __all__ = ["ReplayedVehicle"]
 

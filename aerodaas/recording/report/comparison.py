@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.report.page.document import document, paragraph, picture, section, table
 from aerodaas.recording.report.page.flight import origin_line
 from aerodaas.recording.report.page.tables import figures
 from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.report import Report, read_report
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["comparison_page", "write_comparison"]
 

@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.reader import Record, Recording
-from aerodaas.types.clock import seconds
 
 __all__ = [
     "Band",

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedDetection, RecordedFlight
 from aerodaas.recording.report.overlay import draw_detections
-from aerodaas.types.clock import NANOSECONDS, seconds
 
 __all__ = ["Moment", "MomentPicture", "key_moments", "picture_moments"]
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.messages.detections import Detection
 from aerodaas.recording.report.palette import label_colour
-from aerodaas.types.data import Detection
 
 __all__ = ["VISIBLE", "draw_detections", "draw_line"]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 
 from aerodaas.config.extras import has_extra
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
@@ -18,7 +19,6 @@ from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.vehicle_log.attachment import AttachedLog, attached_logs
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["SUMMARY", "Report", "ReportFiles", "read_report", "write_report", "write_summary"]
 

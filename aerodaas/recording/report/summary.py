@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from typing_extensions import Self
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight, StreamLatency
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["FlightSummary", "LatencyFigures", "RobotFigures"]
 

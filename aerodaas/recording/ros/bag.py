@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, Protocol
 
 from typing_extensions import Self
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording, Topic
 from aerodaas.recording.ros.sqlite_part import SqlitePart
 from aerodaas.recording.steady_clock import SteadyClock
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["BagMessage", "RosBag"]
 

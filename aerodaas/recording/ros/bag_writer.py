@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from aerodaas.errors import RecordingError
+from aerodaas.geometry.frames import is_finite
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, detections_of, shots
 from aerodaas.recording.reader import Record, Recording
@@ -20,8 +22,6 @@ from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.recording.states import state_of
 from aerodaas.ros.names import permitted_topic
-from aerodaas.types.errors import RecordingError
-from aerodaas.types.geometry import is_finite
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection, Qos

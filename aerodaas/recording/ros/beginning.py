@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from aerodaas.cameras.images import picture_bytes
+from aerodaas.cameras.picture_size import picture_fits, picture_size
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
 from aerodaas.recording.ros.lens import Place, camera_settings, info_topic, place_of
 from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.ros.incoming import battery_of, fix_of, odometry_of, stamp_of
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.picture_size import picture_fits, picture_size
 
 __all__ = ["Beginning"]
 

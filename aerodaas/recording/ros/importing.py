@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from aerodaas.cameras.images import decode_image, picture_bytes
+from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_size
 from aerodaas.cameras.settings import camera_model
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.checked import checked
 from aerodaas.config.document import public_document
 from aerodaas.config.model import (
@@ -21,6 +23,14 @@ from aerodaas.config.model import (
     RecordingConfig,
     validated,
 )
+from aerodaas.errors import AeroDaaSError, RecordingError, SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.identifiers import internal
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance, package_versions
@@ -30,14 +40,6 @@ from aerodaas.recording.ros.bag import BagMessage, RosBag
 from aerodaas.recording.ros.beginning import Beginning
 from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.ros.incoming import battery_of, detection_items, fix_of, odometry_of
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detections, Frame, Header, Odometry
-from aerodaas.types.errors import AeroDaaSError, RecordingError, SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.identifiers import internal
-from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["ImportedBag", "import_bag"]
 

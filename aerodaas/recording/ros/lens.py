@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.frames import FLU_FROM_OPTICAL, rotation_from_rpy
 from aerodaas.ros.incoming import euler_of
-from aerodaas.types.geometry import FLU_FROM_OPTICAL, rotation_from_rpy
 
 __all__ = ["Place", "camera_settings", "info_topic", "place_of"]
 

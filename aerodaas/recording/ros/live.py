@@ -8,6 +8,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from aerodaas.geometry.frames import CameraModel, is_finite
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link
 from aerodaas.recording.ros import typestore
@@ -15,10 +20,6 @@ from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
 from aerodaas.ros.link import RosLink, RosPublisher
 from aerodaas.ros.names import permitted_topic, ros_type
-from aerodaas.types.data import Detections, Frame
-from aerodaas.types.geometry import CameraModel, is_finite
-from aerodaas.types.status import Message
-from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["RosGraph"]
 

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.rotation import Rotation, from_rpy
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Detections, GpsFix, Odometry
-from aerodaas.types.geometry import Vector
 
 __all__ = ["MessageBuilder"]
 

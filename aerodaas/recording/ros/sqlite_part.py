@@ -16,10 +16,10 @@ from urllib.parse import quote
 
 import zstandard
 
+from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.recording.decoding.limits import MAX_CHANNELS, MAX_CHUNK, MAX_RATIO, MAX_UNPACKED
 from aerodaas.recording.reader import Topic
 from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
-from aerodaas.types.errors import AeroDaaSError, RecordingError
 
 __all__ = ["SqlitePart"]
 

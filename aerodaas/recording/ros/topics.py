@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Topic
 from aerodaas.recording.ros import typestore
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["BagTopics", "Taken", "use_of"]
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from typing_extensions import Self
 
+from aerodaas.clock import seconds
+from aerodaas.errors import RecordingError, UnknownIdError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.vehicle_log.clock_line import ClockLine, fit_clock_line, starts_of
 from aerodaas.recording.vehicle_log.log import Floats, VehicleLog
-from aerodaas.types.clock import seconds
-from aerodaas.types.errors import RecordingError, UnknownIdError
 
 __all__ = ["Alignment", "RecordedClock", "align", "recorded_clocks", "robot_of"]
 

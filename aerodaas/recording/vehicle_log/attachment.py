@@ -6,7 +6,9 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.printable import printable
+from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.decoding.limits import MAX_VEHICLE_LOG
 from aerodaas.recording.reader import Recording
@@ -19,8 +21,6 @@ from aerodaas.recording.vehicle_log.alignment import (
 )
 from aerodaas.recording.vehicle_log.log import VehicleLog
 from aerodaas.recording.vehicle_log.reading import read_vehicle_log
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import AeroDaaSError, RecordingError
 
 __all__ = ["AttachedLog", "attach_log", "attached_logs", "flight_of"]
 

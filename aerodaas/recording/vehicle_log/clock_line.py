@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.vehicle_log.log import Floats
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["ClockLine", "fit_clock_line", "starts_of"]
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.vehicle_log.log import Floats, LogText, Series, Topic, VehicleLog
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["DATAFLASH_HEAD", "read_dataflash"]
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.limits import MAX_VEHICLE_LOG
 from aerodaas.recording.vehicle_log.dataflash import DATAFLASH_HEAD, read_dataflash
 from aerodaas.recording.vehicle_log.log import Series, Topic, VehicleLog
 from aerodaas.recording.vehicle_log.ulog import ULOG_HEAD, read_ulog
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["read_vehicle_log"]
 

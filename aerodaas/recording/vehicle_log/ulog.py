@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aerodaas.config.extras import require_extra
+from aerodaas.errors import RecordingError
 from aerodaas.recording.vehicle_log.log import Floats, LogText, Series, Topic, VehicleLog
-from aerodaas.types.errors import RecordingError
 
 if TYPE_CHECKING:
     from pyulog import ULog

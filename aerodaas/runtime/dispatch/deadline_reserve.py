@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from aerodaas.messages.envelope import Message
 from aerodaas.schedulers.analytics.base import MILLISECOND
-from aerodaas.types.status import Message
 
 __all__ = ["DeadlineReserve"]
 

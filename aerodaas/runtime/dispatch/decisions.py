@@ -6,13 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from aerodaas.clock import host_time_ns
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import Decision
 from aerodaas.runtime.node import Outlet
 from aerodaas.runtime.stream_names import DECISIONS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Result, Task, TaskOutcome
 from aerodaas.schedulers.analytics.windows import QoeWindows
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Header
-from aerodaas.types.status import Decision, Message
 
 __all__ = ["Counts", "DecisionLog"]
 

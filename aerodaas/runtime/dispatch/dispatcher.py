@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
+from aerodaas.errors import failure_line
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.dispatch.decisions import Counts, DecisionLog
 from aerodaas.runtime.dispatch.guarded_scheduler import GuardedDispatch
 from aerodaas.runtime.node import Node
@@ -33,9 +36,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskOutcome,
 )
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
-from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
-from aerodaas.types.errors import failure_line
-from aerodaas.types.status import Message
 
 __all__ = ["Dispatcher", "Managed"]
 

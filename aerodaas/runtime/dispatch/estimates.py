@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.runtime.dispatch.costs import ExecutionEstimates
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["Estimates"]
 

@@ -6,9 +6,9 @@ import random
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import SimulationConfig
 from aerodaas.schedulers.analytics.base import Task
-from aerodaas.types.clock import NANOSECONDS
 
 if TYPE_CHECKING:
     from aerodaas.schedulers.lab.network import Network

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
-from aerodaas.types.records import fast_pickle
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.records import fast_pickle
 
 __all__ = ["Codec", "CodedFrame", "decoded", "load"]
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.dispatch import Dispatch
-from aerodaas.types.errors import SchedulerError
 
 __all__ = ["GuardedDispatch"]
 

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from aerodaas.messages.envelope import Message
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.records import fast_pickle
 from aerodaas.runtime.session import FRAME_DEPTH
-from aerodaas.types.data import Frame
-from aerodaas.types.records import fast_pickle
-from aerodaas.types.status import Message
 
 __all__ = ["FrameReference", "FrameReferences", "MissingFrame", "RecentFrames"]
 

@@ -15,12 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from aerodaas.messages.envelope import Message
 from aerodaas.runtime.dispatch.dispatcher import Dispatcher, Managed
 from aerodaas.runtime.dispatch.executions import Executions
 from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources, Task, TaskOutcome
-from aerodaas.types.status import Message
 
 __all__ = ["SimulatedDispatcher"]
 

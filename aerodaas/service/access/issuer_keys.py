@@ -17,7 +17,7 @@ from urllib3.exceptions import HTTPError
 
 from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.config.printable import printable
-from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.errors import ConfigError, SourceError
 
 __all__ = ["IssuerKeys", "require_secure"]
 

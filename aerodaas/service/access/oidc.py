@@ -14,10 +14,10 @@ from typing import Any
 import jwt
 
 from aerodaas.config.printable import printable
+from aerodaas.errors import SourceError
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.issuer_keys import IssuerKeys
 from aerodaas.service.errors import RefusedError
-from aerodaas.types.errors import SourceError
 
 __all__ = ["Issued", "OidcSettings", "OidcVerifier"]
 

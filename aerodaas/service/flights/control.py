@@ -21,6 +21,8 @@ from pydantic import ValidationError
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.clock import host_time_ns, seconds
+from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
@@ -30,8 +32,6 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.unix_server import UnixServer
-from aerodaas.types.clock import host_time_ns, seconds
-from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["ControlServer", "Flown", "Reader"]
 

@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from aerodaas.config.file_lock import exclusive, is_locked
 from aerodaas.config.private_file import write_private
+from aerodaas.errors import MissionError
 from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
 from aerodaas.service.unix_server import fits_a_socket
-from aerodaas.types.errors import MissionError
 
 __all__ = ["FlightFolder"]
 

@@ -14,12 +14,12 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.clock import host_time_ns, seconds
+from aerodaas.errors import ConfigError, MissionError
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.trouble import TroubleLog
-from aerodaas.types.clock import host_time_ns, seconds
-from aerodaas.types.errors import ConfigError, MissionError
 
 __all__ = ["FlightLink", "FlightNews"]
 

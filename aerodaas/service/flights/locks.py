@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from aerodaas.config.file_lock import actor_lock, exclusive, is_locked
-from aerodaas.types.errors import MissionError
+from aerodaas.errors import MissionError
 
 __all__ = ["RobotLocks"]
 

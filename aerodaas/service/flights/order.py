@@ -8,11 +8,11 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
-from aerodaas.types.clock import WallOffset
 
 __all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome", "Progress"]
 

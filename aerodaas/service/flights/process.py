@@ -28,6 +28,7 @@ from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
@@ -39,7 +40,6 @@ from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.terrain.ground import Ground
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 
 __all__ = ["Flying", "fly"]
 

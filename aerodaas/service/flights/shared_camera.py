@@ -14,10 +14,11 @@ from aerodaas.analytics.wire_items import ItemError, unpack
 from aerodaas.cameras.base import Picture
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.odometry import Odometry
 from aerodaas.service.flights.order import Attached
-from aerodaas.types.data import Frame, Odometry
-from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel
 
 __all__ = ["SharedCamera", "SharedCameraSettings", "attached_config"]
 

@@ -6,9 +6,9 @@ import threading
 import time
 from collections.abc import Callable
 
+from aerodaas.clock import WallOffset
 from aerodaas.protocol.schemas import SilencePolicy
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.types.clock import WallOffset
 
 __all__ = ["LeaseWatch"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from aerodaas.messages.health import HealthItem
 from aerodaas.protocol.schemas import LinkState
-from aerodaas.types.health import HealthItem
 
 __all__ = ["MonitorNews", "VehicleNews", "Wanted"]
 

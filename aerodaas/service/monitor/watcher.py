@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
+from aerodaas.errors import AeroDaaSError, failure_line
+from aerodaas.messages.vehicle import Vehicle, VehicleMode, VehicleState
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor.news import VehicleNews
-from aerodaas.types.errors import AeroDaaSError, failure_line
-from aerodaas.types.vehicle import Vehicle, VehicleMode, VehicleState
 
 __all__ = ["VehicleWatcher"]
 

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.page.figures import png_of
@@ -19,7 +20,6 @@ from aerodaas.recording.report.plots.style import mark
 from aerodaas.recording.report.plots.trajectory import trajectory_figure
 from aerodaas.service.limits import Outline
 from aerodaas.service.rehearsal.findings import Finding, OtherArea, findings_of
-from aerodaas.types.errors import RecordingError
 
 __all__ = ["draw"]
 

@@ -11,10 +11,10 @@ from http import HTTPStatus
 from starlette.requests import HTTPConnection
 
 from aerodaas.console.access import bearer
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
 from aerodaas.service.errors import RefusedError
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Admission"]
 

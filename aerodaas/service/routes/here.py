@@ -10,6 +10,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from aerodaas.analytics.guests.channel import GuestError
 from aerodaas.console.jobs import end_jobs
 from aerodaas.console.live import until_refused
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal
 from aerodaas.service.desk import MissionDesk
@@ -17,7 +18,6 @@ from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["HereRoutes"]
 

@@ -8,11 +8,11 @@ from fastapi import APIRouter, WebSocket
 
 from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import PictureForm, Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import refuse
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LiveRoutes"]
 

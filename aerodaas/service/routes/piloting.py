@@ -11,6 +11,7 @@ from fastapi.security import HTTPBearer
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.console.controls import ControlCommand, ControlSession, told_of_controls
 from aerodaas.console.surveys import SurveyPlanner
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import Role, Scope, Word
 from aerodaas.service.access import Audit
@@ -19,7 +20,6 @@ from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.bodies import BoundedRoute
 from aerodaas.service.routes.refusals import refuse
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["PilotingRoutes"]
 

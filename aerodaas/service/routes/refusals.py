@@ -15,9 +15,9 @@ from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
 
 from aerodaas.analytics.remote.denial import deny, malformed
+from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError, without_folders
-from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["REFUSALS", "refuse", "register_refusals"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from panda3d.core import NodePath
 
+from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.simulation.scenario import Rubble
 from aerodaas.simulation.scene.layers import attach
 from aerodaas.simulation.scene.light import Light
@@ -16,7 +17,6 @@ from aerodaas.simulation.scene.mesh import Mesh, box, merged
 from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import Thing
-from aerodaas.types.geometry import rotation_from_rpy
 
 __all__ = ["add_rubble"]
 

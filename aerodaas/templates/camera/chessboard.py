@@ -5,7 +5,7 @@ import numpy as np
 from aerodaas import Odometry
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
 
 
 class Chessboard:

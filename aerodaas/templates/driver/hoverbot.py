@@ -9,7 +9,7 @@ import numpy as np
 
 from aerodaas import Battery, Odometry
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.types.vehicle import (
+from aerodaas.messages.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,

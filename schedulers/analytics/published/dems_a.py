@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Decision,
@@ -16,7 +17,6 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
 )
 from aerodaas.schedulers.analytics.published.dems import Dems
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["DemsA"]
 

@@ -7,10 +7,10 @@ measured on a Jetson edge and on AWS Lambda.
 
 from __future__ import annotations
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import SchedulersConfig, TaskConfig
+from aerodaas.identifiers import told
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.identifiers import told
 
 __all__ = ["ACTIVE", "CLOUD_TIME", "EDGE_TIME", "PASSIVE", "PUBLISHED", "told_profile"]
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Frame
+from aerodaas.messages.frames import Frame
 
 Box = tuple[int, float, float, float, float, float]
 """Class, score, left, top, right, bottom."""

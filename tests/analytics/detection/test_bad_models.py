@@ -10,8 +10,8 @@ from onnx import TensorProto
 from synthetic_models import constant_model
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
+from aerodaas.messages.frames import Frame, Header
 
 BOXES = np.zeros((1, 6, 84), np.float32)
 BOXES[0, :, -1] = [32, 32, 20, 20, 0.0, 0.01]

@@ -12,8 +12,9 @@ from aerodaas.analytics.detection.combined import CombinedDetector
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import ConfigError, ModelError
+from aerodaas.errors import ConfigError, ModelError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 
 PICTURES = sorted((Path(__file__).parents[2] / "pictures").glob("*.jpg"))
 

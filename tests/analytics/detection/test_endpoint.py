@@ -27,8 +27,9 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.analytics.endpoint.tensors import HEADER_LENGTH, decode_reply, encode_request
 from aerodaas.config.model import ComputeConfig
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import ConfigError, EndpointError, GraphError, ModelError
+from aerodaas.errors import ConfigError, EndpointError, GraphError, ModelError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 
 pytestmark = pytest.mark.wall_clock
 

@@ -14,8 +14,9 @@ from synthetic_models import constant_model, patchwork_model
 
 from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Detections, Frame, Header
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
 
 NAMES = "{0: 'vest', 1: 'person'}"
 CELLS = 8 * 8 + 4 * 4 + 2 * 2  # 64 x 64 pixels at strides of 8, 16 and 32

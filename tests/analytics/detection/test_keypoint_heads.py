@@ -11,7 +11,7 @@ from synthetic_models import constant_model, simcc_model
 from aerodaas.analytics.detection.keypoint_heads import SimccHead
 from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.people.pose import PoseAnalytics
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.detection.overlap import one_for_each
-from aerodaas.types.data import Detection
+from aerodaas.messages.detections import Detection
 
 CORNER, LENGTH = st.floats(0, 300), st.floats(0, 200)
 

@@ -12,7 +12,7 @@ from synthetic_models import mosaic_model
 
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.models import DETECTOR
-from aerodaas.types.data import Frame, Header
+from aerodaas.messages.frames import Frame, Header
 
 PICTURES = sorted((Path(__file__).parents[2] / "pictures").glob("*.jpg"))
 

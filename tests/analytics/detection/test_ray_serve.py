@@ -16,7 +16,7 @@ from synthetic_models import patchwork_model
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.config.model import ComputeConfig
-from aerodaas.types.data import Frame, Header
+from aerodaas.messages.frames import Frame, Header
 
 # Ray Serve's own declarations are of an older Pydantic.
 pytestmark = [

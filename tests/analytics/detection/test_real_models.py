@@ -17,7 +17,7 @@ from plain_decoding import compare
 from required import needs_peer, peer
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Frame, Header
+from aerodaas.messages.frames import Frame, Header
 
 DATA = Path(peer("AERODAAS_TEST_DATA"))
 MODELS = sorted((DATA / "models").glob("*.onnx"))

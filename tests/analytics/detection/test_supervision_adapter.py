@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics import from_supervision, to_supervision
-from aerodaas.types.data import Detection, Detections, Frame, Header
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame, Header
 
 FRAME = Frame(Header(7, 5, "drone/cam"), np.zeros((120, 160, 3), np.uint8))
 EDGE = st.floats(0, 100)

@@ -13,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.detection.tracking import Tracker, TrackingAnalytics
+from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.odometry import Odometry
 
 
 def detections(step: int, boxes: Sequence[tuple[float, ...]], label: str = "person") -> Detections:

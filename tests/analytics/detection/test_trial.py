@@ -12,7 +12,7 @@ from synthetic_models import constant_model, endless_model
 
 from aerodaas.analytics.detection import model_file
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.errors import ModelError
+from aerodaas.errors import ModelError
 
 CELLS = 20 * 20 + 10 * 10 + 5 * 5  # 160 x 160 pixels at strides of 8, 16 and 32
 SHAPE = (1, 3, 160, 160)

@@ -7,7 +7,7 @@ import pytest
 from aerodaas import AeroNavigation, Waypoint
 from aerodaas.analytics.guests.payload import require_no_moves
 from aerodaas.analytics.item_json import decoded, encoded
-from aerodaas.types.errors import GraphError
+from aerodaas.errors import GraphError
 
 MOVING = AeroNavigation(data=[Waypoint("drop", 0, 5, 2, actuate={"hook": "release"})])
 

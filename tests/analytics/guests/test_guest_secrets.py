@@ -11,8 +11,8 @@ from filled import filled
 from aerodaas.analytics.guests import analysis
 from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.grants import GuestQuota
-from aerodaas.types.data import Alert
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 
 STATE: VehicleState = filled(VehicleState, video="rtsp://me:password@10.0.0.2")
 

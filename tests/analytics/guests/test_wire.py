@@ -14,10 +14,13 @@ from aerodaas.analytics.guests.channel import LARGEST_TEXT, Channel, GuestError
 from aerodaas.analytics.guests.document import read_document
 from aerodaas.analytics.item_json import ItemError, decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Detection, Detections, Header, Odometry, Readings
-from aerodaas.types.errors import GraphError
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.waypoints import (
+from aerodaas.errors import GraphError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Readings
+from aerodaas.messages.waypoints import (
     NavigationItem,
     SchedulingType,
     VelocityCommand,

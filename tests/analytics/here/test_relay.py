@@ -19,9 +19,10 @@ from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
 from aerodaas.analytics.item_json import ItemError
 from aerodaas.analytics.wire_items import pack
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Alert, Frame, Header, Readings
-from aerodaas.types.errors import ConfigError, ModelError
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.errors import ConfigError, ModelError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.vehicle import VehicleState
 
 READINGS = Readings(5, {"height": 2.0})
 

@@ -19,7 +19,7 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.models.cache import fetched_path
 from aerodaas.analytics.models.fetching import fetch_model
 from aerodaas.analytics.models.registry import REGISTRY, Archive, RegisteredModel
-from aerodaas.types.errors import ConfigError, ModelError, SourceError, UnknownIdError
+from aerodaas.errors import ConfigError, ModelError, SourceError, UnknownIdError
 
 BOXES = np.zeros((1, 6, 84), np.float32)
 BOXES[0, :, -1] = [32, 32, 20, 20, 0.0, 0.01]

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.dataflow.plans.areas import Area, read_areas
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.schedulers.trajectory.coverage import cover
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)
 RING = [[8.0, 47.0], [8.002, 47.0], [8.002, 47.001], [8.0, 47.001], [8.0, 47.0]]

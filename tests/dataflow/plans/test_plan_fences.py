@@ -14,8 +14,8 @@ from plan_files import plan
 from aerodaas.dataflow.plans.fences import geofence_of
 from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)
 SQUARE = [[46.999, 7.999], [46.999, 8.001], [47.001, 8.001], [47.001, 7.999]]

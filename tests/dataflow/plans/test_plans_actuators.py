@@ -21,8 +21,8 @@ from aerodaas.dataflow.plans.plan import Plan
 from aerodaas.dataflow.plans.reading import flown_plan
 from aerodaas.dataflow.plans.waypoints_in import waypoints_of
 from aerodaas.dataflow.plans.writing import planned
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)
 CARRIED: list[ActuatorConfig] = [

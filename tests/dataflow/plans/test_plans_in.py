@@ -19,8 +19,8 @@ from aerodaas.dataflow.plans.commands import IMAGE_STOP_CAPTURE, NAV_LAST, comma
 from aerodaas.dataflow.plans.plan import Plan, PlanItem
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.dataflow.plans.waypoints_in import waypoints_of
-from aerodaas.types.errors import AeroDaaSError, ConfigError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import AeroDaaSError, ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)
 """The environment's; its altitude is above the ellipsoid, and no height depends on it."""

@@ -18,9 +18,9 @@ from plan_files import item, lines, mavwp, plan, survey, waypoint
 from aerodaas import AeroNavigation, VelocityCommand, Waypoint
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.dataflow.plans.writing import write_plan
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import GeodeticOrigin, wrap_angle
-from aerodaas.types.waypoints import HeightReference, WaypointType
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import GeodeticOrigin, wrap_angle
+from aerodaas.messages.waypoints import HeightReference, WaypointType
 
 HOME = GeodeticOrigin(-35.363262, 149.165237, 584.0)
 metres = st.floats(-2000.0, 2000.0)

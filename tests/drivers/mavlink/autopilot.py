@@ -26,7 +26,7 @@ from aerodaas.drivers.mavlink.wire import link as link_module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.vehicle import VelocitySetpoint
+from aerodaas.messages.vehicle import VelocitySetpoint
 
 __all__ = [
     "ACCEPTED",

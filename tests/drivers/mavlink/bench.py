@@ -13,7 +13,7 @@ from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire import link as link_module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 
 __all__ = ["Bench"]
 

@@ -21,23 +21,23 @@ import pytest
 from autopilot import COMMANDS, SteppedClock, robot_of
 from typing_extensions import Self
 
+from aerodaas.clock import Clock
 from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig, MissionConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.payload import PhotoOutcome
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import Clock
-from aerodaas.types.geometry import Vector
-from aerodaas.types.payload import PhotoOutcome
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VehicleMode, VehicleState
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 __all__ = [

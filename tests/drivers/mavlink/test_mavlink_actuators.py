@@ -16,12 +16,12 @@ from aerodaas.config.actuators import (
 )
 from aerodaas.config.model import MissionConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.actuators import MoveResult
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import ReleaseParachute
 from aerodaas.mission.mission import Mission
-from aerodaas.types.actuators import MoveResult
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.actuators import EmulatedActuators
 

@@ -8,7 +8,7 @@ import pytest
 from aerodaas.drivers.mavlink.state.alignment import Alignment, global_origin
 from aerodaas.drivers.mavlink.state.frames import Attitude, LocalFrame
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
-from aerodaas.types.geometry import Vector
+from aerodaas.geometry.frames import Vector
 
 NORTH = 0.001
 """Degrees of latitude that are 111.2 m at 47 degrees north."""

@@ -10,6 +10,7 @@ from emulated import Stepped, told
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.drivers.mavlink.microservices.camera_status import (
@@ -17,12 +18,11 @@ from aerodaas.drivers.mavlink.microservices.camera_status import (
     capture_status,
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.messages.payload import CameraStatus, LensCamera, LensTarget, Photo, PhotoFailure
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.safety.checklist import Checklist
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.health import HealthItem, Verdict
-from aerodaas.types.payload import CameraStatus, LensCamera, LensTarget, Photo, PhotoFailure
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 

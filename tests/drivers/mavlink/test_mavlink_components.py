@@ -9,9 +9,9 @@ import pytest
 from emulated import Stepped, fly_pictures, told
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure
 from aerodaas.mission.mission import Mission
-from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
-from aerodaas.types.status import MissionState
 from tools.mavlink_vehicle import AutopilotOptions
 
 CAMERA, GIMBAL = 100, 154

@@ -13,7 +13,7 @@ from rtcm_station import BaseStation, rtcm
 
 from aerodaas.drivers.mavlink.wire import corrections as module
 from aerodaas.drivers.mavlink.wire.corrections import Corrections
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 MESSAGE = rtcm(bytes(range(200)))
 

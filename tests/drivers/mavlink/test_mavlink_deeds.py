@@ -13,8 +13,8 @@ from bench import Bench
 from aerodaas.drivers.mavlink.microservices.events import event_number
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import InvalidWaypointError, VehicleError
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 
 HOLD, LAND, RETURN = FlightMode.HOLD, FlightMode.LAND, FlightMode.RETURN
 OFFBOARD, POSITION, TAKE_OFF = FlightMode.GUIDED, FlightMode.OTHER, FlightMode.TAKE_OFF

@@ -12,7 +12,7 @@ from bench import Bench
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 HOME = {"latitude": 46.999, "longitude": 8.0, "altitude": 500.0}
 """111.2 m south of where it stands."""

@@ -23,8 +23,8 @@ from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 TESTS = Path(__file__).parents[2]

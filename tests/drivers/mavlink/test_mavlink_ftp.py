@@ -20,8 +20,8 @@ from aerodaas.drivers.mavlink.microservices.ftp import (
     FtpScript,
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
 from aerodaas.testing.channel import Channel, Impairment
-from aerodaas.types.errors import VehicleError
 from tools.mavlink_vehicle.files import FileServer
 
 T = TypeVar("T")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from aerodaas.drivers.mavlink.control.guidance import MovingTarget, Target
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.messages.vehicle import PositionSetpoint
 
 _DRAG = 1.0
 """1/s, that of PX4's simulated quadrotor (SIH_KDV and SIH_MASS)."""

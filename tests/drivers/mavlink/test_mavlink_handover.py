@@ -13,6 +13,9 @@ from emulated import FAMILIES, FlownMission, Stepped, inject
 
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import (
     AddNavigation,
     Answer,
@@ -25,9 +28,6 @@ from aerodaas.mission.commands import (
     TakeBack,
 )
 from aerodaas.mission.safety.neighbours import Neighbour
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.flight import MavFlight
 

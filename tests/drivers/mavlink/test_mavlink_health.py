@@ -17,7 +17,7 @@ from aerodaas.drivers.mavlink.microservices.events import EventReader, event_num
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 from tools.mavlink_vehicle import AutopilotOptions
 
 NAN = float("nan")

@@ -21,7 +21,7 @@ from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
 from aerodaas.drivers.mavlink.wire.transport import is_exposed
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions
 
 KEY = bytes(range(32))

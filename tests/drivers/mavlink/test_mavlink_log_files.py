@@ -11,9 +11,9 @@ import pytest
 from emulated import Flight, Stepped
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle_log import LogEntry
 from tools.mavlink_vehicle import AutopilotOptions
 
 DATAFLASH = b"\xa3\x95\x80" + random.Random(1).randbytes(100_000)

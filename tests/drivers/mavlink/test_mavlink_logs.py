@@ -15,9 +15,9 @@ from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
 
 from aerodaas.cli.app import main
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.recording.reader import Recording
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle_log import LogEntry
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.store import LogStore
 

@@ -16,7 +16,7 @@ from router import Router
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.types.payload import LensCamera, LensTarget, Photo, PhotoOutcome, PhotoPlace
+from aerodaas.messages.payload import LensCamera, LensTarget, Photo, PhotoOutcome, PhotoPlace
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 PYTHON = peer("AERODAAS_MAVSDK")

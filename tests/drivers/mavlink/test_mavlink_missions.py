@@ -10,7 +10,7 @@ from emulated import LOOPBACK, free_port
 from flying import Flyer, hop, robot
 
 from aerodaas import Environment
-from aerodaas.types.status import MissionState
+from aerodaas.messages.mission import MissionState
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]

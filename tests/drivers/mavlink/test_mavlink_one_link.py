@@ -8,7 +8,7 @@ import pytest
 
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.loading import check_links, link_of
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 
 def robot(name: str, **settings: Any) -> RobotConfig:  # noqa: ANN401

@@ -23,7 +23,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 )
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 
 OURS = 245
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED

@@ -12,7 +12,7 @@ from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
 READ, SET = "PARAM_REQUEST_READ", "PARAM_SET"

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure
 from aerodaas.mission.mission import Mission
-from aerodaas.types.payload import GimbalTarget, Photo, PhotoFailure
-from aerodaas.types.status import MissionState
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 

@@ -15,9 +15,9 @@ from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices.fence import fence_items, upload_fence
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions
 
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION

@@ -12,8 +12,8 @@ from aerodaas.drivers.mavlink.state.frames import Attitude
 from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.status import MissionState
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 
 LEVEL = Attitude()

@@ -14,12 +14,12 @@ from emulated import FAMILIES, Stepped
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import ReturnHome
 from aerodaas.mission.safety.checklist import Checklist
-from aerodaas.types.health import HealthItem, Verdict
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 
 NUMBER = "FIN87astrdge12k8"

@@ -11,7 +11,7 @@ from bench import Bench
 
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 
 STAMPED = {"ATTITUDE", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT"}
 NOTHING_NEW = "telemetry: packets come, and say nothing new"

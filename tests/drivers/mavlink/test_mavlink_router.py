@@ -14,8 +14,8 @@ from router import Router
 from rtcm_station import BaseStation, rtcm
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions
 
 _LOITER = 5

@@ -16,8 +16,8 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
 from aerodaas.drivers.mavlink.wire.sharing import WireShare, share_wire
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions
 
 HERE: Peer = (LOOPBACK, 4)

@@ -13,7 +13,7 @@ from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.signing import load_key, sign_with, signature_fits
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 KEY = bytes(range(32))
 BEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)

@@ -12,8 +12,8 @@ from aerodaas.drivers.mavlink.control.guidance import Target
 from aerodaas.drivers.mavlink.control.setpoint import position_message, velocity_message
 from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.geometry import GeodeticOrigin, Vector
-from aerodaas.types.vehicle import VelocitySetpoint
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.vehicle import VelocitySetpoint
 
 HOME = GeodeticOrigin(47.0, 8.0, 500.0)
 FRAME = LocalFrame(np.array([100.0, 200.0, 50.0]))

@@ -12,10 +12,10 @@ from autopilot import ARM, COMMANDS, MODE, RISE, SETPOINT, Family
 from emulated import FAMILIES, FlownMission, Stepped
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.testing.channel import Impairment
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 
 PILOT: dict[str, dict[str, tuple[float, ...]]] = {

@@ -14,9 +14,9 @@ from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 
 FRAME = LocalFrame(np.array([100.0, 200.0, 50.0]))
 LIMITS = {"max_speed": 4.0, "cruise_speed": 2.0, "max_climb": 1.5, "max_yaw_rate": 90.0}

@@ -6,7 +6,7 @@ import pytest
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
-from aerodaas.types.vehicle import FlightEnd
+from aerodaas.messages.vehicle import FlightEnd
 
 START = 7.0
 """Metres up in the autopilot's frame at which it is armed."""

@@ -21,8 +21,8 @@ from bench import Bench
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle import VehicleMode
 
 HOLD, LAND, TAKE_OFF = FlightMode.HOLD, FlightMode.LAND, FlightMode.TAKE_OFF
 

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.microservices.traffic import TrafficTable
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.vehicle import Traffic, VehicleState
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.mission import Mission
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.aircraft import EmulatedAircraft
 

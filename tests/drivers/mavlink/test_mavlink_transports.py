@@ -15,7 +15,7 @@ import pytest
 
 from aerodaas.drivers.mavlink.wire import transport as module
 from aerodaas.drivers.mavlink.wire.transport import Transport, open_transport
-from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.errors import ConfigError, VehicleError
 
 HOST = "127.0.0.1"
 EVERYTHING = bytes(range(256))

@@ -13,8 +13,8 @@ from autopilot import STILL, Family
 from emulated import FAMILIES, Flight, Stepped
 
 from aerodaas.drivers.mavlink import connecting
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import (
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle import (
     FlightEnd,
     PositionSetpoint,
     VehicleMode,

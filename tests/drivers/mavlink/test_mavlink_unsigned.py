@@ -20,9 +20,9 @@ from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.discovery import hear_vehicles
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor.watcher import VehicleWatcher
-from aerodaas.types.errors import VehicleError
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 KEY = bytes(range(32))

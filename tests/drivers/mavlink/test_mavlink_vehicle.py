@@ -13,8 +13,8 @@ from emulated import FAMILIES, LOOPBACK, Stepped, free_port
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.types.errors import ConfigError, VehicleError
-from aerodaas.types.vehicle import (
+from aerodaas.errors import ConfigError, VehicleError
+from aerodaas.messages.vehicle import (
     ClockedVehicle,
     PositionSetpoint,
     Vehicle,

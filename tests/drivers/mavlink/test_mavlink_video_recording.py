@@ -9,10 +9,10 @@ from emulated import Stepped, told
 
 from aerodaas.config.model import MissionConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.messages.payload import VideoCamera
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.mission import Mission
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import VideoCamera
-from aerodaas.types.waypoints import Waypoint
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 

@@ -19,9 +19,9 @@ from aerodaas.cameras.base import Camera, Picture
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.ros2 import camera as module
 from aerodaas.drivers.ros2.camera import Ros2Camera
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.ros import messages as ros
 from aerodaas.ros.link import RosLink, RosPublisher
-from aerodaas.types.errors import ConfigError, SourceError
 
 NOW = 100_000_000_000
 """Mission time of captures, nanoseconds."""

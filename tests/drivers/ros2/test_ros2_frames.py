@@ -11,9 +11,9 @@ from ros_drone import odometry_message
 from scipy.spatial.transform import Rotation
 
 from aerodaas.drivers.ros2.frames import Alignment, velocity_in
+from aerodaas.messages.odometry import Odometry
 from aerodaas.ros.incoming import odometry_of
 from aerodaas.simulation.dynamics import KinematicState
-from aerodaas.types.data import Odometry
 
 ANGLES = st.floats(-math.pi, math.pi)
 TILTS = st.floats(-1.2, 1.2)

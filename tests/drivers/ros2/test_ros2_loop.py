@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from aerodaas.drivers.ros2.loop import Limits, VelocityLoop
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint
 
 
 @pytest.mark.parametrize(("asked", "passed"), [(0.0, 0.0), (0.8, 0.8), (9.0, 1.5)])

@@ -10,19 +10,19 @@ import pytest
 from ros_domain import wait_for
 from ros_drone import RosDrone
 
+from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.ros2.vehicle import Ros2Vehicle
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import FlightEnd
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.ros.link import RosLink
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import ScaledClock
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import FlightEnd
-from aerodaas.types.waypoints import Waypoint
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from aerodaas.drivers.ros2.touchdown import Touchdown
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import FlightEnd
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import FlightEnd
 
 
 def came_down(

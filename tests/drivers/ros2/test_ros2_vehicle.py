@@ -17,10 +17,8 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.drivers.ros2 import vehicle as module
 from aerodaas.drivers.ros2.vehicle import Ros2Vehicle
-from aerodaas.ros import messages as ros
-from aerodaas.ros.link import RosLink
-from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.vehicle import (
+from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.messages.vehicle import (
     ClockedVehicle,
     FlightEnd,
     PositionSetpoint,
@@ -28,6 +26,8 @@ from aerodaas.types.vehicle import (
     VehicleMode,
     VelocitySetpoint,
 )
+from aerodaas.ros import messages as ros
+from aerodaas.ros.link import RosLink
 
 pytestmark = pytest.mark.wall_clock
 

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.types.data import Detection, Detections, Frame
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Frame
 
 __all__ = ["LimeVestFinder"]
 

@@ -12,7 +12,7 @@ from typing import Any
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from tools.tello_vehicle import EmulatedTello, TelloOptions
 
 __all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of", "wait_for"]

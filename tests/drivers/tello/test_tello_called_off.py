@@ -10,7 +10,7 @@ from tello_flights import flight
 
 from aerodaas.drivers.tello.phase import FlightPhase
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.types.vehicle import FlightEnd, VehicleMode
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from tools.tello_vehicle import Impairment, TelloOptions
 
 

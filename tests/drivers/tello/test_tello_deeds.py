@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello import vehicle as module
 from aerodaas.drivers.tello.commands import STILL, Command, Sticks
 from aerodaas.drivers.tello.link import LinkCounts
 from aerodaas.drivers.tello.state import TelloState
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.clock import NANOSECONDS, SimulatedClock
-from aerodaas.types.errors import InvalidWaypointError, VehicleError
-from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
 
 STANDING = TelloState(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, 0.1, 100.0, 80, 0.0, 50.0)
 SPEEDS = {"full_speed": 2.0, "full_climb": 1.0, "full_turn": 100.0}

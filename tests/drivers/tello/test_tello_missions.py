@@ -18,8 +18,8 @@ from tello_flights import free_port
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.analytics import VipFollowAnalytics
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import VehicleMode
 from tools.tello_vehicle import EmulatedTello, TelloOptions, VideoOptions
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]

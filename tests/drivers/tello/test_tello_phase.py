@@ -6,7 +6,7 @@ import pytest
 
 from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.types.vehicle import FlightEnd, VehicleMode
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 
 
 def packet(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from aerodaas.drivers.tello.commands import BodyMotion, Sticks, StickScale
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.state import parse_state
-from aerodaas.types.geometry import wrap_angle
+from aerodaas.geometry.frames import wrap_angle
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.options import TelloOptions
 

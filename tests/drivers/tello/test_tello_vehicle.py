@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from tello_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
 
+from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.clock import ScaledClock
-from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.types.geometry import Vector
-from aerodaas.types.vehicle import (
+from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.vehicle import (
     ClockedVehicle,
     FlightEnd,
     PositionSetpoint,

@@ -39,10 +39,11 @@ from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.document.flying import compile_application, fly_mission
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
 from aerodaas.following.follow_settings import FollowGains, LostPolicy
+from aerodaas.messages.frames import Frame
+from aerodaas.messages.readings import Readings
 from aerodaas.schedulers.trajectory.optimal import OptimalScheduler
-from aerodaas.types.data import Frame, Readings
-from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
 
 APPS = Path(__file__).resolve().parents[3] / "apps"
 SHIPPED = (

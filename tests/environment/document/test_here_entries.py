@@ -32,8 +32,9 @@ from aerodaas.dataflow.mission_document import (
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.here_server import HereServer
-from aerodaas.types.data import Alert, Frame, Header, Readings
-from aerodaas.types.errors import AeroDaaSError, GraphError
+from aerodaas.errors import AeroDaaSError, GraphError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.readings import Alert, Readings
 
 CONTENT: dict[str, Any] = {
     **FLAT,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aerodaas.environment.provider.address import ServiceAddress, is_url
 from aerodaas.environment.provider.logins import Logins, client_for, default_url
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 pytestmark = pytest.mark.usefixtures("own_logins")
 _HOST = st.from_regex(r"[a-z][a-z0-9]{0,10}(\.[a-z]{2,5}){1,2}", fullmatch=True)

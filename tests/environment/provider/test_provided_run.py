@@ -22,9 +22,7 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
 from aerodaas.environment.provider import client as client_module
 from aerodaas.environment.provider import follower, pauses
-from aerodaas.mission.commands import AddNavigation
-from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
-from aerodaas.types.errors import (
+from aerodaas.errors import (
     ConfigError,
     GraphError,
     InvalidWaypointError,
@@ -33,6 +31,8 @@ from aerodaas.types.errors import (
     SourceError,
     UnknownIdError,
 )
+from aerodaas.mission.commands import AddNavigation
+from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 
 
 @pytest.fixture(autouse=True)

@@ -15,8 +15,8 @@ from provider_stub import MISSION, TOKEN, Stub, mission
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.client import LARGEST_MODEL, ProviderClient
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, SourceError
 from aerodaas.protocol.schemas import CommandIn, MissionPhase, NavigationIn
-from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, SourceError
 
 
 @contextmanager

@@ -15,10 +15,11 @@ from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.here import HereLink
 from aerodaas.environment.provider.streams import WireReader
+from aerodaas.errors import ConfigError, MissionError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.odometry import Odometry
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.types.data import Frame, Header, Odometry
-from aerodaas.types.errors import ConfigError, MissionError
-from aerodaas.types.guest_item import GuestItem
 
 SECONDS = 20.0
 

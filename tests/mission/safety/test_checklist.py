@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 from flights import KinematicVehicle, add, square
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.config.preflight import PreflightConfig
+from aerodaas.errors import VehicleError
+from aerodaas.messages.health import HealthItem, HealthReadings, Verdict, gravest
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.odometry import Battery, GpsFix
+from aerodaas.messages.payload import CameraStatus
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, GpsFix
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.health import HealthItem, HealthReadings, Verdict, gravest
-from aerodaas.types.payload import CameraStatus
-from aerodaas.types.status import MissionState
-from aerodaas.types.vehicle import VehicleState
 
 WELL = HealthReadings(
     cells=(4.1, 4.08, 4.12),

@@ -12,14 +12,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import ReturnHome
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
-from aerodaas.types.waypoints import Waypoint
 
 Array = NDArray[np.float64]
 LIMITS = LimitsConfig(

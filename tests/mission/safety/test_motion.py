@@ -11,6 +11,7 @@ from flights import KinematicVehicle, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import (
     EnvironmentConfig,
     GeofenceConfig,
@@ -19,6 +20,11 @@ from aerodaas.config.model import (
     RobotConfig,
 )
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.actions import Fly
 from aerodaas.mission.commands import ReturnHome, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -26,12 +32,6 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
 from aerodaas.mission.safety.motion import MotionWatch
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import Waypoint
 
 _PERIOD = NANOSECONDS // 20
 _SQUARE = [(-60.0, -60.0), (60.0, -60.0), (60.0, 60.0), (-60.0, 60.0)]

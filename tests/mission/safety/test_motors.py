@@ -10,14 +10,14 @@ from flights import Flight, KinematicVehicle, add, flight, live, square
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import End, Pause, ReturnHome, StreamItem
 from aerodaas.mission.safety.motors import Motors, MotorWatch
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 
 def aborted_in_flight(one: Flight) -> None:

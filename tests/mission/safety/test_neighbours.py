@@ -12,11 +12,11 @@ from flights import KinematicVehicle
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.robot import LimitsConfig
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 
 _SECOND = NANOSECONDS
 _SILENT_NS = round(SILENT * NANOSECONDS)

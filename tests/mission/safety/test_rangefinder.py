@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.robot import GeofenceConfig, LimitsConfig
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 from aerodaas.mission.safety.setpoint_filter import FilteredSetpoint, SetpointFilter
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 
 LIMITS = LimitsConfig(
     max_speed=4.0,

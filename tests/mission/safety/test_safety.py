@@ -11,15 +11,15 @@ from flights import KinematicVehicle
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.errors import ConfigError
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
 from aerodaas.mission.safety import setpoint_filter
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
 
 L_SHAPE = [(-15.0, -15.0), (15.0, -15.0), (15.0, 0.0), (0.0, 0.0), (0.0, 15.0), (-15.0, 15.0)]
 HOLE = [(-9.0, -9.0), (-5.0, -9.0), (-5.0, -5.0), (-9.0, -5.0)]

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.geometry.energy import EnergyMeter, EnergyModel
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import CALM, Supervisor
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.energy import EnergyMeter, EnergyModel
-from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 LIMITS = LimitsConfig(battery_return=0.25, battery_land=0.125, link_timeout=3.0)
 FENCE = GeofenceConfig(polygon=[(-50, -50), (50, -50), (50, 50), (-50, 50)])

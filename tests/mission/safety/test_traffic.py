@@ -13,9 +13,22 @@ from flights import Flight, KinematicVehicle, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.traffic import TrafficConfig
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.health import Verdict
+from aerodaas.messages.mission import MissionState as S
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import (
+    PositionSetpoint,
+    Traffic,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import ReturnHome
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.failsafe import FailsafeAction
@@ -28,14 +41,6 @@ from aerodaas.mission.safety.traffic import (
     meets_in,
     traffic_neighbours,
 )
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.health import Verdict
-from aerodaas.types.status import MissionState as S
-from aerodaas.types.traffic import Traffic
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import Waypoint
 
 CLOSE = TrafficConfig(action="hold", distance=100.0, height=50.0, lookahead=10.0)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import pytest
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -24,7 +25,6 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.dispatch import EXECUTOR_DOWN, Dispatch
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
-from aerodaas.types.errors import SchedulerError
 
 MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND, 1, 2)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Drop,
@@ -16,7 +17,6 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.published.gems import Gems
 from aerodaas.testing.scheduler_kit import End, play
-from aerodaas.types.clock import NANOSECONDS
 
 WINDOW = 20 * NANOSECONDS
 BLOCK = Profile("block", 100, 1000 * MILLISECOND, 50 * MILLISECOND, 300 * MILLISECOND, 1, 20)

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MIGRATED,
     MILLISECOND,
@@ -30,7 +31,6 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
 
 MS = MILLISECOND
 _IDLE_SHARE = 0.5

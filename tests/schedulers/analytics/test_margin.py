@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,
@@ -29,7 +30,6 @@ from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.testing.scheduler_kit import End, play
-from aerodaas.types.clock import NANOSECONDS
 
 HV, MD, CD = PUBLISHED["HV"], PUBLISHED["MD"], PUBLISHED["CD"]
 

@@ -7,6 +7,7 @@ from statistics import NormalDist
 
 import pytest
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     STOLEN,
@@ -27,7 +28,6 @@ from aerodaas.schedulers.analytics.planner import Job, Lane, plan
 from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.testing.scheduler_kit import play
-from aerodaas.types.errors import SchedulerError
 
 MS = MILLISECOND
 M = Profile("m", 100, 1000 * MS, 200 * MS, 200 * MS, 1, 20)

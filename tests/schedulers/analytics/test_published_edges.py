@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MIGRATED,
     MILLISECOND,
@@ -27,7 +28,6 @@ from aerodaas.schedulers.analytics.published.dems_a import DemsA
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
 from aerodaas.schedulers.analytics.published.kalmia import Kalmia
 from aerodaas.testing.scheduler_kit import End, play
-from aerodaas.types.clock import NANOSECONDS
 
 
 def model(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -22,7 +23,6 @@ from aerodaas.schedulers.analytics.published.gems import Gems
 from aerodaas.schedulers.analytics.published.kalmia import Kalmia
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.testing.scheduler_kit import End, play
-from aerodaas.types.clock import NANOSECONDS
 
 
 def _model(

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import pytest
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Decision,
@@ -20,7 +21,6 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.published.edge_only import Fifo
 from aerodaas.schedulers.analytics.registry import scheduler_names
 from aerodaas.testing.scheduler_kit import check_scheduler
-from aerodaas.types.errors import SchedulerError
 
 
 class _Forgetful(Fifo):

@@ -13,11 +13,11 @@ from aerodaas.actors.streams.definitions import pickled_class
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import Graph
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Profile, Resources
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 
 @pytest.mark.parametrize("name", scheduler_names())

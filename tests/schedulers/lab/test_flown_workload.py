@@ -15,6 +15,7 @@ from aerodaas.cli.flown_tasks import Flown
 from aerodaas.cli.flown_workload import flown_trace, flown_workload
 from aerodaas.cli.lab import app
 from aerodaas.config.model import TaskConfig
+from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.summary import FlightSummary
@@ -22,7 +23,6 @@ from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab import ExecutionTimes, Network, run_lab
 from aerodaas.schedulers.lab.metrics import score
 from aerodaas.schedulers.lab.sample import SamplePath
-from aerodaas.types.errors import RecordingError
 
 pytestmark = pytest.mark.wall_clock
 

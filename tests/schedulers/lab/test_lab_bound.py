@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
@@ -17,7 +18,6 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
 
 _job = st.tuples(
     st.integers(0, 300), st.integers(15, 200), st.integers(15, 400), st.integers(1, 99)

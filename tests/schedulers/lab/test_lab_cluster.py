@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from aerodaas.cli.lab import app
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.lab import Workload, run_lab
-from aerodaas.types.clock import NANOSECONDS
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.network import Network
@@ -15,7 +16,6 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.clock import NANOSECONDS
 
 GOLDEN = Path(__file__).with_name("lab_golden.json")
 """Digests by scheduler and case; `REGENERATE` shows how they were made."""

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Decision,
@@ -27,8 +29,6 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Arrival, Workload
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 SHORT = Workload.named("2D-A", 10 * NANOSECONDS)
 VARYING = ExecutionTimes("lognormal", 0.15)

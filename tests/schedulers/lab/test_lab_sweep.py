@@ -17,7 +17,9 @@ from typer.testing import CliRunner
 
 from aerodaas.cli.lab import app
 from aerodaas.cli.lab_sweep import parse_sweeps
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config import extras
+from aerodaas.errors import ConfigError, SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.published.edge_only import Edf, Fifo
 from aerodaas.schedulers.lab import Workload, run_lab, run_sweep
 from aerodaas.schedulers.lab.network import Network
@@ -26,8 +28,6 @@ from aerodaas.schedulers.lab.sweep import SweepResult
 from aerodaas.schedulers.lab.sweep_plots import plot_sweep
 from aerodaas.schedulers.lab.workload import Arrival
 from aerodaas.testing.scheduler_kit import check_scheduler
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError, SchedulerError, UnknownIdError
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "sweeps.md"
 SETTINGS: dict[str, Any] = {"workload": "2D-P", "duration": 5.0, "jobs": 1}

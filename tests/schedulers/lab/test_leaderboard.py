@@ -15,12 +15,12 @@ from aerodaas.cli.leaderboard.command import leaderboard
 from aerodaas.cli.leaderboard.markdown import markdown_page
 from aerodaas.cli.leaderboard.origin import Origin
 from aerodaas.cli.leaderboard.page import html_page
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import ConfigError, SchedulerError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Decision, Drop, Resources, Task
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.lab import ExecutionTimes, Network, Workload, run_lab
 from aerodaas.schedulers.lab.leaderboard import CASES, Extent, Leaderboard, run_leaderboard
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import ConfigError, SchedulerError
 
 SHORT = Extent(seeds=8, seconds=2)
 ORIGIN = Origin("2000-01-01", "abc+", "a processor", 2, {"aerodaas": "0"})

@@ -11,11 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.cli.lab_study import workload_of
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab import Network, read_arrivals, run_lab
 from aerodaas.schedulers.lab.network_trace import read_bandwidth
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.errors import SchedulerError
 
 SECOND = NANOSECONDS
 MBIT = 125_000

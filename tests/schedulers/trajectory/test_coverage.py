@@ -10,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry.base import BaseGeometry
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.trajectory.coverage import Coverage, cover, footprint
-from aerodaas.types.errors import SchedulerError
 
 FIELD = [(0.0, 0.0), (60.0, 0.0), (60.0, 25.0), (0.0, 25.0)]
 L_SHAPE = [(0.0, 0.0), (60.0, 0.0), (60.0, 20.0), (25.0, 20.0), (25.0, 60.0), (0.0, 60.0)]

@@ -13,6 +13,9 @@ from required import needs_python
 from waypoint_fields import HOME, in_a_hurry, places, scatter, waypoints
 
 from aerodaas.config.plugins import load_plugin
+from aerodaas.errors import SchedulerError
+from aerodaas.geometry.energy import EnergyModel
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.schedulers.trajectory.deadline import DeadlineScheduler
 from aerodaas.schedulers.trajectory.fleet import share_out
@@ -20,9 +23,6 @@ from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborSched
 from aerodaas.schedulers.trajectory.optimal import OptimalScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.schedulers.trajectory.travel import TravelCosts, tour_length
-from aerodaas.types.energy import EnergyModel
-from aerodaas.types.errors import SchedulerError
-from aerodaas.types.waypoints import Waypoint
 
 needs_solver = needs_python(3, 11, because="PyVRP has no older")
 

@@ -10,9 +10,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.trajectory.coverage import cover
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
-from aerodaas.types.errors import SchedulerError
 
 FIELD = [(0.0, 0.0), (90.0, 0.0), (90.0, 40.0), (0.0, 40.0)]
 ZONE = [(30.0, 12.0), (45.0, 12.0), (45.0, 22.0), (30.0, 22.0)]

@@ -6,10 +6,10 @@ import pickle
 
 from aerodaas.dataflow.graph import AeroStreamData, Graph, NavigationEdge, Node
 from aerodaas.dataflow.navigation import AeroNavigation, PriorityQueue
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, OpenStream, initial_commands
 from aerodaas.schedulers.trajectory.base import NavigationEntry
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.types.waypoints import Waypoint
 
 
 def stream(name: str, item: type = AeroNavigation) -> AeroStreamData[AeroNavigation]:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from waypoint_fields import HOME, in_a_hurry, places, scatter, waypoints
 
 from aerodaas.config.plugins import load_plugin
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.planner import PlanRequest, solve
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.deadline import DeadlineScheduler
@@ -18,7 +19,6 @@ from aerodaas.schedulers.trajectory.exact import shortest_order
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.priority import PriorityScheduler
 from aerodaas.schedulers.trajectory.travel import TravelCosts
-from aerodaas.types.waypoints import Waypoint
 
 NAMES = ["ordered", "nearest_neighbor", "priority", "deadline"]
 

@@ -17,6 +17,7 @@ from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 from oidc_issuer import AUDIENCE, Issuer
 
+from aerodaas.errors import ConfigError, SourceError
 from aerodaas.protocol.schemas import AccountIn, Role, Scope
 from aerodaas.service.access import (
     Access,
@@ -29,7 +30,6 @@ from aerodaas.service.access import (
 from aerodaas.service.access.issuer_keys import IssuerKeys
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.store import Store
-from aerodaas.types.errors import ConfigError, SourceError
 
 
 @pytest.fixture

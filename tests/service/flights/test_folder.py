@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.errors import ConfigError, MissionError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.types.errors import ConfigError, MissionError
 
 HOLD = """
 import sys, time

@@ -17,7 +17,11 @@ import pytest
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.analytics.wire_items import pack
+from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.errors import ConfigError, MissionError, SourceError
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.flights import link
@@ -27,10 +31,6 @@ from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import Attached, FlightOrder
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
 from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import ConfigError, MissionError, SourceError
-from aerodaas.types.health import HealthItem, Verdict
 
 FLEET = {
     "name": "campus",

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.errors import VehicleError
+from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 
 
 @dataclass

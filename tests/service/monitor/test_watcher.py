@@ -12,11 +12,11 @@ from scripted_fleet import fleet_of
 from scripted_vehicle import Script
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.health import Verdict
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor import watcher as watchers
 from aerodaas.service.monitor.watcher import VehicleWatcher
-from aerodaas.types.health import Verdict
-from aerodaas.types.vehicle import VehicleMode
 
 READING = {"connect", "read", "preflight", "close"}
 

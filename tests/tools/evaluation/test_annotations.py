@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.types.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 from tools.evaluation import dataset
 from tools.evaluation.dataset import Dataset, read_picture, read_size
 from tools.evaluation.reading import read_dataset

@@ -13,7 +13,7 @@ import pytest
 from synthetic_models import patchwork_model
 from typer.testing import CliRunner, Result
 
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation.__main__ import app
 
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from synthetic_models import patchwork_model
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Detection
-from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Box
+from aerodaas.errors import ConfigError
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.detections import Detection
 from tools.evaluation.dataset import AnnotatedPicture, Dataset, Thing
 from tools.evaluation.figures import Evaluation, evaluate, measure
 

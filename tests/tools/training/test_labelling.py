@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 from tools.training.labelling import Label, LabellingRenderer, box_of, project, visibility
 
 CAMERA = CameraModel.from_fov(640, 360, math.radians(70))

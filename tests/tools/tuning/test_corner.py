@@ -7,11 +7,13 @@ import pytest
 
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.clock import seconds
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.depth import renderer_for
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detections, Frame, Header, Odometry
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.perception import TruthPerception
 

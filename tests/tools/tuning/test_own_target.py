@@ -8,11 +8,12 @@ import pytest
 
 from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.clock import seconds
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scenario import load_scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.clock import seconds
-from aerodaas.types.data import Detections, Odometry
-from aerodaas.types.geometry import CameraModel
 from tools.tuning.chase import Chase
 from tools.tuning.perception import DetectorPerception
 

@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.errors import ConfigError
 from aerodaas.following.follow_settings import FollowGains
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.types.errors import ConfigError
 from tools.tuning.__main__ import app
 from tools.tuning.chase import TELLO, Chase, ChaseResult
 from tools.tuning.perception import TruthPerception

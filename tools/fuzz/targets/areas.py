@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterable
 
 from aerodaas.dataflow.plans.areas import read_areas
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]

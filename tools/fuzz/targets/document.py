@@ -14,7 +14,7 @@ from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 
 __all__ = ["mutate", "run", "seeds"]

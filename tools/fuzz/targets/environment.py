@@ -10,7 +10,7 @@ from pathlib import Path
 from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located, overridden, parse_setting
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
 
 __all__ = ["run", "seeds"]
 

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.monitoring.gps_logger import GpsLoggerAnalytics
-from aerodaas.types.data import Alert
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.readings import Alert
 from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]

@@ -22,10 +22,12 @@ from aerodaas.analytics.guests.document import (
 )
 from aerodaas.analytics.item_json import ItemError, decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Detection, Detections, Header, Readings
-from aerodaas.types.errors import GraphError
-from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.waypoints import VelocityCommand, Waypoint
+from aerodaas.errors import GraphError
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.readings import Readings
+from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 
 _HEAD = struct.Struct("<II")

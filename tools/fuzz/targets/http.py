@@ -17,10 +17,10 @@ from aerodaas.analytics.remote.app import build_app
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command, OpenStream, StreamItem
-from aerodaas.types.data import Alert
-from aerodaas.types.status import MissionState, MissionStatus
-from aerodaas.types.vehicle import VehicleState
 from tools.fuzz.flight import LIMITS, TURN, FuzzedFlight, require
 
 __all__ = ["run", "seeds"]

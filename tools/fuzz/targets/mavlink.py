@@ -19,8 +19,8 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire import link
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import ned_to_enu
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import ned_to_enu
 from tools.fuzz.flight import (
     LIMITS,
     START,

@@ -9,8 +9,8 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.types.data import Frame, Header
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.frames import Frame, Header
 from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from aerodaas.dataflow.plans.commands import command_name
 from aerodaas.dataflow.plans.fences import geofence_of
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry.frames import GeodeticOrigin
 from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]

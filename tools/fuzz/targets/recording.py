@@ -26,6 +26,17 @@ from aerodaas.cli.flown_tasks import Flown
 from aerodaas.cli.flown_workload import flown_trace, flown_workload
 from aerodaas.config.model import RecordingConfig, SensorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.errors import AeroDaaSError
+from aerodaas.geometry.frames import CameraModel, GeodeticOrigin
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import Decision, MissionState, MissionStatus, SetpointRecord
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.messages.vitals import GpuLoad, Vitals
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.recording.export.tabular import write_csv
 from aerodaas.recording.export.track import write_gpx, write_kml
 from aerodaas.recording.export.video import write_videos
@@ -48,30 +59,6 @@ from aerodaas.recording.report.report import Report
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.vehicle_log.attachment import attached_logs
-from aerodaas.types.data import (
-    Alert,
-    Battery,
-    Detection,
-    Detections,
-    Frame,
-    GpsFix,
-    Header,
-    Odometry,
-)
-from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.geometry import CameraModel, GeodeticOrigin
-from aerodaas.types.gpu import GpuLoad
-from aerodaas.types.status import (
-    Decision,
-    Message,
-    MissionState,
-    MissionStatus,
-    SetpointRecord,
-    TraceSpan,
-)
-from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.vitals import Vitals
-from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 __all__ = ["mutate", "run", "seeds"]
 

@@ -16,7 +16,7 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello import handshake, link, vehicle
 from aerodaas.drivers.tello.link import TelloLink
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 from tools.fuzz.flight import (
     LIMITS,
     START,

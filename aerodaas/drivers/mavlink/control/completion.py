@@ -9,9 +9,9 @@ import numpy as np
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import PositionSetpoint
 
 __all__ = ["ClimbCompletion"]
 

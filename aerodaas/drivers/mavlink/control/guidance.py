@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.types.braking import braking_distance, braking_speed
-from aerodaas.types.geometry import Vector, wrap_angle
-from aerodaas.types.vehicle import PositionSetpoint
+from aerodaas.geometry.braking import braking_distance, braking_speed
+from aerodaas.geometry.frames import Vector, wrap_angle
+from aerodaas.messages.vehicle import PositionSetpoint
 
 __all__ = ["MovingTarget", "Target"]
 

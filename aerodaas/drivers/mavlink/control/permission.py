@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 
 __all__ = ["flight_objection"]
 

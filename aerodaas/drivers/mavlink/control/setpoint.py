@@ -7,7 +7,7 @@ from typing import Any
 from aerodaas.drivers.mavlink.control.guidance import Target
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.vehicle import VelocitySetpoint
+from aerodaas.messages.vehicle import VelocitySetpoint
 
 __all__ = ["position_message", "velocity_message"]
 

@@ -15,9 +15,9 @@ from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.setpoints import slowed
-from aerodaas.types.braking import limit_length
-from aerodaas.types.data import Odometry
-from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
+from aerodaas.geometry.braking import limit_length
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import Setpoint, VelocitySetpoint
 
 __all__ = ["Steering"]
 

@@ -29,8 +29,8 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
-from aerodaas.types.actuators import MoveResult
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
+from aerodaas.messages.actuators import MoveResult
 
 __all__ = ["MavlinkActuators"]
 
@@ -62,7 +62,7 @@ class _Move:
 
 
 class MavlinkActuators:
-    """The actuators of one vehicle; implements `aerodaas.types.actuators.Actuators`.
+    """The actuators of one vehicle; implements `aerodaas.messages.actuators.Actuators`.
 
     The link's thread calls `take` and `turn`, the loop's thread the rest, under one lock.
     """

@@ -19,8 +19,8 @@ from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
-from aerodaas.types.geometry import Vector, is_finite
-from aerodaas.types.traffic import Traffic
+from aerodaas.geometry.frames import Vector, is_finite
+from aerodaas.messages.vehicle import Traffic
 
 __all__ = ["Airspace"]
 

@@ -30,7 +30,7 @@ from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, vi
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.mavlink.wire.senders import CAMERAS
-from aerodaas.types.payload import CameraStatus
+from aerodaas.messages.payload import CameraStatus
 
 __all__ = ["PayloadComponent"]
 

@@ -20,7 +20,7 @@ from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, 
 from aerodaas.drivers.mavlink.microservices.way_home import other_way_home, upload_way_home
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["Fallback"]
 

@@ -10,7 +10,7 @@ from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, item_place, upload
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["fence_items", "upload_fence"]
 

@@ -13,7 +13,7 @@ from itertools import islice
 from typing import NamedTuple, TypeAlias, TypeVar
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["FtpClient", "FtpEntry", "FtpPacket", "FtpRefusedError", "FtpScript", "Turn"]
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from aerodaas.config.private_file import write_private
 from aerodaas.config.user_folders import state_folder
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["Changes", "Journal", "ParameterChange"]
 

@@ -8,8 +8,8 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.payload import LensTarget
+from aerodaas.errors import VehicleError
+from aerodaas.messages.payload import LensTarget
 
 __all__ = ["MavlinkLens"]
 

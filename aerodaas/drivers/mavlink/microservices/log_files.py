@@ -20,8 +20,8 @@ from aerodaas.drivers.mavlink.microservices.ftp import (
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle_log import LogEntry
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle_log import LogEntry
 
 __all__ = ["FileTransfer", "fetch_file", "find_log"]
 

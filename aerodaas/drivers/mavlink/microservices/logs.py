@@ -15,8 +15,8 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, older_than
 from aerodaas.drivers.mavlink.microservices.log_files import FileTransfer, fetch_file, find_log
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.vehicle_log import LogEntry
+from aerodaas.errors import VehicleError
+from aerodaas.messages.vehicle_log import LogEntry
 
 __all__ = ["fetch_log", "list_logs"]
 

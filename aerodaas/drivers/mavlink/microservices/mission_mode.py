@@ -22,10 +22,10 @@ from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.mission_mode import MissionModePhase, PlannedPlace, PlanProgress
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.mission_mode import MissionModePhase, PlannedPlace, PlanProgress
+from aerodaas.messages.vehicle import VehicleMode
 
 __all__ = ["MavlinkMissionMode", "mission_items"]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["Parameters", "UnsafeParameter", "unsafe_parameters"]
 

@@ -16,18 +16,18 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import ClassVar
 
+from aerodaas.clock import Clock
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
 from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
 from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
-from aerodaas.types.clock import Clock
-from aerodaas.types.data import Odometry
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import yaw_enu_to_ned
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.payload import (
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import yaw_enu_to_ned
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import (
     CameraStatus,
     Gimbal,
     GimbalAttitude,
@@ -36,7 +36,7 @@ from aerodaas.types.payload import (
     PhotoCamera,
     PhotoOutcome,
 )
-from aerodaas.types.vehicle import VehicleState
+from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["Payload"]
 

@@ -23,8 +23,8 @@ from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
 from aerodaas.drivers.mavlink.microservices.recorder import MavlinkRecorder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
-from aerodaas.types.data import Odometry
-from aerodaas.types.payload import GimbalAttitude, Photo, PhotoFailure, PhotoOutcome, PhotoPlace
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoFailure, PhotoOutcome, PhotoPlace
 
 __all__ = ["MavlinkCamera", "Moment"]
 
@@ -53,7 +53,7 @@ class _Request:
 
 
 class MavlinkCamera:
-    """One camera; implements `aerodaas.types.payload.PhotoCamera`. The caller locks."""
+    """One camera; implements `aerodaas.messages.payload.PhotoCamera`. The caller locks."""
 
     def __init__(
         self,

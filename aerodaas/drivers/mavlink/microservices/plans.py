@@ -13,8 +13,8 @@ import numpy as np
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
 
 __all__ = ["DEGREE", "MissionItem", "Progress", "Upload", "download", "item_place", "upload"]
 

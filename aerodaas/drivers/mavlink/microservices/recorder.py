@@ -15,7 +15,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["MavlinkRecorder"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
-from aerodaas.types.geometry import GeodeticOrigin, Vector, length
-from aerodaas.types.traffic import Traffic
+from aerodaas.geometry.frames import GeodeticOrigin, Vector, length
+from aerodaas.messages.vehicle import Traffic
 
 __all__ = ["TrafficTable"]
 

@@ -18,9 +18,9 @@ from aerodaas.drivers.mavlink.microservices.plans import (
 )
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["other_way_home", "upload_way_home", "way_home_items"]
 

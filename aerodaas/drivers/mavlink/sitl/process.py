@@ -14,7 +14,7 @@ from types import TracebackType
 from typing_extensions import Self
 
 from aerodaas.drivers.mavlink.sitl.programs import PROGRAMS, Family, SitlOptions
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 __all__ = ["SitlProcess"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from aerodaas.types.errors import SourceError
+from aerodaas.errors import SourceError
 
 __all__ = ["PROGRAMS", "Family", "SimulatedHome", "SitlOptions", "SitlProgram"]
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import GeodeticOrigin, Vector, ned_to_enu
 
 __all__ = ["Alignment", "global_origin"]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["BootClock"]
 

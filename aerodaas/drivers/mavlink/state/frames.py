@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.types.geometry import (
+from aerodaas.geometry.frames import (
     GeodeticOrigin,
     Vector,
     enu_to_ned,

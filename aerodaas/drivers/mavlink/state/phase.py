@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import math
 
-from aerodaas.types.vehicle import VehicleMode
+from aerodaas.messages.vehicle import VehicleMode
 
 __all__ = ["PROTECTIVE", "FlightMode", "FlightPhase"]
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.airspace import Airspace
@@ -18,11 +19,10 @@ from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
-from aerodaas.types.clock import NANOSECONDS
-from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
-from aerodaas.types.health import HealthReadings
-from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.vehicle import VehicleMode, VehicleState
 
 __all__ = ["REASONS", "VehicleReport"]
 

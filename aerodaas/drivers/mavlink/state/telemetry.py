@@ -16,9 +16,9 @@ from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
 from aerodaas.drivers.mavlink.state.health import Health
 from aerodaas.drivers.mavlink.state.rangefinder import Rangefinder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.data import Battery, GpsFix
-from aerodaas.types.errors import VehicleError
-from aerodaas.types.geometry import Vector
+from aerodaas.errors import VehicleError
+from aerodaas.geometry.frames import Vector
+from aerodaas.messages.odometry import Battery, GpsFix
 
 __all__ = ["Sensors", "Telemetry"]
 

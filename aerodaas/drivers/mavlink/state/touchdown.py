@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from aerodaas.drivers.mavlink.state.phase import FlightMode
-from aerodaas.types.vehicle import FlightEnd
+from aerodaas.messages.vehicle import FlightEnd
 
 __all__ = ["Touchdown"]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from aerodaas.drivers.mavlink.wire.rtcm import LARGEST, RtcmFramer, fragments
 from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
-from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.errors import ConfigError, VehicleError
 
 __all__ = ["Corrections"]
 

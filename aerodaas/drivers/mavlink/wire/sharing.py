@@ -14,7 +14,7 @@ from aerodaas.drivers.mavlink.wire.framing import senders
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
 from aerodaas.drivers.mavlink.wire.transport import Transport
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.errors import VehicleError
+from aerodaas.errors import VehicleError
 
 __all__ = ["WireMember", "WireShare", "share_wire"]
 

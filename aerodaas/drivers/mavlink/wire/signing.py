@@ -12,7 +12,7 @@ from typing import Any
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import ConfigError
+from aerodaas.errors import ConfigError
 
 __all__ = ["SignedCodec", "load_key", "sign_with", "signature_fits"]
 

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Protocol
 
 from aerodaas.drivers.pin import Peer
-from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.errors import ConfigError, VehicleError
 
 __all__ = ["Transport", "is_exposed", "open_transport"]
 

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from aerodaas.clock import seconds
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.recording.report.palette import STATE_COLOURS, label_colour
 from aerodaas.recording.report.plots.style import colours_of, grid, legend, mark, new_figure
-from aerodaas.types.clock import seconds
 
 __all__ = ["profile_figure", "trajectory_figure"]
 

@@ -1,0 +1,1 @@
+"""Frames of reference, geodesy, depth, braking, free paths and energy."""

@@ -1,0 +1,79 @@
+"""What a vehicle carries to act with: grippers, servos, relays and parachutes, by name.
+
+A driver implements `Actuators` for the actuators of the robot's section in the environment file,
+and hands it out as an `ActuatedVehicle`. A command names the position that is to be reached, never
+a change of the present one: so it may be repeated without harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.vehicle import Vehicle
+
+__all__ = ["ActuatedVehicle", "Actuators", "MoveResult"]
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class MoveResult:
+    """What became of one command to an actuator."""
+
+    number: int
+    """That of `Actuators.move`, or of `Actuators.release_parachute`."""
+    accepted: bool
+    """Whether the vehicle says that it was done."""
+    reason: str = ""
+    """Why it was not, in a few words."""
+
+
+class Actuators(Protocol):
+    """The actuators of one vehicle; every method returns at once."""
+
+    def move(self, actuator: str, position: str) -> int:
+        """Have an actuator take a position; returns a number of this command alone.
+
+        `position` is one of the configuration's `positions`; of a parachute `enable` and
+        `disable`, and never its release. The driver repeats what is not acknowledged. Raises
+        VehicleError if it certainly cannot.
+        """
+        ...
+
+    def release_parachute(self, actuator: str) -> int:
+        """Fire a parachute, which ends the flight; returns a number of this command alone.
+
+        Raises VehicleError if it certainly cannot.
+        """
+        ...
+
+    def withdraw(self, number: int) -> None:
+        """Repeat the command of this `number` no more, and tell nothing of it.
+
+        One that has been sent may be executed all the same.
+        """
+        ...
+
+    def results(self) -> list[MoveResult]:
+        """What became of commands since the last call."""
+        ...
+
+    @property
+    def positions(self) -> Mapping[str, str]:
+        """The positions last taken, by actuator, as far as the vehicle has acknowledged them.
+
+        One that was not moved since connecting is not in it: nobody knows where it stands.
+        """
+        ...
+
+
+@runtime_checkable
+class ActuatedVehicle(Vehicle, Protocol):
+    """A vehicle whose driver can move actuators."""
+
+    @property
+    def actuators(self) -> Actuators | None:
+        """Its actuators; None if the environment file names none."""
+        ...

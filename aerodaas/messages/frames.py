@@ -1,0 +1,88 @@
+"""Camera frames, and the header that a measurement shares with its results.
+
+Stamps are nanoseconds of the mission clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.records import fast_pickle
+
+__all__ = ["Frame", "Header", "Image"]
+
+
+class Header(NamedTuple):
+    """Identity of a measurement: its source, its number, and its timestamp.
+
+    A result carries the header of the measurement it was made from, so that its age is known
+    wherever it arrives.
+    """
+
+    id: int
+    """Counts up from zero within one source."""
+    stamp: int
+    """Mission clock at capture, in nanoseconds."""
+    source: str
+    """Identifier of the sensor, `robot/sensor`."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An immutable image with the data needed to place it in the world."""
+
+    header: Header
+    image: NDArray[np.uint8]
+    """Height x width x 3, BGR."""
+    camera: CameraModel | None = None
+    """Calibration and mount, where known."""
+    odometry: Odometry | None = None
+    """The vehicle's odometry at capture, where known."""
+    depth: NDArray[np.uint16] | None = None
+    """Height x width, pixel by pixel: millimetres along the optical axis, 0 where not measured.
+    None from cameras that measure none."""
+
+    def __post_init__(self) -> None:
+        """Require 8-bit BGR, and depth of the image's size."""
+        bgr_axes, bgr_channels = 3, 3
+        image = self.image
+        if image.dtype != np.uint8 or image.ndim != bgr_axes or image.shape[2] != bgr_channels:
+            message = (
+                f"{self.header.source}: a frame must be height x width x 3 of uint8 (BGR), "
+                f"not {image.shape} of {image.dtype}"
+            )
+            raise SourceError(message)
+        depth = self.depth
+        if depth is not None and (depth.dtype != np.uint16 or depth.shape != image.shape[:2]):
+            message = (
+                f"{self.header.source}: depth must be height x width of uint16 (millimetres), as "
+                f"the picture's {image.shape[:2]}, not {depth.shape} of {depth.dtype}"
+            )
+            raise SourceError(message)
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return int(self.image.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return int(self.image.shape[0])
+
+    @property
+    def nbytes(self) -> int:
+        """Size in bytes of the image and its depth."""
+        return self.image.nbytes + (0 if self.depth is None else self.depth.nbytes)
+
+
+Image = Frame
+"""The paper's name of a camera's item."""

@@ -1,0 +1,449 @@
+"""Commands for a drone: waypoints, and velocity commands with the target that they follow."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.payload import GimbalTarget, LensTarget
+from aerodaas.messages.records import fast_pickle, shared_pickle
+
+__all__ = [
+    "DEFAULT_PRIORITY",
+    "LEAST_TRIGGER",
+    "FollowedTarget",
+    "HeightDatum",
+    "HeightReference",
+    "NavigationItem",
+    "NavigationType",
+    "SchedulingType",
+    "TargetState",
+    "VelocityCommand",
+    "Waypoint",
+    "WaypointType",
+]
+
+DEFAULT_PRIORITY = 5
+"""Priority of navigation that states none; smaller is more urgent, as in the paper."""
+
+
+class WaypointType(str, enum.Enum):
+    """The reference of a waypoint's x, y and z."""
+
+    RELATIVE = "relative"
+    """Metres east, north and up of the place where this robot took off."""
+    LOCAL = "local"
+    """Metres east, north and up of the environment's home."""
+    GLOBAL = "global"
+    """Latitude and longitude in WGS84 degrees, altitude in metres above the ellipsoid."""
+    GLOBAL_RELATIVE = "global_relative"
+    """Latitude and longitude in WGS84 degrees, height in metres above the environment's home."""
+
+
+class HeightReference(str, enum.Enum):
+    """What a waypoint's z is counted from, whatever its x and y are."""
+
+    HOME = "home"
+    """The environment's home."""
+    SEA = "sea"
+    """Mean sea level, as on maps and in the autopilots' altitudes; not the ellipsoid of GPS."""
+    GROUND = "ground"
+    """The ground beneath the waypoint, by the environment's terrain; the way there follows it."""
+
+
+@dataclass(frozen=True)
+class HeightDatum:
+    """What is known of sea and ground where a drone flies."""
+
+    sea_level: float | None = None
+    """Metres of the local frame's zero above mean sea level; None if it is not known."""
+    ground: Callable[[float, float], float] | None = None
+    """Local height of the ground at metres east and north, NaN where it is not known; None without
+    a terrain."""
+
+
+_NO_DATUM = HeightDatum()
+
+
+class NavigationType(str, enum.Enum):
+    """Where navigation comes from."""
+
+    DISTANCE_DRIVEN = "distance_driven"
+    """Waypoints known beforehand."""
+    ANALYTICS_DRIVEN = "analytics_driven"
+    """Waypoints or velocities that analytics makes in flight."""
+
+
+class SchedulingType(str, enum.Enum):
+    """Whether a trajectory scheduler may change the order of waypoints."""
+
+    ORDERED = "ordered"
+    UNORDERED = "unordered"
+
+
+_WHOLE = 100.0
+"""Percent."""
+_HALF_TURN = 3.1416
+"""Radians: pi, and the rounding of who writes it by hand."""
+LARGEST = 1e9
+"""Largest number of a waypoint either way: 64 bits hold as many seconds in nanoseconds; Earth is
+smaller in metres."""
+LEAST_TRIGGER = 0.1
+"""Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
+_ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
+
+
+def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
+    for name in names:
+        value = getattr(record, name)
+        # Almost every value; a status has hundreds of them, each time that it is read.
+        if value is None or (type(value) is float and abs(value) <= LARGEST):
+            continue
+        if not (isinstance(value, int | float | np.floating) and abs(value) <= LARGEST):
+            message = f"{owner}: {name} must be a finite number, not {value!r}; at most {LARGEST:g}"
+            raise InvalidWaypointError(message)
+
+
+def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
+    if not isinstance(waypoint_id, str) or not waypoint_id:
+        raise InvalidWaypointError(f"{owner}: an id is a text that is not empty")
+    if not (isinstance(priority, int | np.integer) and abs(priority) <= LARGEST):
+        message = f"{owner}: priority must be a whole number, not {priority!r}; at most {LARGEST:g}"
+        raise InvalidWaypointError(message)
+
+
+def _moves(owner: str, asked: object) -> tuple[tuple[str, str], ...]:
+    """Pairs of actuator and position."""
+    pairs = tuple(asked.items()) if isinstance(asked, Mapping) else asked
+    if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
+        message = f'{owner}: actuate is positions by actuator, {{"hook": "release"}}, not {asked!r}'
+        raise InvalidWaypointError(message)
+    moves = tuple((str(name), str(position)) for name, position in pairs)
+    if len(dict(moves)) < len(moves):
+        raise InvalidWaypointError(f"{owner}: actuate names an actuator twice: give two waypoints")
+    return moves
+
+
+def _is_pair(value: object) -> bool:
+    texts = value if isinstance(value, tuple | list) else ()
+    return [type(one) for one in texts] == [str, str]
+
+
+@shared_pickle
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A place to fly to, with hover time, yaw, speed and priority.
+
+    Raises InvalidWaypointError for numbers that are not finite or out of range.
+    """
+
+    id: str
+    x: float
+    """Metres east, or latitude in degrees for a global waypoint."""
+    y: float
+    """Metres north, or longitude in degrees for a global waypoint."""
+    z: float
+    """Metres up, or altitude in metres for a global waypoint; see WaypointType."""
+    hover_duration: float = 0.0
+    """Seconds to stay after arrival."""
+    waypoint_type: WaypointType | str = WaypointType.RELATIVE
+    yaw: float | None = None
+    """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
+    speed: float | None = None
+    """m/s towards it; None takes the robot's cruise speed."""
+    priority: int = DEFAULT_PRIORITY
+    """Smaller is more urgent; a more urgent waypoint preempts the plan."""
+    deadline: float | None = None
+    """Seconds of mission time by which to arrive; None for no deadline."""
+    above: HeightReference | str | None = None
+    """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
+    gimbal_pitch: float | None = None
+    """Radians to which the gimbal is turned on the way there, 0 at the horizon, negative
+    downwards: -pi/2 looks straight down. None leaves it as it is, or level where `gimbal_yaw` is
+    given."""
+    gimbal_yaw: float | None = None
+    """Radians from the nose, counter-clockwise; None leaves it as it is, or ahead where
+    `gimbal_pitch` is given."""
+    photo: bool = False
+    """Whether a picture is taken there, once the gimbal looks where it is to."""
+    actuate: dict[str, str] | tuple[tuple[str, str], ...] = ()
+    """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
+    other, after the picture; kept as a tuple of pairs."""
+    trigger_distance: float | None = None
+    """Metres between pictures on the way there, along the straight line from where it begins; the
+    drone does not stop for them. None takes none."""
+    trigger_interval: float | None = None
+    """Seconds between pictures on the way there and during the stay; the drone does not stop for
+    them. None takes none."""
+    look_at: tuple[float, float, float] | None = None
+    """A place that the gimbal keeps looking at from the way there on, or the nose where the gimbal
+    cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
+    x, y and z are."""
+
+    zoom: float | None = None
+    """Percent of the camera's zoom, 0 (sees most) to 100, that is set on the way there; None leaves
+    it as it is."""
+    focus: float | None = None
+    """The same for the focus, 0 (near) to 100 (far)."""
+    video: bool | None = None
+    """Whether the camera's recording on its own card is begun there (True) or ended (False), after
+    the picture and before actuators move; None leaves it as it is. One that the mission has begun
+    ends with it."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and turn the type's name into a WaypointType."""
+        owner = f"waypoint {self.id!r}"
+        _require_names(owner, self.id, self.priority)
+        _require_finite(owner, self, _NUMBERS)
+        if type(self.waypoint_type) is not WaypointType:
+            object.__setattr__(self, "waypoint_type", self._type_named(owner))
+        if self.above is not None and type(self.above) is not HeightReference:
+            object.__setattr__(self, "above", self._reference_named(owner))
+        if self.hover_duration < 0:
+            message = f"{owner}: hover_duration must not be negative, not {self.hover_duration}"
+            raise InvalidWaypointError(message)
+        if self.speed is not None and self.speed <= 0:
+            message = f"{owner}: speed must be positive, not {self.speed}"
+            raise InvalidWaypointError(message)
+        self._check_camera(owner)
+        if self.actuate != ():
+            object.__setattr__(self, "actuate", _moves(owner, self.actuate))
+        self._require_on_the_globe(owner, self.x, self.y)
+
+    def _check_camera(self, owner: str) -> None:
+        for name, angle in (("gimbal_pitch", self.gimbal_pitch), ("gimbal_yaw", self.gimbal_yaw)):
+            if angle is not None and abs(angle) > _HALF_TURN:
+                message = f"{owner}: {name} is in radians, from -pi to pi, not {angle}"
+                raise InvalidWaypointError(message)
+        photo: object = self.photo
+        if not isinstance(photo, bool):
+            message = f"{owner}: photo must be True or False, not {photo!r}"
+            raise InvalidWaypointError(message)
+        video: object = self.video
+        if not isinstance(video, bool | None):
+            message = f"{owner}: video must be True, False or None, not {video!r}"
+            raise InvalidWaypointError(message)
+        for name in ("trigger_distance", "trigger_interval"):
+            value = getattr(self, name)
+            if value is not None and value < LEAST_TRIGGER:
+                message = f"{owner}: {name} must be at least {LEAST_TRIGGER}, not {value}"
+                raise InvalidWaypointError(message)
+        if self.trigger_distance is not None and self.trigger_interval is not None:
+            message = f"{owner}: give it trigger_distance or trigger_interval, not both"
+            raise InvalidWaypointError(message)
+        for name in ("zoom", "focus"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value <= _WHOLE:
+                message = f"{owner}: {name} is in percent, from 0 to 100, not {value}"
+                raise InvalidWaypointError(message)
+        self._check_look_at(owner)
+
+    def _check_look_at(self, owner: str) -> None:
+        if self.look_at is None:
+            return
+        if self.gimbal is not None:
+            message = f"{owner}: give it look_at or the gimbal's angles, not both"
+            raise InvalidWaypointError(message)
+        place: object = self.look_at
+        if not (
+            isinstance(place, tuple | list)
+            and len(place) == len("xyz")
+            and all(isinstance(one, int | float | np.floating) for one in place)
+            and all(abs(one) <= LARGEST for one in place)
+        ):
+            message = f"{owner}: look_at must be three finite numbers (x, y, z), not {place!r}"
+            raise InvalidWaypointError(message)
+        object.__setattr__(self, "look_at", tuple(map(float, place)))
+        self._require_on_the_globe(owner, *self.look_at[:2])
+
+    def _require_on_the_globe(self, owner: str, x: float, y: float) -> None:
+        north_pole, date_line = 90.0, 180.0
+        if self.waypoint_type in _ON_THE_GLOBE and (abs(x) > north_pole or abs(y) > date_line):
+            message = f"{owner}: ({x}, {y}) is no latitude and longitude in degrees"
+            raise InvalidWaypointError(message)
+
+    def _type_named(self, owner: str) -> WaypointType:
+        try:
+            return WaypointType(self.waypoint_type)
+        except ValueError:
+            choices = ", ".join(kind.value for kind in WaypointType)
+            message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
+            raise InvalidWaypointError(message) from None
+
+    def _reference_named(self, owner: str) -> HeightReference:
+        try:
+            return HeightReference(str(self.above))
+        except ValueError:
+            choices = ", ".join(kind.value for kind in HeightReference)
+            message = f"{owner}: above must be one of {choices}, not {self.above!r}"
+            raise InvalidWaypointError(message) from None
+
+    def resolve(
+        self, takeoff: Vector, origin: GeodeticOrigin | None, datum: HeightDatum = _NO_DATUM
+    ) -> Waypoint:
+        """The same waypoint in the local ENU frame of the environment.
+
+        `takeoff` is where this robot took off, ENU metres; `datum` is for heights above sea and
+        ground. Raises InvalidWaypointError if a global waypoint meets an environment without a
+        geodetic home, or one above sea or ground meets one whose own height is not known.
+        """
+        if self.look_at is not None:
+            x, y, z = self.look_at
+            bare = replace(self, look_at=None)
+            seen = replace(bare, x=x, y=y, z=z).resolve(takeoff, origin, datum)
+            there = bare.resolve(takeoff, origin, datum)
+            return replace(there, look_at=(seen.x, seen.y, seen.z))
+        if self.above is not None:
+            kind = self.waypoint_type
+            if kind is WaypointType.GLOBAL:
+                kind = WaypointType.GLOBAL_RELATIVE
+            level = replace(self, z=float(takeoff[2]), waypoint_type=kind, above=None)
+            place = level.resolve(takeoff, origin)
+            return replace(place, z=self._local_height(place, datum))
+        if self.waypoint_type is WaypointType.LOCAL:
+            return self
+        if self.waypoint_type is WaypointType.RELATIVE:
+            x, y, z = np.array([self.x, self.y, self.z]) + takeoff
+        elif origin is None:
+            message = f"waypoint {self.id!r} is global, but the environment file gives no home"
+            raise InvalidWaypointError(message)
+        elif self.waypoint_type is WaypointType.GLOBAL:
+            x, y, z = origin.to_local(self.x, self.y, self.z)
+        else:
+            # Height is over home's level, as barometers have it, not over its tangent plane.
+            x, y, _ = origin.to_local(self.x, self.y, origin.altitude)
+            z = self.z
+        return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
+
+    def _local_height(self, place: Waypoint, datum: HeightDatum) -> float:
+        """Metres over the local frame's zero, of a waypoint that says what it is counted from."""
+        if self.above is HeightReference.HOME:
+            return self.z
+        if self.above is HeightReference.SEA:
+            if datum.sea_level is None:
+                raise InvalidWaypointError(
+                    f"waypoint {self.id!r} is above the sea, and home's own height above it is not "
+                    "known: give home.above_sea in the environment file (a map's height; GPS "
+                    "counts from the ellipsoid)"
+                )
+            return self.z - datum.sea_level
+        if datum.ground is None:
+            raise InvalidWaypointError(
+                f"waypoint {self.id!r} is above ground, and the environment file names no terrain"
+            )
+        ground = datum.ground(place.x, place.y)
+        if math.isnan(ground):
+            raise InvalidWaypointError(
+                f"waypoint {self.id!r} is above ground that the terrain does not know"
+            )
+        return ground + self.z
+
+    @property
+    def gimbal(self) -> GimbalTarget | None:
+        """Where the gimbal is to look; None to leave it as it is."""
+        if self.gimbal_pitch is None and self.gimbal_yaw is None:
+            return None
+        return GimbalTarget(self.gimbal_pitch or 0.0, self.gimbal_yaw or 0.0)
+
+    @property
+    def lens(self) -> LensTarget | None:
+        """What the camera's lens is set to; None to leave it as it is."""
+        if self.zoom is None and self.focus is None:
+            return None
+        return LensTarget(self.zoom, self.focus)
+
+    @property
+    def moves(self) -> dict[str, str]:
+        """Positions by actuator that are taken there, in order; empty for none."""
+        return dict(self.actuate)
+
+    @property
+    def position(self) -> Vector:
+        """x, y and z as an array of shape (3,)."""
+        return np.array([self.x, self.y, self.z], dtype=np.float64)
+
+
+_NUMBERS = tuple(
+    field.name
+    for field in fields(Waypoint)
+    if field.name
+    in {
+        *("x", "y", "z", "hover_duration", "yaw", "speed", "deadline"),
+        *("gimbal_pitch", "gimbal_yaw", "trigger_distance", "trigger_interval"),
+        *("zoom", "focus"),
+    }
+)
+
+
+class TargetState(str, enum.Enum):
+    """How sure a follower is of its target in one frame."""
+
+    SURE = "sure"
+    LIKELY = "likely"
+    """Another one came close, and they were not told apart since: this is the likelier one."""
+    UNCERTAIN = "uncertain"
+    """It is not known which of those seen it is; the drone holds."""
+    UNSEEN = "unseen"
+    """It was not found in this frame: the drone slows, holds or searches."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class FollowedTarget:
+    """The target of a velocity command. Its frame is the one that the command was made from."""
+
+    state: TargetState
+    box: tuple[float, float, float, float] | None = None
+    """Left, top, right, bottom in the frame's pixels; None where it is not known."""
+    track_id: int | None = None
+    """Of the follower's own tracker."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class VelocityCommand:
+    """A velocity asked for by analytics, in the level body frame (FLU).
+
+    It is valid for `valid_for` seconds from arrival at the drone; after that the drone holds.
+    Raises InvalidWaypointError for numbers that are not finite.
+    """
+
+    forward: float = 0.0
+    """m/s."""
+    left: float = 0.0
+    """m/s."""
+    up: float = 0.0
+    """m/s."""
+    yaw_rate: float = 0.0
+    """rad/s, counter-clockwise."""
+    priority: int = DEFAULT_PRIORITY
+    valid_for: float = 0.5
+    """Seconds."""
+    evasive: bool = False
+    """Whether it gives way to a person: it takes effect at once, without a ramp of the setpoints.
+    All boundaries hold."""
+    target: FollowedTarget | None = None
+    """What it follows; for people who look on, not for the drone."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are not finite and a validity that is not positive."""
+        names = ("forward", "left", "up", "yaw_rate", "valid_for")
+        _require_finite("velocity command", self, names)
+        if self.valid_for <= 0:
+            message = f"velocity command: valid_for must be positive, not {self.valid_for}"
+            raise InvalidWaypointError(message)
+
+    @property
+    def velocity(self) -> Vector:
+        """Forward, left and up as an array of shape (3,), m/s."""
+        return np.array([self.forward, self.left, self.up], dtype=np.float64)
+
+
+NavigationItem: TypeAlias = Waypoint | VelocityCommand
