@@ -212,7 +212,9 @@ def test_a_feed_tells_its_newest_row() -> None:
     alerts: list[Alert] = []
     with feed(answers) as address:
         logger = GpsLoggerAnalytics(address)
+        logger.open()
         fixes = [logger.process(None, at(step, alerts)) for step in range(10)]
+        logger.close()
     found = [None if fix is None else fix.latitude for fix in fixes]
     assert found == [None, 1.0, None, None, 1.1, None, None, None, None, None]
     assert (logger.stale, logger.failures) == (1, 6)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
+import ssl
 import time
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 
-import urllib3
+import httpx
 from pydantic import SecretStr
-from urllib3.exceptions import HTTPError, NewConnectionError, ProtocolError
-from urllib3.exceptions import TimeoutError as NoTimeLeft
 
+from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.config.model import EndpointConfig
 from aerodaas.config.secrets import SecretUrl, cleaned
 from aerodaas.errors import ConfigError, EndpointError
@@ -22,7 +22,6 @@ __all__ = ["Connection", "Reply"]
 
 _MOST_BYTES = 64 * 2**20
 """Largest size of a reply; the raw output of a large detector has 3 MB."""
-_CHUNK = 1 << 18
 _FIRST_PAUSE = 0.02
 """Delay before the second attempt in seconds; doubled before each further one."""
 _LEAST_ATTEMPT = 0.005
@@ -80,7 +79,9 @@ class Connection:
             self.url,
             *map(SecretStr, self._secret.values()),
         )
-        self._pool = urllib3.PoolManager(maxsize=executors, block=True, retries=False)
+        secure = self.url.get_secret_value().startswith("https:")
+        tls = ssl.create_default_context() if secure else None
+        self._client = http_client(config.timeout, tls=tls, connections=executors)
 
     def ask(
         self,
@@ -119,7 +120,7 @@ class Connection:
 
     def close(self) -> None:
         """Close all connections."""
-        self._pool.clear()
+        self._client.close()
 
     def _attempt(
         self, method: str, url: str, body: bytes | None, headers: Mapping[str, str], until: float
@@ -127,57 +128,34 @@ class Connection:
         left = until - time.monotonic()
         if left <= 0:
             raise _AttemptError("timeout", "no time left to ask", again=False)
-        try:
-            response = self._pool.request(
-                method,
-                url,
-                body=body,
-                # A compressed reply could unpack to any size.
-                headers={**headers, "Accept-Encoding": "identity"},
-                timeout=urllib3.Timeout(left),
-                pool_timeout=left,
-                redirect=False,
-                preload_content=False,
-            )
-            try:
-                content = _read(response, until)
-            except BaseException:
-                # Unread bytes must not be taken for the next request's reply.
-                response.close()
-                raise
-            response.release_conn()
-        except NewConnectionError as error:
-            reason = self.cleaned(str(error).rpartition(": ")[2])
-            raise _AttemptError("refused", f"cannot be reached: {reason}", again=True) from None
-        except NoTimeLeft:
-            raise _AttemptError("timeout", "did not answer in time", again=False) from None
-        except ProtocolError as error:
-            text = self.cleaned(f"broke off: {error.args[0]}")
-            raise _AttemptError("broken", text, again=True) from None
-        except HTTPError as error:
-            text = self.cleaned(f"does not speak HTTP: {error}")
-            raise _AttemptError("broken", text, again=False) from None
-        if response.status in _BUSY:
-            raise _AttemptError("busy", f"is busy (status {response.status})", again=True)
-        if response.get_redirect_location():
-            text = "redirects elsewhere; give the address that it redirects to as endpoint.url"
-            raise _AttemptError("redirect", text, again=False)
-        return Reply(response.status, response.headers, content, self._secrets)
-
-
-def _read(response: urllib3.BaseHTTPResponse, until: float) -> bytes:
-    if response.headers.get("Content-Encoding", "identity").lower() != "identity":
-        text = "sent a compressed reply, which was not asked for; switch compression off there"
-        raise _AttemptError("compressed", text, again=False)
-    content = bytearray()
-    while chunk := response.read1(_CHUNK, decode_content=False):
-        content += chunk
+        with (
+            http_errors(self._failure),
+            self._client.stream(
+                method, url, content=body, headers=headers, timeout=left
+            ) as response,
+        ):
+            if response.headers.get("Content-Encoding", "identity").lower() != "identity":
+                text = "sent a compressed reply, which was not asked for; switch it off there"
+                raise _AttemptError("compressed", text, again=False)
+            content = read_at_most(response, _MOST_BYTES + 1, until)
         if len(content) > _MOST_BYTES:
             text = f"sent more than {_MOST_BYTES >> 20} MiB; is this the address of a model?"
             raise _AttemptError("huge", text, again=False)
-        if time.monotonic() > until:
-            raise _AttemptError("timeout", "did not answer in time", again=False)
-    return bytes(content)
+        if response.status_code in _BUSY:
+            text = f"is busy (status {response.status_code})"
+            raise _AttemptError("busy", text, again=True)
+        if response.has_redirect_location:
+            text = "redirects elsewhere; give the address that it redirects to as endpoint.url"
+            raise _AttemptError("redirect", text, again=False)
+        return Reply(response.status_code, response.headers, content, self._secrets)
+
+    def _failure(self, error: Exception) -> _AttemptError:
+        if isinstance(error, httpx.TimeoutException):
+            return _AttemptError("timeout", "did not answer in time", again=False)
+        refused = isinstance(error, httpx.ConnectError)
+        kind, said = ("refused", "cannot be reached") if refused else ("broken", "broke off")
+        again = isinstance(error, httpx.NetworkError | httpx.RemoteProtocolError)
+        return _AttemptError(kind, f"{said}: {self.cleaned(str(error))}", again=again)
 
 
 def _secret(config: EndpointConfig) -> dict[str, str]:

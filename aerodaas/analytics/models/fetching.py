@@ -9,21 +9,21 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import http.client
-import io
 import os
-import urllib.error
-import urllib.request
+import ssl
 import zipfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from http import HTTPStatus
 from pathlib import Path, PurePosixPath
 from typing import IO
 from urllib.parse import urlsplit
 
+import httpx
+
 from aerodaas.analytics.models.cache import fetched_path, require_fetched
 from aerodaas.analytics.models.registry import RegisteredModel, registered
+from aerodaas.config.http_client import http_client, http_errors
 from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError, ModelError, SourceError
 
@@ -108,15 +108,11 @@ def _receive(
         return
     where = source or model.address
     is_local = source is not None and Path(source).is_file()
-    stream: io.BufferedIOBase
-    if is_local:
-        stream, done = Path(where).open("rb"), 0  # noqa: SIM115 - closed below
-    else:
-        stream, done = _asked(_address(model, source), have)
-    with stream:
-        file.truncate(done)
+    opened = _opened(Path(where)) if is_local else _asked(_address(model, source), have)
+    with opened as (start, chunks):
+        done = file.truncate(start)
         progress(done, size)
-        for chunk in _chunks(stream, where):
+        for chunk in chunks:
             done += len(chunk)
             if done > size:
                 break
@@ -147,37 +143,39 @@ def _address(model: RegisteredModel, source: str | None) -> str:
     return address + Path(urlsplit(model.address).path).name
 
 
-def _asked(address: str, have: int) -> tuple[http.client.HTTPResponse, int]:
-    """The answer of a server, and the byte at which it begins: `have`, or 0."""
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[int, Iterator[bytes]]]:
+    """A file on this machine from its beginning, in chunks."""
+    with path.open("rb") as file:
+        yield 0, iter(lambda: file.read(_CHUNK), b"")
+
+
+@contextmanager
+def _asked(address: str, have: int) -> Iterator[tuple[int, Iterator[bytes]]]:
+    """The answer of a server: the byte at which it begins, `have` or 0, and its chunks."""
     headers = {"User-Agent": _AGENT} | ({"Range": f"bytes={have}-"} if have else {})
-    request = urllib.request.Request(address, headers=headers)  # noqa: S310 - checked before
-    try:
-        answer = urllib.request.urlopen(request, timeout=_SILENCE)  # noqa: S310 - as above
-    except urllib.error.HTTPError as error:
-        raise SourceError(f"{address} answers with status {error.code}") from None
-    except (urllib.error.URLError, http.client.HTTPException, TimeoutError) as error:
-        reason = printable(str(getattr(error, "reason", error)))
-        raise SourceError(
-            f"{address} cannot be reached: {reason}; --from takes a mirror, or a file that was "
-            "fetched elsewhere"
-        ) from None
-    partial = answer.status == HTTPStatus.PARTIAL_CONTENT
-    begins = answer.headers.get("Content-Range", "").startswith(f"bytes {have}-")
-    return answer, have if partial and begins else 0
+    tls = ssl.create_default_context()
+    with http_client(_SILENCE, tls=tls, public=True) as client, ExitStack() as stack:
+        with http_errors(lambda error: _unreachable(address, error)):
+            answer = stack.enter_context(client.stream("GET", address, headers=headers))
+        if not answer.is_success:
+            raise SourceError(f"{address} answers with status {answer.status_code}")
+        partial = answer.status_code == HTTPStatus.PARTIAL_CONTENT
+        begins = answer.headers.get("Content-Range", "").startswith(f"bytes {have}-")
+        yield have if partial and begins else 0, _chunks(answer)
 
 
-def _chunks(stream: io.BufferedIOBase, where: str) -> Iterator[bytes]:
+def _unreachable(address: str, error: Exception) -> SourceError:
+    return SourceError(
+        f"{address} cannot be reached: {printable(str(error))}; --from takes a mirror, or a file "
+        "that was fetched elsewhere"
+    )
+
+
+def _chunks(answer: httpx.Response) -> Iterator[bytes]:
     """All chunks; what is cut off ends early, which its length tells."""
-    while True:
-        try:
-            chunk = stream.read(_CHUNK)
-        except (http.client.HTTPException, ConnectionError, TimeoutError):
-            return
-        except OSError as error:
-            raise SourceError(f"cannot read {where}: {error}") from None
-        if not chunk:
-            return
-        yield chunk
+    with suppress(httpx.HTTPError):
+        yield from answer.iter_raw()
 
 
 def _check(file: IO[bytes], part: Path, wanted: str, name: str) -> None:

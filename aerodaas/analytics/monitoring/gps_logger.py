@@ -5,19 +5,23 @@ from __future__ import annotations
 import bisect
 import logging
 import math
+import ssl
 import time
-import urllib.request
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
 from aerodaas.clock import seconds
+from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.frames import Header
 from aerodaas.messages.odometry import GpsFix
 from aerodaas.messages.readings import Alert
+
+if TYPE_CHECKING:
+    import httpx
 
 __all__ = ["GpsLoggerAnalytics"]
 
@@ -85,11 +89,20 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         self._fixes: list[GpsFix] = []
         self._last = -math.inf
         self._failed_in_a_row = 0
+        self._client: httpx.Client | None = None
         if not self._is_feed:
             self._load(Path(source), offset)
 
+    def open(self) -> None:
+        """Make the client of a feed, which connects with its first request."""
+        if self._is_feed:
+            tls = ssl.create_default_context()
+            self._client = http_client(self.timeout, tls=tls, public=True)
+
     def close(self) -> None:
         """Log the numbers of unused rows and failed requests."""
+        if self._client is not None:
+            self._client.close()
         if self.malformed or self.stale or self.failures:
             _log.warning(
                 "%s: %d malformed rows, %d stale ones, %d requests without an answer",
@@ -142,7 +155,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
     def _ask(self, context: Context) -> GpsFix | None:
         try:
             rows = self._fetch()
-        except (OSError, SourceError, ValueError) as error:
+        except (SourceError, ValueError) as error:
             self.failures += 1
             self._failed_in_a_row += 1
             if self._failed_in_a_row == _LOST_AFTER:
@@ -168,8 +181,12 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         return newest.fix
 
     def _fetch(self) -> list[TimedFix]:
-        with urllib.request.urlopen(self.source, timeout=self.timeout) as answer:  # noqa: S310 - http only
-            content = answer.read(_LARGEST_ANSWER)
+        assert self._client is not None  # noqa: S101 - made by `open`
+        until = time.monotonic() + self.timeout
+        with http_errors(SourceError), self._client.stream("GET", self.source) as answer:
+            content = read_at_most(answer, _LARGEST_ANSWER, until)
+        if not answer.is_success:
+            raise SourceError(f"status {answer.status_code}")
         track = parse_track(content.decode("utf-8", errors="replace"), self.source)
         self.malformed += track.malformed
         self.stale += track.stale

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import ssl
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-import urllib3
-from urllib3.exceptions import HTTPError, MaxRetryError
+import httpx
 
+from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.config.printable import printable
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
@@ -20,9 +21,6 @@ __all__ = ["Exchange", "Method", "printed"]
 
 _MOST_BYTES = 32 << 20
 """Largest JSON of an answer: a mission of 64 robots has a thousandth of that."""
-_CHUNK = 1 << 18
-_KEPT_OPEN = 8
-"""Idle connections, for the threads that ask at once."""
 _MOST_TEXT = 2000
 """Characters of a refusal that are shown."""
 _CALLERS = frozenset(
@@ -40,6 +38,9 @@ _CALLERS = frozenset(
 _GATEWAYS = frozenset({HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT})
 """A proxy tells that the service behind it does not answer."""
 _LOGIN = "; is the token right? `aerodaas login` stores one"
+_REPEATABLE = frozenset({"GET", "HEAD", "PUT", "DELETE"})
+"""Methods that change nothing more when they are sent again."""
+_CUT = (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError)
 Method: TypeAlias = Literal["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"]
 
 
@@ -51,16 +52,7 @@ class Exchange:
         self.address = address
         self.ssl = ssl.create_default_context() if address.scheme == "https" else None
         self.headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        # A request that may have changed something is not sent again; others once, for a server
-        # may close an idle connection at the moment that it is used.
-        again = urllib3.Retry(total=1, connect=0, redirect=0, status=0, other=0)
-        self._timeout = urllib3.Timeout(timeout)
-        self._pool = urllib3.PoolManager(
-            retries=again,
-            timeout=self._timeout,
-            ssl_context=self.ssl,
-            maxsize=_KEPT_OPEN,
-        )
+        self._client = http_client(timeout, tls=self.ssl)
 
     def ask(
         self,
@@ -100,18 +92,13 @@ class Exchange:
         raises.
         """
         own = self.headers | (dict(headers or {}) if data is not None else {})
-        with self._answer(method, path, data, own, patience) as response:
-            try:
-                answer = response.read(_MOST_BYTES + 1)
-            except (HTTPError, OSError) as error:
-                raise self.unreachable(error) from None
-            if len(answer) > _MOST_BYTES:
-                # The rest is not worth reading to keep the connection.
-                response.close()
-                raise self.strange(f"its answer is larger than {_MOST_BYTES >> 20} MiB")
-            if response.status not in allowed:
-                self._require_success(response.status, answer)
-            return response.status, answer
+        with self._asked(method, path, data, own, patience) as response:
+            answer = read_at_most(response, _MOST_BYTES + 1)
+        if len(answer) > _MOST_BYTES:
+            raise self.strange(f"its answer is larger than {_MOST_BYTES >> 20} MiB")
+        if response.status_code not in allowed:
+            self._require_success(response.status_code, answer)
+        return response.status_code, answer
 
     def download(
         self, path: str, target: Path, progress: Callable[[int, int | None], None]
@@ -127,16 +114,17 @@ class Exchange:
             AeroDaaSError: As `ask`; UnreachableError also if the answer breaks off.
             OSError: If the file cannot be written.
         """
-        with self._answer("GET", path, None, self.headers) as response:
-            if response.status != HTTPStatus.OK:
-                self._require_success(response.status, response.read(_MOST_BYTES))
+        with self._asked("GET", path, None, self.headers) as response:
+            if response.status_code != HTTPStatus.OK:
+                answer = read_at_most(response, _MOST_BYTES)
+                self._require_success(response.status_code, answer)
             known = response.headers.get("Content-Length", "")
             size, done = int(known) if known.isdigit() else None, 0
             target.parent.mkdir(parents=True, exist_ok=True)
             part = target.with_name(f"{target.name}.part")
             try:
                 with part.open("wb") as file:
-                    for chunk in self._chunks(response):
+                    for chunk in response.iter_raw():
                         file.write(chunk)
                         done += len(chunk)
                         progress(done, size)
@@ -146,8 +134,7 @@ class Exchange:
 
     def unreachable(self, error: Exception) -> UnreachableError:
         """The error of a service that does not answer."""
-        inner = error.reason if isinstance(error, MaxRetryError) and error.reason else error
-        text = printable(str(inner))[:_MOST_TEXT] or type(inner).__name__
+        text = printable(str(error))[:_MOST_TEXT] or type(error).__name__
         return UnreachableError(f"the provider at {self.address.base} does not answer: {text}")
 
     def strange(self, why: str) -> MissionError:
@@ -166,32 +153,33 @@ class Exchange:
         kind = ConfigError if status in _CALLERS else MissionError
         return kind(f"{self.address.host}: {text}{hint}")
 
-    def _answer(
+    @contextmanager
+    def _asked(
         self,
         method: Method,
         path: str,
         data: bytes | None,
         headers: Mapping[str, str],
         patience: float | None = None,
-    ) -> urllib3.BaseHTTPResponse:
-        try:
-            return self._pool.request(
-                method,
-                f"{self.address.base}{path}",
-                body=data,
-                headers=headers,
-                preload_content=False,
-                redirect=False,
-                timeout=self._timeout if patience is None else urllib3.Timeout(patience),
+    ) -> Iterator[httpx.Response]:
+        """Yield an answer whose content is to be read; raise UnreachableError without one."""
+        timeout = httpx.USE_CLIENT_DEFAULT if patience is None else patience
+        with http_errors(self.unreachable):
+            request = self._client.build_request(
+                method, f"{self.address.base}{path}", content=data, headers=headers, timeout=timeout
             )
-        except (HTTPError, OSError) as error:
-            raise self.unreachable(error) from None
+            with closing(self._answer(request)) as response:
+                yield response
 
-    def _chunks(self, response: urllib3.BaseHTTPResponse) -> Any:  # noqa: ANN401 - an iterator
+    def _answer(self, request: httpx.Request) -> httpx.Response:
         try:
-            yield from response.stream(_CHUNK)
-        except (HTTPError, OSError) as error:
-            raise self.unreachable(error) from None
+            return self._client.send(request, stream=True)
+        except _CUT:
+            # A server may close an idle connection at the moment that it is used. What may have
+            # changed something is not sent again.
+            if request.method not in _REPEATABLE:
+                raise
+            return self._client.send(request, stream=True)
 
     def _require_success(self, status: int, answer: bytes) -> None:
         if not HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES:

@@ -323,7 +323,7 @@ def test_an_answer_that_is_lost_is_told_with_the_remedy(
     """The mission may fly: what is sent again has the same key, and the last word is how to see."""
     monkeypatch.setattr(client_module, "_RESEND_SECONDS", 1.0)
     environment = built(stub)
-    environment.provider._exchange._pool.connection_pool_kw["timeout"] = 0.3  # type: ignore[union-attr]
+    environment.provider._exchange._client.timeout = 0.3  # type: ignore[union-attr]
     stub.slow = threading.Event()
     with pytest.raises(SourceError, match="aerodaas missions"):
         environment.start_mission()
