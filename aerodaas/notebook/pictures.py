@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,10 +18,10 @@ from aerodaas.messages.frames import Frame
 from aerodaas.recording.pictures import detections_by_frame, picture_topics, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.overlay import draw_detections
+from aerodaas.recording.report.page.document import render_page
 
 __all__ = ["Picture", "Pictures", "boxed", "recorded_pictures"]
 
-_STYLE = "display:inline-block;vertical-align:top;margin:0 8px 8px 0;max-width:640px"
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 85]
 
 
@@ -64,15 +62,7 @@ class Pictures(Sequence[Picture]):
 
     def _repr_html_(self) -> str:
         """All of them, in one line as far as there is room."""
-        width = "100%" if len(self) == 1 else "300px"
-        figures = (
-            f'<figure style="{_STYLE};width:{width}">'
-            f'<img style="width:100%" src="data:image/jpeg;base64,'
-            f'{base64.b64encode(one.jpeg()).decode()}">'
-            f"<figcaption>{html.escape(one.caption)}</figcaption></figure>"
-            for one in self
-        )
-        return f"<div>{''.join(figures)}</div>"
+        return render_page(Path(__file__).with_name("pictures.html"), pictures=self)
 
 
 def boxed(frame: Frame, found: Iterable[Detection] = ()) -> Pictures:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -20,11 +21,11 @@ from aerodaas.messages.frames import Header
 from aerodaas.messages.vitals import Vitals, read_vitals
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report.comparison import write_comparison
+from aerodaas.recording.report.comparison import comparison_page, write_comparison
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import key_moments, picture_moments
-from aerodaas.recording.report.page.document import document, paragraph, section, table
-from aerodaas.recording.report.report import write_report
+from aerodaas.recording.report.page.flight import flight_page
+from aerodaas.recording.report.report import read_report, write_report
 
 
 class Page(HTMLParser):
@@ -81,14 +82,29 @@ def test_page_is_one_whole_file(recorded: Path, tmp_path: Path) -> None:
         assert told in page.words
 
 
-def test_page_escapes_what_was_recorded() -> None:
-    """A robot called <script> stays text."""
-    evil = "<script>alert('x')</script>"
-    page = document(
-        evil, [paragraph(evil, "outcome")], [section(evil, table([evil], [[evil, 1.0]]))], evil
+def test_page_escapes_what_was_recorded(recorded: Path) -> None:
+    """A robot called <script> stays text, as do streams, alerts, plots and moments."""
+    evil = "<script>alert('x')</script>\""
+    report = read_report(recorded)
+    (robot,) = report.summary.robots.values()
+    summary = replace(
+        report.summary,
+        title=evil,
+        robots={evil: replace(robot, outcome=evil)},
+        alerts=[{"time_s": 1.0, "kind": evil, "text": evil}],
+        drops={evil: 1},
+        reasons={f"{evil}: {evil}": 1},
+        provenance={"app": evil},
     )
+    plots = [plot._replace(title=evil, description=evil) for plot in report.plots[:1]]
+    moments = [replace(one, moment=replace(one.moment, reason=evil)) for one in report.moments[:1]]
+    page = flight_page(summary, plots, moments)
     assert "<script" not in page
-    assert Page(page).words.count(evil) == 7
+    assert Page(page).words.count(evil) > 12
+    other = replace(report, summary=summary, plots=plots)
+    page = comparison_page(evil, other, evil, other)
+    assert "<script" not in page
+    assert Page(page).words.count(evil) > 12
 
 
 def test_comparison_holds_both(recorded: Path, tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
-from aerodaas.recording.report.page.document import paragraph, table
+from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 from aerodaas.recording.report.report import write_report
 
@@ -74,12 +74,16 @@ def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:
         assert len(np.unique(image[::9, ::9].reshape(-1, 3), axis=0)) > 10
 
 
-def test_words_between_backticks_are_code() -> None:
-    """In paragraphs and cells; a stranger's text stays text."""
-    assert paragraph("say `--full`") == "<p>say <code>--full</code></p>"
-    cells = table(["a", "b"], [("`x`", "see `<b>` and a lone `")])
-    assert "<th>`x`</th>" in cells
-    assert "<td>see <code>&lt;b&gt;</code> and a lone `</td>" in cells
+def test_words_between_backticks_are_code(tmp_path: Path) -> None:
+    """Outside a row's first cell; a stranger's text stays text."""
+    template = tmp_path / "own.html"
+    template.write_text(
+        '{% from "parts.html" import table %}<p>{{ text | marked }}</p>{{ table("ab", rows) }}'
+    )
+    text = "see `<b>` and a lone `"
+    page = render_page(template, text=text, rows=[("`x`", text)])
+    assert "<p>see <code>&lt;b&gt;</code> and a lone `</p>" in page
+    assert "<th>`x`</th><td>see <code>&lt;b&gt;</code> and a lone `</td>" in page
 
 
 def test_states_cover_the_flight(recorded: Path) -> None:

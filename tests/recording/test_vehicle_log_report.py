@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -80,8 +81,8 @@ def test_the_report_shows_its_topics(recording: Path, tmp_path: Path) -> None:
     files = write_report(recording, tmp_path / "report")
     names = [f"vehicle_log_1_{name}.png" for name in PLOTS]
     assert [path.name for path in files.plots][-6:] == names
-    page = files.page.read_text()
-    assert page.count("From the autopilot&#x27;s log: ") >= len(PLOTS)
+    page = unescape(files.page.read_text())
+    assert page.count("From the autopilot's log: ") >= len(PLOTS)
     assert "ERR of subsystem 16, code 2" in page
     assert "<th>60.0</th>" in page
     assert "own.bin of drone (ArduPilot) covers 0.0 to 60.0 s of the mission" in page

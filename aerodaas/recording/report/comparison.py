@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from aerodaas.errors import RecordingError
-from aerodaas.recording.report.page.document import document, paragraph, picture, section, table
-from aerodaas.recording.report.page.flight import origin_line
-from aerodaas.recording.report.page.tables import figures
+from aerodaas.recording.report.page.document import render_page
+from aerodaas.recording.report.page.flight import figures, origin_line
 from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.report import Report, read_report
 
@@ -50,19 +49,19 @@ def comparison_page(first_name: str, first: Report, second_name: str, second: Re
         second_name: Name of the second recording.
         second: Report of the second recording.
     """
-    head = [
-        paragraph(f"{letter}: {name} ({origin_line(report.summary)})")
-        for letter, name, report in (("A", first_name, first), ("B", second_name, second))
-    ]
-    rows = table(["", "A", "B", "B less A"], _figure_rows(first, second))
-    parts = [section("Figures", rows, wide=True)]
-    if first.summary.latencies or second.summary.latencies:
-        titles = ["stream", "median A (ms)", "median B (ms)", "99th perc. A", "99th perc. B"]
-        rows = table(titles, _latency_rows(first, second))
-        parts.append(section("Latency since capture", rows, wide=True))
-    parts += _plots(first.plots, second.plots)
-    titles_ = dict.fromkeys((first.summary.title, second.summary.title))
-    return document(" and ".join(titles_) + ", compared", head, parts)
+    titles = dict.fromkeys((first.summary.title, second.summary.title))
+    return render_page(
+        "comparison.html",
+        title=" and ".join(titles) + ", compared",
+        origin="",
+        compared=[
+            (letter, name, origin_line(report.summary))
+            for letter, name, report in (("A", first_name, first), ("B", second_name, second))
+        ],
+        figures=_figure_rows(first, second),
+        latencies=list(_latency_rows(first, second)),
+        plots=_plots(first.plots, second.plots),
+    )
 
 
 def _figure_rows(first: Report, second: Report) -> Iterator[tuple[object, ...]]:
@@ -86,15 +85,11 @@ def _latency_rows(first: Report, second: Report) -> Iterator[tuple[object, ...]]
         )
 
 
-def _plots(first: list[Plot], second: list[Plot]) -> Iterator[str]:
-    """Yield a section for each plot of A, followed by that of B."""
+def _plots(first: list[Plot], second: list[Plot]) -> Iterator[tuple[str, list[Plot | None]]]:
+    """Yield the title of each plot, with that of A and that of B."""
     pairs: dict[str, list[Plot | None]] = {}
     for side, plots in enumerate((first, second)):
         for plot in plots:
             pairs.setdefault(plot.name, [None, None])[side] = plot
     for pair in pairs.values():
-        title = next(plot.title for plot in pair if plot is not None)
-        for letter, one in zip("AB", pair, strict=True):
-            nothing = paragraph("Nothing was recorded.")
-            shown = nothing if one is None else picture(one.png, one.description)
-            yield section(f"{letter}: {title}", shown)
+        yield next(plot.title for plot in pair if plot is not None), pair

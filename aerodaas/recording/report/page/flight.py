@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import cv2
+import numpy as np
 
+from aerodaas.config.printable import printable
 from aerodaas.recording.report.moments import MomentPicture
-from aerodaas.recording.report.page.document import document, paragraph, picture, section
-from aerodaas.recording.report.page.tables import log_section, sections
+from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.vehicle_log.attachment import AttachedLog
 
-__all__ = ["flight_page", "origin_line"]
+__all__ = ["figures", "flight_page", "origin_line"]
 
 _THUMBNAIL = 640
 """Width in pixels of the images in the page."""
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]
+_MOST_TEXTS = 200
+"""Messages of an autopilot that are listed."""
+_LATENCY = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
+_AGE = ["in mission time", "99th perc."]
 
 
 def flight_page(
@@ -27,13 +32,25 @@ def flight_page(
     logs: Sequence[AttachedLog] = (),
 ) -> str:
     """Return the report of a flight as one HTML page."""
-    parts = [section(plot.title, picture(plot.png, plot.description)) for plot in plots]
-    parts += sections(summary)
-    parts += map(log_section, logs)
-    if moments:
-        shown = "".join(_moment(moment) for moment in moments)
-        parts.append(section("Key moments", f'<div class="moments">{shown}</div>', wide=True))
-    return document(summary.title, _head(summary), parts, origin_line(summary))
+    ages = summary.simulates_executions
+    return render_page(
+        "flight.html",
+        title=summary.title,
+        origin=origin_line(summary),
+        summary=summary,
+        plots=plots,
+        figures=figures(summary),
+        latency_head=[*_LATENCY, *_AGE] if ages else _LATENCY,
+        latencies=[
+            (stream, it.count, it.median_ms, it.p99_ms, it.overhead_ms)
+            + ((it.age_ms, it.age_p99_ms) if ages else ())
+            for stream, it in summary.latencies.items()
+        ],
+        reasons=[(*said.split(": ", 1), count) for said, count in summary.reasons.items()],
+        alerts=_alerts(summary),
+        logs=list(map(_log, logs)),
+        moments=[(moment.caption, _thumbnail(moment)) for moment in moments],
+    )
 
 
 def origin_line(summary: FlightSummary) -> str:
@@ -43,30 +60,66 @@ def origin_line(summary: FlightSummary) -> str:
     return ", ".join(f"{name} {known[name]}" for name in wanted if known.get(name))
 
 
-def _head(summary: FlightSummary) -> list[str]:
-    head = [paragraph(f"Began {summary.begun}")] if summary.begun else []
+def figures(summary: FlightSummary) -> dict[str, object]:
+    """All single figures of a flight by name, in reading order."""
+    found: dict[str, object] = {"recorded (s)": summary.duration_s}
     for name, robot in summary.robots.items():
-        head += [paragraph(f"{name}: {robot.outcome}", "outcome"), paragraph(robot.course)]
-    if not summary.complete:
-        head.append(
-            paragraph(
-                "Cut off: the recording was not closed, or parts of it are damaged.", "warning"
-            )
-        )
+        found |= {
+            f"{name}: outcome": robot.outcome,
+            f"{name}: in the air (s)": robot.duration_s,
+            f"{name}: flown (m)": robot.distance_m,
+            f"{name}: waypoints": f"{robot.waypoints_visited} of {robot.waypoints_planned}",
+            f"{name}: waypoints given up": robot.waypoints_given_up,
+        }
+        if robot.max_height_m is not None:
+            found[f"{name}: highest (m)"] = robot.max_height_m
+        if robot.battery_used is not None:
+            found[f"{name}: battery used (%)"] = 100 * robot.battery_used
+        for limit, count in robot.setpoints_clipped.items():
+            found[f"{name}: setpoints changed by {limit}"] = count
+    for camera, count in summary.frames.items():
+        found[f"{camera}: frames"] = count
+        if summary.duration_s:
+            found[f"{camera}: frames per second"] = count / summary.duration_s
+    found |= {f"seen: {label}": count for label, count in summary.detections.items()}
+    found |= {f"scheduler: {action}": count for action, count in summary.decisions.items()}
+    found |= {f"scheduler: {name} utility": gained for name, gained in summary.utility.items()}
+    found["alerts"] = len(summary.alerts)
+    found["dropped"] = sum(summary.drops.values())
     if summary.skipped:
-        text = f"{summary.skipped} broken messages or chunks were skipped."
-        head.append(paragraph(text, "warning"))
-    if summary.drops:
-        count = sum(summary.drops.values())
-        head.append(paragraph(f"{count} messages were dropped; see below.", "warning"))
-    return head
+        found["broken and skipped"] = summary.skipped
+    return found
 
 
-def _moment(moment: MomentPicture) -> str:
+def _alerts(summary: FlightSummary) -> list[tuple[str, str, str]]:
+    """The first alert of each kind, with its number of occurrences."""
+    first: dict[str, tuple[str, str]] = {}
+    times: dict[str, int] = {}
+    for alert in summary.alerts:
+        first.setdefault(alert["kind"], (f"{alert['time_s']:.1f}", alert["text"]))
+        times[alert["kind"]] = times.get(alert["kind"], 0) + 1
+    return [
+        (at, kind, text if times[kind] == 1 else f"{text} ({times[kind]} times)")
+        for kind, (at, text) in first.items()
+    ]
+
+
+def _log(attached: AttachedLog) -> tuple[AttachedLog, list[tuple[str, str, str]], int]:
+    """A vehicle's own log, its first messages, and the number of the others."""
+    if attached.log is None or attached.alignment is None:
+        return attached, [], 0
+    texts, clock = attached.log.texts, attached.alignment.clock
+    rows = [
+        (f"{clock.mission_time(np.array(one.time)):.1f}", one.severity, printable(one.text))
+        for one in texts[:_MOST_TEXTS]
+    ]
+    return attached, rows, len(texts) - len(rows)
+
+
+def _thumbnail(moment: MomentPicture) -> bytes:
     height, width = moment.image.shape[:2]
     image = moment.image
     if width > _THUMBNAIL:
         size = (_THUMBNAIL, round(height * _THUMBNAIL / width))
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(image.dtype)
-    _, data = cv2.imencode(".jpg", image, _QUALITY)
-    return picture(data.tobytes(), moment.caption, media="image/jpeg", caption=moment.caption)
+    return cv2.imencode(".jpg", image, _QUALITY)[1].tobytes()
