@@ -25,11 +25,11 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> str | Path:
         return tmp_path / "service.db"
     from sqlalchemy import create_engine  # noqa: PLC0415
 
-    from aerodaas.service.store.tables import METADATA  # noqa: PLC0415
+    from aerodaas.service.store.rows import Row  # noqa: PLC0415
 
     url = peer(_URL)
     engine = create_engine(url.replace("postgresql://", "postgresql+psycopg://"))
-    METADATA.drop_all(engine)
+    Row.metadata.drop_all(engine)
     engine.dispose()
     return url
 

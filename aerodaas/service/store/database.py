@@ -9,18 +9,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 
-from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, select
+from sqlalchemy import URL, Connection, Engine, Table, create_engine, event
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
+from sqlalchemy.orm import Session
 
 from aerodaas.service.errors import StoreError
-from aerodaas.service.store.tables import METADATA, SCHEMA
+from aerodaas.service.store.migrations import VERSION, prepare
 
-__all__ = ["VERSION", "Database"]
+__all__ = ["Database"]
 
-VERSION = 3
-"""Of the tables: increased whenever they change."""
 _PATIENCE = 5.0
 """Seconds to wait for a lock, a connection or an answer."""
 _CONNECTIONS = 10
@@ -53,24 +52,24 @@ class Database:
         self._engine.dispose()
 
     @contextmanager
-    def reading(self) -> Generator[Connection, None, None]:
+    def reading(self) -> Generator[Session, None, None]:
         """A transaction that reads; raises StoreError for what the database raises."""
-        with self._transaction(self._engine) as connection:
-            yield connection
+        with self._transaction(self._engine) as session:
+            yield session
 
     @contextmanager
-    def writing(self) -> Generator[Connection, None, None]:
+    def writing(self) -> Generator[Session, None, None]:
         """A transaction that writes: all of it, or nothing; raises StoreError as `reading`."""
         engine = self._engine.execution_options(**{_WRITES: True})
         if self._file is None:
-            with self._transaction(engine) as connection:
-                yield connection
+            with self._transaction(engine) as session:
+                yield session
             return
         if not self._writer.acquire(timeout=_PATIENCE):
             raise StoreError(f"{self._name}: the database is locked: {_remedy('locked')}")
         try:
-            with self._transaction(engine) as connection:
-                yield connection
+            with self._transaction(engine) as session:
+                yield session
         finally:
             self._writer.release()
 
@@ -81,12 +80,12 @@ class Database:
         return postgresql.insert(table)
 
     @contextmanager
-    def _transaction(self, engine: Engine) -> Generator[Connection, None, None]:
+    def _transaction(self, engine: Engine) -> Generator[Session, None, None]:
         if self._identify() != self._identity:
             raise StoreError(f"{self._name} is gone: {_remedy('unable to open')}")
         try:
-            with engine.begin() as connection:
-                yield connection
+            with Session(engine, expire_on_commit=False) as session, session.begin():
+                yield session
         except SQLAlchemyError as error:
             raise StoreError(self._line(error)) from None
 
@@ -101,17 +100,13 @@ class Database:
         return (status.st_dev, status.st_ino)
 
     def _prepare(self) -> None:
-        with self.writing() as connection:
-            SCHEMA.create(connection, checkfirst=True)
-            found = connection.execute(select(SCHEMA.c.version)).scalar()
-            if found is None:
-                METADATA.create_all(connection)
-                connection.execute(SCHEMA.insert().values(version=VERSION))
-            elif found != VERSION:
-                raise StoreError(
-                    f"{self._name} has tables of version {found}, not {VERSION}: use the AeroDaaS "
-                    "that made it, or another database"
-                )
+        with self.writing() as session:
+            found = prepare(session)
+        if found != VERSION:
+            raise StoreError(
+                f"{self._name} has tables of version {found}, not {VERSION}: use the AeroDaaS "
+                "that made it, or another database"
+            )
 
     def _line(self, error: Exception) -> str:
         """What went wrong, without the statement and its values, and the remedy."""

@@ -1,14 +1,29 @@
-"""What the service keeps, as plain values: one class a table.
+"""What the service keeps: one mapped class a table, whose annotations are its columns.
 
-Moments are seconds of Unix time, lengths metres, durations as their names say.
+A row is a plain value that belongs to no open transaction; `dataclasses.replace` makes a changed
+one. Moments are seconds of Unix time, lengths metres, durations as their names say.
 """
 
-from __future__ import annotations
-
 import enum
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
+
+from pydantic import TypeAdapter
+from sqlalchemy import (
+    BigInteger,
+    CheckConstraint,
+    Dialect,
+    Double,
+    Enum,
+    ForeignKey,
+    Index,
+    Integer,
+    Text,
+    UniqueConstraint,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, MappedAsDataclass, mapped_column
+from sqlalchemy.types import TypeDecorator
 
 from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
 
@@ -19,58 +34,133 @@ __all__ = [
     "LeaseEnd",
     "Mission",
     "RobotState",
+    "Row",
+    "SchemaVersion",
     "Tenant",
     "Token",
     "Usage",
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Tenant:
+class _Words(TypeDecorator[str]):
+    """A text of any length; what a database cannot hold (half a surrogate pair, 0) is replaced."""
+
+    impl = Text
+    cache_ok = True
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
+        if value is None:
+            return None
+        text = value.encode("utf-8", "replace").decode()
+        return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
+
+
+class _Json(TypeDecorator[Any]):
+    """A value of the annotation `kind`, as a text of JSON."""
+
+    impl = Text
+    cache_ok = True
+
+    def __init__(self, kind: Any) -> None:  # noqa: ANN401 - an annotation
+        super().__init__()
+        self.kind = kind
+        self._adapter = TypeAdapter(kind)
+
+    def process_bind_param(self, value: object, dialect: Dialect) -> str | None:  # noqa: ARG002
+        if value is None:
+            return None
+        return json.dumps(sorted(value) if isinstance(value, frozenset) else value, allow_nan=False)
+
+    def process_result_value(self, value: str | None, dialect: Dialect) -> Any:  # noqa: ANN401, ARG002
+        return None if value is None else self._adapter.validate_python(json.loads(value))
+
+
+_JSON = (
+    Mapping[str, Any],
+    Mapping[str, float],
+    frozenset[Scope],
+    tuple[str, ...],
+    tuple[float, float],
+    tuple[float, float, float],
+    tuple[tuple[float, float], ...],
+)
+
+
+class Row(MappedAsDataclass, DeclarativeBase):
+    """What every table's class is; its metadata holds the tables."""
+
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        str: _Words(),
+        float: Double(),
+        # SQLite counts only a key of its type INTEGER, which has 64 bits there.
+        int: BigInteger().with_variant(Integer, "sqlite"),
+        enum.Enum: Enum(
+            enum.Enum,
+            native_enum=False,
+            length=32,
+            values_callable=lambda kind: [member.value for member in kind],
+        ),
+        **{kind: _Json(kind) for kind in _JSON},
+    }
+
+
+class SchemaVersion(Row):
+    """Version of the tables, in one row."""
+
+    __tablename__ = "schema_version"
+
+    version: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+
+
+class Tenant(Row):
     """A group of accounts that shares quotas, leases and missions; None is no limit."""
 
-    name: str
-    created: float = 0.0
-    weight: float = 1.0
+    __tablename__ = "tenants"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    created: Mapped[float] = mapped_column(default=0.0)
+    weight: Mapped[float] = mapped_column(CheckConstraint("weight > 0"), default=1.0)
     """Share of an edge that is shared, relative to the other tenants'; positive."""
-    flight_minutes: float | None = None
+    flight_minutes: Mapped[float | None] = mapped_column(default=None)
     """Minutes in the air, of all its robots together, in a calendar month (UTC)."""
-    cloud_calls: int | None = None
+    cloud_calls: Mapped[int | None] = mapped_column(default=None)
     """Calls of cloud nodes and endpoints in a month."""
-    storage_bytes: int | None = None
+    storage_bytes: Mapped[int | None] = mapped_column(default=None)
     """Bytes of recordings kept."""
-    max_height: float | None = None
+    max_height: Mapped[float | None] = mapped_column(default=None)
     """Metres above home."""
-    max_speed: float | None = None
+    max_speed: Mapped[float | None] = mapped_column(default=None)
     """m/s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Account:
+class Account(Row):
     """Somebody who uses the service."""
 
-    name: str
-    tenant: str
-    role: Role
-    scopes: frozenset[Scope]
-    created: float
-    disabled: bool = False
-    subject: str | None = None
+    __tablename__ = "accounts"
+
+    name: Mapped[str] = mapped_column(primary_key=True)
+    tenant: Mapped[str] = mapped_column(ForeignKey("tenants.name"), index=True)
+    role: Mapped[Role]
+    scopes: Mapped[frozenset[Scope]]
+    created: Mapped[float]
+    disabled: Mapped[bool] = mapped_column(default=False)
+    subject: Mapped[str | None] = mapped_column(default=None, unique=True)
     """Who it is at an OpenID Connect issuer: that one's URL and its id of them."""
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(Row):
     """A token of an account; of its secret only the SHA-256 is kept."""
 
-    id: str
-    account: str
-    digest: str
+    __tablename__ = "tokens"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    account: Mapped[str] = mapped_column(ForeignKey("accounts.name"), index=True)
+    digest: Mapped[str]
     """SHA-256 of the secret, hexadecimal."""
-    scopes: frozenset[Scope]
-    created: float
-    expires: float
-    revoked: bool = False
+    scopes: Mapped[frozenset[Scope]]
+    created: Mapped[float]
+    expires: Mapped[float]
+    revoked: Mapped[bool] = mapped_column(default=False)
 
 
 class LeaseEnd(str, enum.Enum):
@@ -81,106 +171,118 @@ class LeaseEnd(str, enum.Enum):
     REVOKED = "revoked"
 
 
-@dataclass(frozen=True, slots=True)
-class Lease:
+class Lease(Row):
     """A request of drones and what became of it."""
 
-    id: str
-    number: int
+    __tablename__ = "leases"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    number: Mapped[int] = mapped_column(unique=True)
     """Place in the queue: a lower one was asked for earlier."""
-    tenant: str
-    account: str
-    minutes: float
-    asked: float
-    wanted: tuple[str, ...] = ()
+    tenant: Mapped[str] = mapped_column(ForeignKey("tenants.name"), index=True)
+    account: Mapped[str] = mapped_column(ForeignKey("accounts.name"))
+    minutes: Mapped[float]
+    asked: Mapped[float]
+    wanted: Mapped[tuple[str, ...]] = mapped_column(default=())
     """Robots by id; empty for any one that fits."""
-    camera: bool = False
-    within: float | None = None
-    near: tuple[float, float] = (0.0, 0.0)
-    battery_minutes: float | None = None
-    area: tuple[tuple[float, float], ...] | None = None
-    state: LeaseState = LeaseState.QUEUED
-    robots: tuple[str, ...] = ()
+    camera: Mapped[bool] = mapped_column(default=False)
+    within: Mapped[float | None] = mapped_column(default=None)
+    near: Mapped[tuple[float, float]] = mapped_column(default=(0.0, 0.0))
+    battery_minutes: Mapped[float | None] = mapped_column(default=None)
+    area: Mapped[tuple[tuple[float, float], ...] | None] = mapped_column(default=None)
+    state: Mapped[LeaseState] = mapped_column(default=LeaseState.QUEUED, index=True)
+    robots: Mapped[tuple[str, ...]] = mapped_column(default=())
     """Those that it holds or held; empty while it is queued."""
-    granted: float | None = None
-    ends: float | None = None
+    granted: Mapped[float | None] = mapped_column(default=None)
+    ends: Mapped[float | None] = mapped_column(default=None)
     """When it expires, once it is granted."""
-    ended: float | None = None
-    end: LeaseEnd | None = None
-    reason: str = ""
+    ended: Mapped[float | None] = mapped_column(default=None)
+    end: Mapped[LeaseEnd | None] = mapped_column(default=None)
+    reason: Mapped[str] = mapped_column(default="")
 
 
-@dataclass(frozen=True, slots=True)
-class Mission:
+class Mission(Row):
     """A submitted mission; its document lies in its folder."""
 
-    id: str
-    name: str
-    tenant: str
-    account: str
-    phase: MissionPhase
-    robots: tuple[str, ...]
-    submitted: float
-    folder: str
-    reason: str = ""
-    lease: str | None = None
-    started: float | None = None
-    ended: float | None = None
-    request: Mapping[str, Any] = field(default_factory=dict)
+    __tablename__ = "missions"
+    __table_args__ = (
+        # Those without a key are not compared: NULL equals nothing.
+        UniqueConstraint("tenant", "key"),
+        Index("missions_newest", "tenant", "submitted"),
+    )
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    name: Mapped[str]
+    tenant: Mapped[str] = mapped_column(ForeignKey("tenants.name"))
+    account: Mapped[str] = mapped_column(ForeignKey("accounts.name"))
+    phase: Mapped[MissionPhase] = mapped_column(index=True)
+    robots: Mapped[tuple[str, ...]]
+    submitted: Mapped[float]
+    folder: Mapped[str]
+    reason: Mapped[str] = mapped_column(default="")
+    lease: Mapped[str | None] = mapped_column(ForeignKey("leases.id"), default=None)
+    started: Mapped[float | None] = mapped_column(default=None)
+    ended: Mapped[float | None] = mapped_column(default=None)
+    request: Mapped[Mapping[str, Any]] = mapped_column(default_factory=dict)
     """JSON of `MissionIn` without its document."""
-    verdict: Mapping[str, Any] | None = None
+    verdict: Mapped[Mapping[str, Any] | None] = mapped_column(default=None)
     """JSON of `VerdictOut`."""
-    key: str | None = None
+    key: Mapped[str | None] = mapped_column(default=None)
     """Idempotency key of its submission; no two missions of a tenant have the same."""
-    fingerprint: str | None = None
+    fingerprint: Mapped[str | None] = mapped_column(default=None)
     """SHA-256 of the submission with that key, hexadecimal."""
 
 
-@dataclass(frozen=True, slots=True)
-class RobotState:
+class RobotState(Row):
     """What is known of a drone between its missions."""
 
-    id: str
-    enabled: bool = True
-    battery: float | None = None
+    __tablename__ = "robots"
+
+    id: Mapped[str] = mapped_column(primary_key=True)
+    enabled: Mapped[bool] = mapped_column(default=True)
+    battery: Mapped[float | None] = mapped_column(default=None)
     """Charge left, 0 to 1."""
-    position: tuple[float, float, float] | None = None
+    position: Mapped[tuple[float, float, float] | None] = mapped_column(default=None)
     """Metres east, north and up of home."""
-    heard: float | None = None
+    heard: Mapped[float | None] = mapped_column(default=None)
 
 
-@dataclass(frozen=True, slots=True)
-class AuditEntry:
+class AuditEntry(Row):
     """Who did what, or tried to."""
 
-    at: float
-    account: str
-    tenant: str
-    address: str
-    action: str
-    accepted: bool
-    target: str = ""
-    text: str = ""
-    number: int = 0
-    """Counted by the database; 0 before."""
+    __tablename__ = "audit"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012 - SQLAlchemy's own
+
+    at: Mapped[float]
+    account: Mapped[str]
+    tenant: Mapped[str]
+    address: Mapped[str]
+    action: Mapped[str]
+    accepted: Mapped[bool]
+    target: Mapped[str] = mapped_column(default="")
+    text: Mapped[str] = mapped_column(default="")
+    number: Mapped[int] = mapped_column(primary_key=True, init=False)
+    """Counted by the database."""
 
 
-@dataclass(frozen=True, slots=True)
-class Usage:
+class Usage(Row):
     """What one mission has used."""
 
-    mission: str
-    tenant: str
-    account: str
-    started: float
-    flight_seconds: float = 0.0
+    __tablename__ = "usage"
+    __table_args__ = (Index("usage_by_month", "tenant", "started"),)
+
+    mission: Mapped[str] = mapped_column(ForeignKey("missions.id"), primary_key=True)
+    tenant: Mapped[str] = mapped_column(ForeignKey("tenants.name"))
+    account: Mapped[str] = mapped_column(ForeignKey("accounts.name"))
+    started: Mapped[float]
+    flight_seconds: Mapped[float] = mapped_column(default=0.0)
     """Seconds in the air, summed over its robots."""
-    distance: float = 0.0
-    battery_used: float = 0.0
+    distance: Mapped[float] = mapped_column(default=0.0)
+    battery_used: Mapped[float] = mapped_column(default=0.0)
     """Sum over its robots of the share of a full charge."""
-    compute_seconds: Mapping[str, float] = field(default_factory=dict)
+    compute_seconds: Mapped[Mapping[str, float]] = mapped_column(default_factory=dict)
     """Processor's seconds of analyses, by compute resource."""
-    cloud_calls: int = 0
-    recorded_bytes: int = 0
-    kept: bool = True
+    cloud_calls: Mapped[int] = mapped_column(default=0)
+    recorded_bytes: Mapped[int] = mapped_column(default=0)
+    kept: Mapped[bool] = mapped_column(default=True)
     """Whether the recording still takes up storage."""

@@ -118,18 +118,6 @@ def test_a_file_of_something_else_is_left_as_it_is(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_tables_of_another_version_are_left_as_they_are(
-    place: str | Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A newer service has made them."""
-    known = database.VERSION
-    monkeypatch.setattr(database, "VERSION", known + 1)
-    Store.open(place).close()
-    monkeypatch.undo()
-    with pytest.raises(StoreError, match=f"tables of version {known + 1}, not {known}"):
-        Store.open(place)
-
-
 def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
     """Whatever a call has returned from is there afterwards."""
     path = tmp_path / "service.db"
