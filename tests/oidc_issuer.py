@@ -24,10 +24,16 @@ class Issuer:
         """Private keys by id."""
         self.fetches = 0
         """How often its set of keys was asked for."""
+        self.requests = 0
+        """How often it was asked for anything."""
         self.down = False
         """Whether it answers by 500."""
         self.called: str | None = None
         """What it calls itself, if not by its address."""
+        self.moved: str | None = None
+        """Where it sends who asks for its keys."""
+        self.use = "sig"
+        """What its keys are for."""
         self.add("first")
 
     def __enter__(self) -> Self:
@@ -35,8 +41,12 @@ class Issuer:
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
+                issuer.requests += 1
                 content = json.dumps(issuer._answer(self.path)).encode()
-                self.send_response(500 if issuer.down else 200)
+                moved = issuer.moved if self.path.endswith("/keys") else None
+                self.send_response(500 if issuer.down else 302 if moved else 200)
+                if moved:
+                    self.send_header("Location", moved)
                 self.send_header("Content-Length", str(len(content)))
                 self.end_headers()
                 self.wfile.write(content)
@@ -87,7 +97,7 @@ class Issuer:
         public = self.keys[id_].public_key()
         curve = isinstance(public, ec.EllipticCurvePublicKey)
         found = ECAlgorithm.to_jwk(public, True) if curve else RSAAlgorithm.to_jwk(public, True)  # noqa: FBT003
-        return {**found, "kid": id_, "use": "sig"}
+        return {**found, "kid": id_, "use": self.use}
 
     def _answer(self, path: str) -> dict[str, Any]:
         if path.endswith("/.well-known/openid-configuration"):

@@ -322,8 +322,24 @@ def test_keys_rotate(issuer: Issuer) -> None:
     assert keys.key("first") is None
 
 
+def test_an_issuer_without_any_key_has_withdrawn_them_all(issuer: Issuer) -> None:
+    """None is good any longer, as with one of several."""
+    clock = Clock()
+    keys = IssuerKeys(issuer.url, clock)
+    assert keys.key("first") is not None
+    issuer.keys.clear()
+    clock.now += issuer_keys._FRESH + 1
+    assert keys.key("first") is None
+
+
+def test_a_key_for_encryption_signs_nothing(issuer: Issuer, store: Store) -> None:
+    """Its token is refused as one of an unknown key."""
+    issuer.use = "enc"
+    assert status_of(access(store, issuer), issuer.token()) == 401
+
+
 def test_made_up_ids_do_not_flood_the_issuer(issuer: Issuer) -> None:
-    """However many there are, it is asked once in ten seconds."""
+    """However many there are, it is asked once in ten seconds, also while it is down."""
     clock = Clock()
     keys = IssuerKeys(issuer.url, clock)
     for number in range(100):
@@ -332,6 +348,20 @@ def test_made_up_ids_do_not_flood_the_issuer(issuer: Issuer) -> None:
     clock.now += issuer_keys._AGAIN
     keys.key("another")
     assert issuer.fetches == 2
+    issuer.down, before = True, issuer.requests
+    clock.now += issuer_keys._AGAIN
+    for number in range(100):
+        assert keys.key(f"made up {number}") is None
+    assert issuer.requests == before + 1
+
+
+def test_keys_are_not_fetched_from_where_a_redirect_leads(issuer: Issuer) -> None:
+    """The address that was checked is the one that is asked."""
+    with Issuer() as other:
+        issuer.moved = f"{other.url}/keys"
+        with pytest.raises(SourceError, match="302"):
+            IssuerKeys(issuer.url).key("first")
+        assert other.fetches == 0
 
 
 def test_an_issuer_that_is_down_is_done_without_for_an_hour(issuer: Issuer, store: Store) -> None:
@@ -343,7 +373,7 @@ def test_an_issuer_that_is_down_is_done_without_for_an_hour(issuer: Issuer, stor
     clock.now += issuer_keys._STALE - 1
     assert keys.key("first") is not None
     clock.now += 2
-    with pytest.raises(SourceError, match=r"does not answer: .*status 500"):
+    with pytest.raises(SourceError, match=r"does not answer: .*500"):
         keys.key("first")
     assert status_of(access(store, issuer), issuer.token()) == 503
     assert store.audit.all() == []
@@ -364,6 +394,18 @@ def test_keys_come_by_tls_or_from_this_machine(url: str) -> None:
     """Who could change them on the way could sign anything."""
     with pytest.raises(ConfigError, match="https://host"):
         OidcVerifier(OidcSettings(url, AUDIENCE))
+
+
+def test_keys_of_this_machine_come_by_no_proxy(
+    issuer: Issuer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It could change them on the way."""
+    monkeypatch.setenv("http_proxy", "http://proxy.example:3128")
+    monkeypatch.delenv("no_proxy", raising=False)
+    with pytest.raises(ConfigError, match="set no_proxy"):
+        IssuerKeys(issuer.url)
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    assert IssuerKeys(issuer.url).key("first") is not None
 
 
 def test_a_good_token_is_remembered_while_the_database_is_gone(
