@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES
-from aerodaas.messages.detections import Detection
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.waypoints import Waypoint
 
@@ -19,7 +19,11 @@ __all__ = ["filled", "names"]
 
 _PLAIN: dict[Any, Any] = {bool: True, int: 3, float: 0.375, str: "word", bytes: b"x", Any: 0.625}
 _SPECIAL: dict[Any, dict[str, Any]] = {
-    Detection: {"keypoints": np.full((2, 3), 0.5), "appearance": bytes(ZONES * ZONE_BYTES)},
+    Detection: {
+        "keypoints": np.full((2, 3), 0.5, np.float32),
+        "appearance": bytes(ZONES * ZONE_BYTES),
+    },
+    Detections: {"nearest": np.full((2, 3), 5, np.uint16)},
     Frame: {"image": np.full((2, 3, 3), 7, np.uint8), "depth": np.full((2, 3), 9, np.uint16)},
     # These take the place of one another.
     Waypoint: {"actuate": (("hook", "release"),), "look_at": None, "trigger_interval": None},

@@ -20,6 +20,7 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.schema import json_of, message_of
 
 __all__ = ["ItemError", "pack", "unpack"]
 
@@ -57,9 +58,9 @@ def pack(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
         depth = _written(".png", item.depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     content = {
         "is": _FRAME,
-        "header": encoded(item.header, _refused),
-        "camera": encoded(item.camera, _refused),
-        "odometry": encoded(item.odometry, _refused),
+        "header": json_of(item.header),
+        "camera": None if item.camera is None else json_of(item.camera),
+        "odometry": None if item.odometry is None else json_of(item.odometry),
         "size": [item.width, item.height],
         "format": "png" if lossless else "jpeg",
         "bytes": [len(picture), len(depth)],
@@ -98,13 +99,9 @@ def _written(suffix: str, image: NDArray[Any], words: list[int]) -> bytes:
 def _frame(content: dict[str, Any], blob: bytes) -> Frame:
     if content.keys() != _FRAME_KEYS:
         raise ItemError("a frame with other parts than a frame's")
-    header, camera, odometry = (decoded(content[one]) for one in ("header", "camera", "odometry"))
-    if not (
-        isinstance(header, Header)
-        and isinstance(camera, CameraModel | None)
-        and isinstance(odometry, Odometry | None)
-    ):
-        raise ItemError("a frame whose header, camera or odometry is something else")
+    header = message_of(Header, content["header"])
+    camera = None if content["camera"] is None else message_of(CameraModel, content["camera"])
+    odometry = None if content["odometry"] is None else message_of(Odometry, content["odometry"])
     (width, height), (first, second) = content["size"], content["bytes"]
     numbers = (width, height, first, second)
     if not all(type(one) is int and one >= 0 for one in numbers) or first + second != len(blob):

@@ -11,12 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import pymap3d
 from numpy.typing import NDArray
 
+from aerodaas.geometry.arrays import XYZ, Int64
 from aerodaas.messages.records import shared_pickle
 
 __all__ = [
@@ -41,7 +42,7 @@ __all__ = [
     "yaw_ned_to_enu",
 ]
 
-Vector: TypeAlias = NDArray[np.float64]
+Vector: TypeAlias = Annotated[NDArray[np.float64], XYZ()]
 """A float64 array of shape (3,)."""
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right, bottom in pixels of an image."""
@@ -228,8 +229,8 @@ class CameraModel:
     lowers its right side when positive.
     """
 
-    width: int
-    height: int
+    width: Int64
+    height: Int64
     fx: float
     fy: float
     cx: float

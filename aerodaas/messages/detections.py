@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import overload
+from typing import Annotated, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.geometry.arrays import Int64, NestedLists
 from aerodaas.geometry.depth import depth_in_box, nearest_in_cells
 from aerodaas.geometry.frames import Box, CameraModel
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES, appearance_in_box
@@ -32,9 +33,9 @@ class Detection:
     label: str
     score: float
     """Confidence, 0 to 1."""
-    track_id: int | None = None
+    track_id: Int64 | None = None
     """Identity kept by a tracker."""
-    keypoints: NDArray[np.float32] | None = None
+    keypoints: Annotated[NDArray[np.float32], NestedLists(np.float32, 3)] | None = None
     """K x 3: pixel u, pixel v, confidence; None where the model gives none."""
     depth: float | None = None
     """Metres along the optical axis to its surface, where the camera measured that."""
@@ -70,13 +71,13 @@ class Detections(Sequence[Detection]):
 
     header: Header
     items: tuple[Detection, ...]
-    width: int
+    width: Int64
     """Pixels across of the frame."""
-    height: int
+    height: Int64
     """Pixels down of the frame."""
     camera: CameraModel | None = None
     odometry: Odometry | None = None
-    nearest: NDArray[np.uint16] | None = None
+    nearest: Annotated[NDArray[np.uint16], NestedLists(np.uint16)] | None = None
     """Rows x columns of cells that cover the frame: millimetres along the optical axis to the
     nearest in each, 0 where nothing was measured. None where the camera measures no depth."""
 

@@ -6,12 +6,15 @@ Stamps are nanoseconds of the mission clock.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from aerodaas.errors import SourceError
+from aerodaas.geometry.arrays import Int64
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.records import fast_pickle
@@ -26,12 +29,29 @@ class Header(NamedTuple):
     wherever it arrives.
     """
 
-    id: int
+    id: Int64
     """Counts up from zero within one source."""
-    stamp: int
+    stamp: Int64
     """Mission clock at capture, in nanoseconds."""
     source: str
     """Identifier of the sensor, `robot/sensor`."""
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes it as an object, as a dataclass."""
+        del source
+        fields = core_schema.typed_dict_schema(
+            {
+                name: core_schema.typed_dict_field(handler.generate_schema(kind), required=True)
+                for name, kind in get_type_hints(cls, include_extras=True).items()
+            }
+        )
+        written = core_schema.plain_serializer_function_ser_schema(cls._asdict)
+        return core_schema.no_info_after_validator_function(
+            lambda value: cls(**value), fields, serialization=written
+        )
 
 
 @fast_pickle

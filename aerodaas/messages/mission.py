@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
+from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.messages.frames import Header
 from aerodaas.messages.records import fast_pickle
 from aerodaas.messages.vehicle import Setpoint
@@ -62,13 +63,13 @@ GROUNDED = frozenset(
 class BatteryOutlook:
     """How far the battery lasts, by the energy model as this flight scaled it; charges 0 to 1."""
 
-    plan: float
+    plan: Real
     """Charge that it takes from now on to fly the rest of the plan and home, and to have
     `battery_land` left; more than 1 where no battery has it."""
-    returns_at: float
+    returns_at: Real
     """Charge at which the drone would return from where it is: `battery_return`, or more where the
     way home needs it."""
-    hover: float
+    hover: Real
     """Seconds of hovering where it is until then; 0 where it is due."""
 
 
@@ -77,7 +78,7 @@ class BatteryOutlook:
 class MissionStatus:
     """The mission at one moment."""
 
-    stamp: int
+    stamp: Int64
     """Mission clock, nanoseconds."""
     state: MissionState
     reason: str = ""
@@ -90,20 +91,20 @@ class MissionStatus:
     """Ids of the waypoints reached last, in order; `RECENT` at most, for a status is sent often."""
     given_up: tuple[str, ...] = ()
     """Ids of the waypoints refused last by the scheduler or the safety layer; `RECENT` at most."""
-    distance: float = 0.0
+    distance: Real = 0.0
     """Metres flown since take-off."""
     faults: tuple[str, ...] = ()
     """Present faults, as the safety layer names them."""
-    visits: int = 0
+    visits: Int64 = 0
     """How often a waypoint has been reached since take-off; `visited` holds the last of them."""
-    waypoint_counts: tuple[int, int] = (0, 0)
+    waypoint_counts: tuple[Int64, Int64] = (0, 0)
     """How many waypoints were visited, and how many are known; one visited twice is one."""
     pilot: str = ""
     """Who flies the drone by hand now; empty for nobody."""
     outlook: BatteryOutlook | None = None
     """Forecast before take-off, on the way through the plan, and while paused; None 2 s after that,
     and where charge or place is not known."""
-    photos: tuple[int, int] = (0, 0)
+    photos: tuple[Int64, Int64] = (0, 0)
     """How many pictures were taken, and how many that waypoints asked for were not."""
     unfinished: str = ""
     """What ended the mission before its plan was flown; empty if nothing did, or a command."""
@@ -120,7 +121,7 @@ class MissionStatus:
 class SetpointRecord:
     """One turn of the setpoint loop: the requested and the sent setpoint."""
 
-    stamp: int
+    stamp: Int64
     asked: Setpoint | None
     sent: Setpoint | None
     clipped_by: tuple[str, ...] = ()
@@ -134,12 +135,12 @@ class SetpointRecord:
 class Decision:
     """One decision of an analytics scheduler, with its reason."""
 
-    stamp: int
+    stamp: Int64
     task: str
     """Analysis and frame, `node#frame`; `node#camera:frame` where it watches several cameras."""
     action: str
     """`edge`, `cloud`, `drop` are decisions, `retry` is one of the dispatcher's; `done`, `late`,
     `timeout`, `failed` and `dropped` (it never came to its turn) are how a task ended."""
     reason: str = ""
-    values: dict[str, float] = field(default_factory=dict)
+    values: dict[str, Real] = field(default_factory=dict)
     """Figures behind it: milliseconds, or utility in the environment file's own unit."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.records import fast_pickle
 
@@ -23,15 +24,15 @@ class Odometry:
     """Metres, ENU, from home."""
     velocity: Vector
     """m/s, ENU."""
-    yaw: float
+    yaw: Real
     """Radians, counter-clockwise from east."""
-    roll: float = 0.0
+    roll: Real = 0.0
     """Radians, positive with the right side down."""
-    pitch: float = 0.0
+    pitch: Real = 0.0
     """Radians, positive with the nose down."""
-    yaw_rate: float = 0.0
+    yaw_rate: Real = 0.0
     """rad/s, counter-clockwise."""
-    position_sigma: float = 0.0
+    position_sigma: Real = 0.0
     """Standard deviation of the position in metres, zero if the driver gives none."""
 
     @property
@@ -45,14 +46,14 @@ class Odometry:
 class GpsFix:
     """A global position: WGS84 degrees, metres above the ellipsoid, and its accuracy."""
 
-    latitude: float
-    longitude: float
-    altitude: float
-    horizontal_sigma: float = 0.0
+    latitude: Real
+    longitude: Real
+    altitude: Real
+    horizontal_sigma: Real = 0.0
     """Metres."""
-    vertical_sigma: float = 0.0
+    vertical_sigma: Real = 0.0
     """Metres."""
-    satellites: int = 0
+    satellites: Int64 = 0
 
 
 @fast_pickle
@@ -60,11 +61,11 @@ class GpsFix:
 class Battery:
     """State of the flight battery."""
 
-    fraction: float
+    fraction: Real
     """Charge left, 0 to 1."""
-    voltage: float = 0.0
+    voltage: Real = 0.0
     """Volts, zero where unknown."""
-    current: float = 0.0
+    current: Real = 0.0
     """Amperes drawn, zero where unknown."""
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
+from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.geometry.frames import CameraModel, angles_of_rotation, rotation_from_rpy
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.records import fast_pickle
@@ -63,13 +64,13 @@ class LensTarget:
 class GimbalAttitude:
     """Where a gimbal says that it looks; radians."""
 
-    stamp: int
+    stamp: Int64
     """Mission clock when it said so, nanoseconds."""
-    pitch: float
+    pitch: Real
     """Negative looks down."""
-    yaw: float
+    yaw: Real
     """From the vehicle's nose, counter-clockwise, in (-pi, pi]."""
-    roll: float = 0.0
+    roll: Real = 0.0
     """Positive with the right side of the picture down."""
 
 
@@ -93,7 +94,7 @@ class Photo:
 
     number: int | None
     """That of `PhotoCamera.take_photo`; None for a picture that nobody here asked for."""
-    stamp: int
+    stamp: Int64
     """Mission clock at exposure, nanoseconds."""
     label: str = ""
     """What it was taken for, such as a waypoint's id."""

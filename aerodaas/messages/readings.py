@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.messages.frames import Header
 from aerodaas.messages.records import fast_pickle
 
@@ -33,6 +34,6 @@ class Readings:
     `state` is the index of the mission's state in `MissionState`.
     """
 
-    stamp: int
+    stamp: Int64
     """Mission clock, nanoseconds."""
-    values: dict[str, float]
+    values: dict[str, Real]

@@ -9,6 +9,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from pydantic import ConfigDict
 
 __all__ = [
     "SECRET",
@@ -31,6 +32,10 @@ _MOST_SHARED = 4096
 """Records that came last and are kept to be found again."""
 _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
+
+
+_JSON = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64", ser_json_inf_nan="null")
+"""How pydantic writes a record's fields as JSON, and reads them."""
 
 
 class Record(NamedTuple):
@@ -103,6 +108,7 @@ def fast_pickle(cls: C) -> C:
         return cls, values(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
+    cls.__pydantic_config__ = _JSON
     names = tuple(field.name for field in dataclasses.fields(cls))
     _records[cls] = Record(values, partial(_set, cls, names))
     return valued(cls)

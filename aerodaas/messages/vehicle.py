@@ -9,9 +9,12 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Annotated, Protocol, TypeAlias, runtime_checkable
+
+from pydantic import Field
 
 from aerodaas.clock import Clock
+from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import Gimbal, GimbalAttitude, PhotoCamera
@@ -60,7 +63,7 @@ class VehicleMode(str, enum.Enum):
 class Traffic:
     """One aircraft, where it is at the stamp of the state that it stands in."""
 
-    address: int
+    address: Int64
     """24-bit ICAO address."""
     callsign: str
     """Its callsign; its address in hexadecimal digits where it tells none."""
@@ -68,7 +71,7 @@ class Traffic:
     """ENU metres; `up` is NaN where its height is not known."""
     velocity: Vector
     """ENU m/s; zero where it is not known."""
-    age: float = 0.0
+    age: Real = 0.0
     """Seconds since it was last heard; its way since then is as its velocity says."""
 
     @property
@@ -143,7 +146,7 @@ class Capabilities:
 class VehicleState:
     """The newest knowledge about a vehicle."""
 
-    stamp: int
+    stamp: Int64
     """Mission clock of the odometry, in nanoseconds."""
     odometry: Odometry
     battery: Battery
@@ -154,7 +157,7 @@ class VehicleState:
     """The simulator's exact state; None for a real vehicle. Only simulated sensors may use it."""
     faults: tuple[str, ...] = ()
     """Present complaints of the vehicle, one sentence each."""
-    extra: dict[str, float] = field(default_factory=dict)
+    extra: dict[str, Real] = field(default_factory=dict)
     """Further figures by name in SI units, such as temperature or link quality."""
     ended: FlightEnd | None = None
     """How the latest flight ended; None before and during one, or if the driver cannot tell."""
@@ -169,7 +172,7 @@ class VehicleState:
     limits need one; None without a fresh reading in its range."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
-    video: str = field(default="", repr=False, metadata=SECRET)
+    video: Annotated[str, Field(exclude=True)] = field(default="", repr=False, metadata=SECRET)
     """Address of its camera's video, as it says; it may hold a password, so it is recorded nowhere
     and sent to nobody else. Empty where it tells none that may be read."""
 

@@ -10,6 +10,7 @@ from typing import Any
 import psutil
 
 from aerodaas.clock import host_time_ns
+from aerodaas.geometry.arrays import Int64
 from aerodaas.messages.records import fast_pickle
 
 __all__ = ["GpuLoad", "Vitals", "read_gpus", "read_vitals"]
@@ -31,11 +32,11 @@ class GpuLoad:
 class Vitals:
     """One process and its machine at one moment."""
 
-    taken: int
+    taken: Int64
     """`clock.host_time_ns` of the reading."""
     cpu_seconds: float
     """Processor time that the process has used since it started, all its threads together."""
-    memory: int
+    memory: Int64
     """Bytes of the process in memory, shared memory included."""
     machine_cpu: float
     """Share of all the machine's cores that was busy since the last reading, 0 to 1."""

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry.arrays import Int64
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.payload import GimbalTarget, LensTarget
 from aerodaas.messages.records import fast_pickle, shared_pickle
@@ -158,7 +159,7 @@ class Waypoint:
     """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
     speed: float | None = None
     """m/s towards it; None takes the robot's cruise speed."""
-    priority: int = DEFAULT_PRIORITY
+    priority: Int64 = DEFAULT_PRIORITY
     """Smaller is more urgent; a more urgent waypoint preempts the plan."""
     deadline: float | None = None
     """Seconds of mission time by which to arrive; None for no deadline."""
@@ -402,7 +403,7 @@ class FollowedTarget:
     state: TargetState
     box: tuple[float, float, float, float] | None = None
     """Left, top, right, bottom in the frame's pixels; None where it is not known."""
-    track_id: int | None = None
+    track_id: Int64 | None = None
     """Of the follower's own tracker."""
 
 
@@ -423,7 +424,7 @@ class VelocityCommand:
     """m/s."""
     yaw_rate: float = 0.0
     """rad/s, counter-clockwise."""
-    priority: int = DEFAULT_PRIORITY
+    priority: Int64 = DEFAULT_PRIORITY
     valid_for: float = 0.5
     """Seconds."""
     evasive: bool = False

@@ -54,49 +54,26 @@ interface Early {
 
 interface PictureItem {
   is: "Picture" | "Frame" | "Depth";
-  header: unknown;
+  header: Header;
   bytes: number[];
   format?: string;
   depth?: boolean;
   range?: number;
 }
 
-/** The fields of an item as the wire has it: `{"is": CLASS, "of": fields}`. */
-function fields<T>(item: unknown): T {
-  return (item as { of: T }).of;
-}
-
-function list(items: unknown): unknown[] {
-  return Array.isArray(items) ? items : ((items as { of?: unknown[] } | null)?.of ?? []);
-}
-
-/** Rows of three of an array of 32-bit floats, as the wire has it; none for anything else. */
-function triples(array: unknown): [number, number, number][] {
-  const known = array as { type?: string; shape?: number[]; data?: string } | null;
-  if (known?.type !== "<f4" || known.shape?.[1] !== 3 || known.data === undefined) return [];
-  const bytes = Uint8Array.from(atob(known.data), (one) => one.charCodeAt(0));
-  const view = new DataView(bytes.buffer);
-  return Array.from({ length: Math.floor(bytes.length / 12) }, (_, row) => [
-    view.getFloat32(12 * row, true),
-    view.getFloat32(12 * row + 4, true),
-    view.getFloat32(12 * row + 8, true),
-  ]);
-}
+/** A detection as the wire has it. */
+type WireDetection = Omit<Detection, "points"> & { keypoints: [number, number, number][] | null };
 
 /** What was found, and in which frame. */
 export function detectionsOf(message: Record<string, unknown>): {
   header: Header;
   found: Detection[];
 } {
-  const item = fields<{ header: unknown; items: unknown }>(message["item"]);
-  const found = list(item.items).map((one) => {
-    const { box, label, score, track_id, keypoints } = fields<
-      Detection & { keypoints?: unknown }
-    >(one);
-    const corners = list(box) as Detection["box"];
-    return { box: corners, label, score, track_id, points: triples(keypoints) };
+  const item = message["item"] as { of: { header: Header; items: WireDetection[] } };
+  const found = item.of.items.map(({ box, label, score, track_id, keypoints }) => {
+    return { box, label, score, track_id, points: keypoints ?? [] };
   });
-  return { header: fields<Header>(item.header), found };
+  return { header: item.of.header, found };
 }
 
 export class Pictures {
@@ -120,7 +97,7 @@ export class Pictures {
   /** Take a picture or its depth. */
   async take(message: Record<string, unknown>, data: ArrayBuffer): Promise<void> {
     const item = message["item"] as PictureItem;
-    const header = fields<Header>(item.header);
+    const { header } = item;
     const bytes = new Uint8Array(data, 0, item.bytes[0]);
     if (item.is === "Depth") {
       const depth = await coloured(new Blob([bytes], { type: "image/png" }), item.range ?? 0);
@@ -148,13 +125,13 @@ export class Pictures {
 
   /** Take what was found, or what is followed, in a picture. */
   found(message: Record<string, unknown>): void {
-    const item = message["item"] as { is?: string; header?: unknown } & Target;
+    const item = message["item"] as { is?: string; header: Header } & Target;
     if (item.is !== "Target") {
       const { header, found } = detectionsOf(message);
       this.of(header).found.set(message["stream"] as string, found);
     } else {
-      const { state, box } = item;
-      this.of(fields<Header>(item.header)).target = { state, box };
+      const { header, state, box } = item;
+      this.of(header).target = { state, box };
     }
   }
 

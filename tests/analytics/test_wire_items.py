@@ -41,7 +41,7 @@ from aerodaas.messages.waypoints import (
     WaypointType,
 )
 
-floats = st.floats(allow_subnormal=False)
+floats = st.floats(allow_subnormal=False, allow_infinity=False)
 real = st.floats(-1e9, 1e9, allow_subnormal=False)
 words = st.text(min_size=1, max_size=8)
 stamps = st.integers(0, 2**62)
@@ -60,13 +60,17 @@ waypoints = st.builds(
 )
 commands = st.builds(VelocityCommand, *[st.floats(-5, 5)] * 4)
 batteries = st.builds(Battery, floats, floats)
-keypoints = hnp.arrays(np.float32, st.tuples(st.integers(0, 5), st.just(3)))
+keypoints = hnp.arrays(
+    np.float32,
+    st.tuples(st.integers(0, 5), st.just(3)),
+    elements=st.floats(width=32, allow_infinity=False),
+)
 appearances = st.binary(min_size=ZONES * ZONE_BYTES, max_size=ZONES * ZONE_BYTES)
 boxes = st.builds(
     Detection,
     st.tuples(real, real, real, real),
     words,
-    floats,
+    real,
     track_id=st.none() | st.integers(0, 99),
     keypoints=st.none() | keypoints,
     depth=st.none() | real,
@@ -160,10 +164,9 @@ def test_an_item_is_read_as_it_was_written(item: object) -> None:
 @pytest.mark.parametrize(
     "item", [MissionState.ENROUTE, [WaypointType.LOCAL], {"a": FlightEnd.FELL}]
 )
-def test_a_member_of_a_known_enumeration_stays_one(item: object) -> None:
-    """It is no text, though it is written as one in the field of a known class."""
-    found = unpack(*sent(item))
-    assert repr(found) == repr(item)
+def test_a_member_of_an_enumeration_is_sent_as_its_value(item: object) -> None:
+    """It equals the member, as all of the project's enumerations are texts."""
+    assert unpack(*sent(item)) == item
 
 
 def kinds(hint: Any) -> Iterator[Any]:  # noqa: ANN401 - an annotation
@@ -345,7 +348,7 @@ def told(**words: object) -> Callable[[dict[str, Any], bytes], bytes]:
         (told(size=[6, 5]), "not of the size"),
         (told(bytes=[3, 4]), "not those that it tells of"),
         (told(format="jpeg"), "no jpeg or png"),
-        (told(header=None), "header, camera or odometry"),
+        (told(header=None), "Header: Input should be"),
         (told(pickle="x"), "other parts"),
         (lambda _, blob: blob + b"x", "not those that it tells of"),
         (lambda _, blob: blob[:60] + b"\0" * (len(blob) - 60), "damaged|16 bits"),
@@ -367,18 +370,18 @@ def test_bytes_beside_what_is_no_picture_are_refused() -> None:
         unpack(5, b"x")
 
 
-@pytest.mark.parametrize(("field", "value"), [("appearance", b"x"), ("keypoints", np.zeros(4))])
+@pytest.mark.parametrize(("field", "value"), [("appearance", "eA=="), ("keypoints", [[0.0] * 4])])
 def test_a_detection_has_parts_of_its_sizes(field: str, value: object) -> None:
     """A tracker that looks at them is another's."""
     content, _ = sent(Detection((0.0, 0.0, 1.0, 1.0), "person", 0.5))
-    content["of"][field], _ = pack(value)
-    with pytest.raises(ItemError, match="malformed item: ValueError"):
+    content["of"][field] = value
+    with pytest.raises(ItemError, match=r"Detection[.:]"):
         unpack(content)
 
 
 def test_a_position_has_three_numbers() -> None:
     """Each array is of the annotation's shape and type."""
     content, _ = sent(Odometry(np.zeros(3), np.zeros(3), 0.0))
-    content["of"]["position"], _ = pack(np.zeros(4))
-    with pytest.raises(ItemError, match="position is of a wrong type"):
+    del content["of"]["position"]["z"]
+    with pytest.raises(ItemError, match=r"position\.z: Field required"):
         unpack(content)

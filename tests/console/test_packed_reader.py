@@ -109,7 +109,7 @@ def test_depth_is_sent_alone_and_only_where_it_was_measured() -> None:
     found = Detections.of(measured, [Detection((1, 2, 3, 4), "person", 0.5)])
     ((message, blob),) = packed(PictureForm.DEPTH, frame(0, 4), measured, found)
     assert message["item"]["is"] == "Depth"
-    assert message["item"]["header"]["of"]["stamp"] == 5
+    assert message["item"]["header"]["stamp"] == 5
     assert message["item"]["range"] == 3.0
     assert message["item"]["bytes"] == [len(blob)]
 
@@ -153,7 +153,7 @@ def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands
         found = reader.next_packed(0.1)
         assert found is not None
         item = found[0]["item"]
-        assert item["header"]["of"] == {"id": 7, "stamp": 5, "source": SOURCE}
+        assert item["header"] == {"id": 7, "stamp": 5, "source": SOURCE}
         assert (item["is"], item["state"], item["box"]) == ("Target", "sure", [1.0, 2.0, 3.0, 4.0])
     reader = PackedReader(Commands(), "follower", PictureForm.WHOLE)
     whole = [reader.next_packed(0.1) for _ in commands]
@@ -163,18 +163,19 @@ def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands
     assert PackedReader(Commands(), "follower", PictureForm.DEPTH).next_packed(0.1) is None
 
 
-class Strange(Detection):
-    """A detection of a plug-in's own class."""
+class Strange:
+    """A result of a plug-in's own class."""
+
+    header = Header(3, 5, SOURCE)
 
 
 def test_an_item_that_cannot_be_written_is_told_of() -> None:
     """In its place, and the next ones come: a stream of some of them goes on."""
     header = Header(3, 5, SOURCE)
-    odd = Detections(header, (Strange((0.0, 0.0, 1.0, 1.0), "person", 0.5),), 64, 48)
     for form in (PictureForm.WHOLE, PictureForm.JPEG):
-        (first, _), (second, _) = packed(form, odd, Detections(header, (), 64, 48))
+        (first, _), (second, _) = packed(form, Strange(), Detections(header, (), 64, 48))
         assert (first["kind"], first["stream"]) == ("left_out", SOURCE)
-        assert first["reason"] == "Detections is of no class that goes over the wire, or holds one"
+        assert first["reason"] == "Strange is of no class that goes over the wire, or holds one"
         assert (second["kind"], second["item"]["is"]) == ("item", "Detections")
 
 

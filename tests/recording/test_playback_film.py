@@ -113,11 +113,11 @@ def test_any_time_gives_the_last_picture_captured(film: Film, times: list[int]) 
         assert len(boxes) == (number % 3 == 0)
         assert len(followed) == (number % 4 == 0)
         for target in followed:
-            assert target["header"]["of"]["stamp"] == CAPTURED[number]
+            assert target["header"]["stamp"] == CAPTURED[number]
             assert (target["is"], target["state"]) == ("Target", "likely")
             assert target["box"] == [number, 1.0, number + 2, 4.0]
         for one, _ in found:
-            assert one["item"]["of"]["header"]["of"]["stamp"] == CAPTURED[number]
+            assert one["item"]["of"]["header"]["stamp"] == CAPTURED[number]
 
 
 def test_each_picture_is_there_to_the_nanosecond(film: Film) -> None:
@@ -151,7 +151,7 @@ def test_another_cameras_boxes_are_not_drawn(tmp_path: Path) -> None:
         for number, camera in enumerate(("left", "right")):
             (one, _), (message, data) = film.at(f"tello/{camera}", 10**9)
             assert abs(shown(data) - number) <= 1
-            assert one["item"]["of"]["header"]["of"]["source"] == f"tello/{camera}"
+            assert one["item"]["of"]["header"]["source"] == f"tello/{camera}"
             assert message["stream"] == f"tello/{camera}"
 
 

@@ -27,8 +27,9 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.schema import json_of
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
-from aerodaas.recording.converters.vehicle import body_frame, odometry_json
+from aerodaas.recording.converters.vehicle import body_frame
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.h264 import H264Encoder
@@ -117,7 +118,7 @@ def _head(item: Frame | EncodedFrame, stream: str, session: Session) -> Iterator
         "height": item.height,
     }
     if item.odometry is not None:
-        value["odometry"] = odometry_json(item.odometry)
+        value["odometry"] = json_of(item.odometry)
     yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
 
 

@@ -17,13 +17,14 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import SetpointRecord
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import Photo
-from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, Setpoint, Traffic, VehicleState
+from aerodaas.messages.schema import json_text
+from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector, xyz
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.rotation import from_rpy
 
-__all__ = ["body_frame", "odometry_json"]
+__all__ = ["body_frame"]
 
 ODOMETRY = FoxgloveOdometry.get_schema()
 TRANSFORM = FrameTransform.get_schema()
@@ -77,19 +78,6 @@ def body_frame(source: str) -> str:
     return base_link(robot) if slash else MAP_FRAME
 
 
-def odometry_json(odometry: Odometry) -> dict[str, Any]:
-    """Convert odometry for JSON without loss of precision."""
-    return {
-        "position": xyz(odometry.position),
-        "velocity": xyz(odometry.velocity),
-        "yaw": float(odometry.yaw),
-        "roll": float(odometry.roll),
-        "pitch": float(odometry.pitch),
-        "yaw_rate": float(odometry.yaw_rate),
-        "position_sigma": float(odometry.position_sigma),
-    }
-
-
 @convert.register
 def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -> Iterator[Entry]:
     """Write a state as odometry, transform, location and JSON."""
@@ -98,42 +86,8 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
     yield from _pose(item.odometry, base_link(robot), stream, item.stamp, session)
     if item.gps is not None:
         yield _location(item.gps, base_link(robot), stream, item.stamp, session)
-    state = {
-        "stamp": item.stamp,
-        "robot": robot,
-        "mode": item.mode.value,
-        "armed": item.armed,
-        "battery": _battery_json(item.battery),
-        "odometry": odometry_json(item.odometry),
-        "faults": item.faults,
-        "extra": item.extra,
-        "ended": item.ended,
-    }
-    if item.gps is not None:
-        state["gps"] = item.gps
-    if item.gimbal is not None:
-        state["gimbal"] = item.gimbal
-    if item.zoom is not None:
-        state["zoom"] = item.zoom
-    if item.traffic:
-        state["traffic"] = [_traffic_json(one) for one in item.traffic]
-    if item.below is not None:
-        state["below"] = item.below
-    if item.actuators:
-        state["actuators"] = item.actuators
-    if item.truth is not None:
-        state["truth"] = odometry_json(item.truth)
-    yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)
-
-
-def _traffic_json(aircraft: Traffic) -> dict[str, Any]:
-    return {
-        "address": aircraft.address,
-        "callsign": aircraft.callsign,
-        "position": xyz(aircraft.position),
-        "velocity": xyz(aircraft.velocity),
-        "age": aircraft.age,
-    }
+    data = json_text(item, robot=robot, without_none=True)
+    yield Entry(topic(stream, "state"), STATE, data, item.stamp)
 
 
 @convert.register
@@ -155,26 +109,17 @@ def battery(item: Battery, message: Message[Any], session: Session) -> Iterator[
     """Write the reading of a battery sensor."""
     del session
     header = message.header
-    value = {"stamp": header.stamp, "source": header.source, **_battery_json(item)}
-    yield Entry(topic(message.stream, "battery"), BATTERY, json_bytes(value))
+    data = json_text(item, stamp=header.stamp, source=header.source)
+    yield Entry(topic(message.stream, "battery"), BATTERY, data)
 
 
 @convert.register
 def photo(item: Photo, message: Message[Any], session: Session) -> Iterator[Entry]:
     """Write what is known of a picture that the vehicle's own camera took."""
     del session
-    value = {
-        "stamp": item.stamp,
-        "robot": (message.header.source or message.stream).partition("/")[0],
-        "number": item.number,
-        "label": item.label,
-        "place": item.place,
-        "odometry": item.odometry and odometry_json(item.odometry),
-        "gimbal": item.gimbal,
-        "zoom": item.zoom,
-        "file": item.file,
-    }
-    yield Entry(topic(message.stream, "photos"), PHOTO, json_bytes(value), item.stamp)
+    robot = (message.header.source or message.stream).partition("/")[0]
+    data = json_text(item, robot=robot)
+    yield Entry(topic(message.stream, "photos"), PHOTO, data, item.stamp)
 
 
 @convert.register
@@ -230,14 +175,6 @@ def _location(fix: GpsFix, frame: str, stream: str, stamp: int, session: Session
         position_covariance_type=kinds.DiagonalKnown if horizontal else kinds.Unknown,
     )
     return Entry(topic(stream, "location"), LOCATION, location.encode(), stamp)
-
-
-def _battery_json(battery: Battery) -> dict[str, float]:
-    return {
-        "fraction": battery.fraction,
-        "voltage": battery.voltage,
-        "current": battery.current,
-    }
 
 
 def _setpoint_json(setpoint: Setpoint | None) -> dict[str, Any] | None:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.wire_items import pack
 from aerodaas.following.ground_point import ground_point
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
+from aerodaas.messages.schema import json_of
 from aerodaas.messages.waypoints import FollowedTarget
 from aerodaas.recording.playback.depth_picture import depth_picture
 from aerodaas.terrain.ground import Ground
@@ -32,7 +32,7 @@ def packed_picture(header: Header, size: int, form: str, *, measured: bool) -> d
     """
     return {
         "is": "Picture",
-        "header": pack(header)[0],
+        "header": json_of(header),
         "format": form,
         "depth": measured,
         "bytes": [size],
@@ -42,7 +42,7 @@ def packed_picture(header: Header, size: int, form: str, *, measured: bool) -> d
 def packed_depth(header: Header, depth: NDArray[np.uint16]) -> tuple[dict[str, Any], bytes]:
     """A frame's depth (height x width, millimetres) as a grey PNG, with its range in metres."""
     data, reach = depth_picture(depth)
-    content = {"is": "Depth", "header": pack(header)[0], "range": reach, "bytes": [len(data)]}
+    content = {"is": "Depth", "header": json_of(header), "range": reach, "bytes": [len(data)]}
     return content, data
 
 
@@ -50,7 +50,7 @@ def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
     """What a page is told of what is followed in the frame of `header`."""
     return {
         "is": "Target",
-        "header": pack(header)[0],
+        "header": json_of(header),
         "state": target.state.value,
         "box": None if target.box is None else list(target.box),
     }

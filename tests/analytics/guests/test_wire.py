@@ -51,7 +51,7 @@ def opaque(item: object) -> GuestItem:
         Readings(5, {"count": 1.0}),
         Odometry(np.zeros(3), np.ones(3), 0.5),
         Detections(HEADER, (Detection((0.0, 1.0, 2.0, 3.0), "p", 0.5, keypoints=POINTS),), 64, 48),
-        Waypoint("a", 1, 2, 3, waypoint_type=WaypointType.LOCAL, deadline=4.0),
+        Waypoint("a", 1.0, 2.0, 3.0, waypoint_type=WaypointType.LOCAL, deadline=4.0),
     ],
 )
 def test_items_come_back(item: object) -> None:
@@ -80,7 +80,7 @@ def deep(levels: int) -> Any:  # noqa: ANN401 - JSON
     """Lists in lists."""
     content: Any = 1
     for _ in range(levels):
-        content = {"is": "list", "of": [content]}
+        content = [content]
     return content
 
 
@@ -100,9 +100,8 @@ def deep(levels: int) -> Any:  # noqa: ANN401 - JSON
         {"is": "array", "type": "<f8", "shape": [-1], "data": ""},
         {"is": "GuestItem", "kind": "a b", "value": 1, "data": ""},
         {"is": "Readings", "of": {"stamp": 1, "values": {"a": []}}},
-        {"is": "list", "of": [0] * 200_000},
+        [0] * 200_000,
         {"is": []},
-        [1],
         deep(40),
     ],
 )

@@ -396,7 +396,7 @@ def test_an_item_of_its_own_class_leaves_by_a_number(server: HereServer) -> None
     [
         (question("drone/height", at(-1.0)), "ValueError: below ground"),
         (question("drone/none", 1), "no analysis 'drone/none' here"),
-        ({**question("drone/height", None), "item": {"is": "os.system"}}, "malformed item"),
+        ({**question("drone/height", None), "item": {"is": "os.system"}}, "no class 'os.system'"),
         (question("drone/height", at(1.0), vehicle=5), "vehicle's state"),
         (question("drone/height", at(1.0), now="x"), "or its time"),
         ({"number": 3}, "no analysis"),

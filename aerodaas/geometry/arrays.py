@@ -1,0 +1,97 @@
+"""Forms of numbers and NumPy arrays in JSON: annotations from which pydantic derives its checks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+__all__ = ["XYZ", "Int64", "NestedLists", "Real"]
+
+Array: TypeAlias = NDArray[Any]
+_AXES = ("x", "y", "z")
+
+
+def _nan_of_null(value: object) -> object:
+    return math.nan if value is None else value
+
+
+Int64: TypeAlias = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+"""A whole number of 64 bits."""
+Real: TypeAlias = Annotated[float, BeforeValidator(_nan_of_null)]
+"""A number that may be NaN, which is null in JSON."""
+
+
+@dataclass(frozen=True)
+class XYZ:
+    """A float64 array of shape (3,) as `{"x": …, "y": …, "z": …}`; NaN is null."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the array."""
+        del source
+        number = handler.generate_schema(float | None)
+        axes = core_schema.typed_dict_schema(
+            {axis: core_schema.typed_dict_field(number, required=True) for axis in _AXES}
+        )
+        written = core_schema.plain_serializer_function_ser_schema(_xyz, return_schema=axes)
+        return core_schema.no_info_after_validator_function(_vector, axes, serialization=written)
+
+
+@dataclass(frozen=True)
+class NestedLists:
+    """An array of rows and columns as a list of lists; NaN is null.
+
+    Args:
+        dtype: Number type in memory.
+        columns: Number of columns; None for any.
+        longest: Most rows, and most elements.
+    """
+
+    dtype: type[np.generic]
+    columns: int | None = None
+    longest: int = 100_000
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the array."""
+        del source
+        whole = issubclass(self.dtype, np.integer)
+        number = handler.generate_schema(int if whole else float | None)
+        row = core_schema.list_schema(
+            number, min_length=self.columns, max_length=self.columns or self.longest
+        )
+        lists = core_schema.list_schema(row, max_length=self.longest)
+        written = core_schema.plain_serializer_function_ser_schema(
+            np.ndarray.tolist, return_schema=lists
+        )
+        return core_schema.no_info_after_validator_function(
+            self._array, lists, serialization=written
+        )
+
+    def _array(self, value: list[Any]) -> Array:
+        try:
+            # A list of lists of different lengths, and a number outside of the type's range, raise.
+            array = np.array(value, np.float64 if self.dtype is np.float32 else self.dtype)
+        except OverflowError as error:
+            raise ValueError(str(error)) from None
+        if array.size > self.longest:
+            raise ValueError(f"an array of {array.size} numbers; at most {self.longest}")
+        # Without rows, JSON does not tell the length of one.
+        shape = (len(value), self.columns) if self.columns else array.shape
+        return array.astype(self.dtype, copy=False).reshape(shape)
+
+
+def _xyz(vector: Array) -> dict[str, float]:
+    return dict(zip(_AXES, map(float, vector), strict=True))
+
+
+def _vector(value: dict[str, float | None]) -> Array:
+    return np.array([math.nan if value[axis] is None else value[axis] for axis in _AXES])
