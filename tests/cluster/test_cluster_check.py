@@ -115,7 +115,7 @@ class TestGood:
             "drone.navigate(Wish().deploy(far).instantiate())\n"
             "drone.start_mission()\n"
         )
-        path = os.pathsep.join([str(ROOT), str(ROOT / "tests/actors")])
+        path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
         ended = aerodaas(
             "run",
             str(tmp_path / "app.py"),
