@@ -207,11 +207,9 @@ def test_of_two_the_quicker_is_used_and_the_other_when_it_is_gone(
     assert desk.answers(1)[0].way.endswith(" to near")
     ray.kill(quick.handle, no_restart=False)
     desk.send("one", desk.frame())
-    while not (answer := desk.answers(1)[0]).lost:
+    # None is lost where its end is known before the send.
+    while (answer := desk.answers(1)[0]).lost:
         desk.send("one", desk.frame())
-    assert desk.sites.slots == 4
-    desk.send("one", desk.frame())
-    answer = desk.answers(1)[0]
     assert answer.way.endswith(" to far")
     desk.look_until(lambda: desk.sites.slots == 8)
     desk.sites.finish(1.0)
