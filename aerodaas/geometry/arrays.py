@@ -4,27 +4,61 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
-__all__ = ["XYZ", "Int64", "NestedLists", "Real"]
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
+
+__all__ = ["XYZ", "Int64", "NanIsNull", "NestedLists", "Real", "SignedBits"]
 
 Array: TypeAlias = NDArray[Any]
 _AXES = ("x", "y", "z")
 
 
-def _nan_of_null(value: object) -> object:
-    return math.nan if value is None else value
+@dataclass(frozen=True)
+class SignedBits:
+    """A whole number of so many bits, one of them the sign.
+
+    Args:
+        count: Number of bits.
+    """
+
+    count: int
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the number."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
+        del source, handler
+        end = 1 << self.count - 1
+        return core_schema.int_schema(ge=-end, lt=end)
 
 
-Int64: TypeAlias = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+Int64: TypeAlias = Annotated[int, SignedBits(64)]
 """A whole number of 64 bits."""
-Real: TypeAlias = Annotated[float, BeforeValidator(_nan_of_null)]
-"""A number that may be NaN, which is null in JSON."""
+
+
+@dataclass(frozen=True)
+class NanIsNull:
+    """A number that is null in JSON where it is NaN."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the number."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
+        return core_schema.no_info_before_validator_function(_nan_of_null, handler(source))
+
+
+Real: TypeAlias = Annotated[float, NanIsNull()]
+"""A number that may be NaN."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +69,8 @@ class XYZ:
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema by which pydantic reads and writes the array."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
         del source
         number = handler.generate_schema(float | None)
         axes = core_schema.typed_dict_schema(
@@ -62,6 +98,8 @@ class NestedLists:
         self, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema by which pydantic reads and writes the array."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
         del source
         whole = issubclass(self.dtype, np.integer)
         number = handler.generate_schema(int if whole else float | None)
@@ -87,6 +125,10 @@ class NestedLists:
         # Without rows, JSON does not tell the length of one.
         shape = (len(value), self.columns) if self.columns else array.shape
         return array.astype(self.dtype, copy=False).reshape(shape)
+
+
+def _nan_of_null(value: object) -> object:
+    return math.nan if value is None else value
 
 
 def _xyz(vector: Array) -> dict[str, float]:

@@ -6,18 +6,20 @@ Stamps are nanoseconds of the mission clock.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
 from aerodaas.errors import SourceError
 from aerodaas.geometry.arrays import Int64
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.records import fast_pickle
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
 
 __all__ = ["Frame", "Header", "Image"]
 
@@ -41,6 +43,8 @@ class Header(NamedTuple):
         cls, source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema by which pydantic reads and writes it as an object, as a dataclass."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
         del source
         fields = core_schema.typed_dict_schema(
             {

@@ -9,7 +9,6 @@ from operator import attrgetter
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from pydantic import ConfigDict
 
 __all__ = [
     "SECRET",
@@ -34,7 +33,7 @@ _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
 
 
-_JSON = ConfigDict(ser_json_bytes="base64", val_json_bytes="base64", ser_json_inf_nan="null")
+_JSON = {"ser_json_bytes": "base64", "val_json_bytes": "base64", "ser_json_inf_nan": "null"}
 """How pydantic writes a record's fields as JSON, and reads them."""
 
 

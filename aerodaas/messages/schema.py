@@ -14,6 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, from_json, to_json
 
 from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.records import secrets_of
 
 __all__ = ["MessageError", "json_of", "json_text", "message_of"]
 
@@ -68,7 +69,11 @@ def json_text(message: object, *, without_none: bool = False, **more: str | int)
     try:
         # Fields are not checked here: whoever reads the message checks them.
         text = _adapter(type(message)).dump_json(
-            message, warnings="none", fallback=_number, exclude_none=without_none
+            message,
+            exclude=set(secrets_of(type(message))),
+            exclude_none=without_none,
+            warnings="none",
+            fallback=_number,
         )
         return to_json(more)[:-1] + b"," + text[1:] if more else text
     except (PydanticSerializationError, TypeError, ValueError) as error:

@@ -9,9 +9,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Protocol, TypeAlias, runtime_checkable
-
-from pydantic import Field
+from typing import Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.clock import Clock
 from aerodaas.geometry.arrays import Int64, Real
@@ -172,7 +170,7 @@ class VehicleState:
     limits need one; None without a fresh reading in its range."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
-    video: Annotated[str, Field(exclude=True)] = field(default="", repr=False, metadata=SECRET)
+    video: str = field(default="", repr=False, metadata=SECRET)
     """Address of its camera's video, as it says; it may hold a password, so it is recorded nowhere
     and sent to nobody else. Empty where it tells none that may be read."""
 
