@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.errors import AeroDaaSError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
@@ -151,7 +150,7 @@ def decoded(content: Any) -> Any:  # noqa: ANN401 - JSON to any item
     """
     try:
         return _Reader().read(content)
-    except AeroDaaSError:
+    except ItemError:
         raise
     except Exception as error:  # noqa: BLE001 - a stranger's numbers in any constructor
         raise ItemError(f"malformed item: {type(error).__name__}: {error}"[:300]) from None

@@ -550,7 +550,7 @@ def node(**words: object) -> dict[str, object]:
         (
             forged("[]", "[{'robot': 'drone', 'waypoints': [{'is': 'Waypoint', 'of': {}}]}]"),
             ("fly",),
-            "malformed",
+            "Waypoint.id: Field required",
         ),
         (forged("['x' * (100 << 20)]"), RIGHTS, "too large"),
         (HEAD + "os.write(4, b'nonsense' * 1000); os.write(3, b'nonsense' * 1000)", (), "guest"),
