@@ -17,7 +17,7 @@ import numpy as np
 import pymap3d
 from numpy.typing import NDArray
 
-from aerodaas.geometry.arrays import XYZ, Int64
+from aerodaas.messages.json_types import XYZ, Int64, Real
 from aerodaas.messages.records import shared_pickle
 
 __all__ = [
@@ -44,7 +44,7 @@ __all__ = [
 
 Vector: TypeAlias = Annotated[NDArray[np.float64], XYZ()]
 """A float64 array of shape (3,)."""
-Box: TypeAlias = tuple[float, float, float, float]
+Box: TypeAlias = tuple[Real, Real, Real, Real]
 """Left, top, right, bottom in pixels of an image."""
 Triple: TypeAlias = tuple[float, float, float]
 

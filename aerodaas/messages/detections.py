@@ -9,11 +9,11 @@ from typing import Annotated, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.geometry.arrays import Int64, NestedLists
 from aerodaas.geometry.depth import depth_in_box, nearest_in_cells
 from aerodaas.geometry.frames import Box, CameraModel
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES, appearance_in_box
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.json_types import Int64, NestedLists, Real
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.records import fast_pickle
 
@@ -31,7 +31,7 @@ class Detection:
     box: Box
     """Left, top, right, bottom."""
     label: str
-    score: float
+    score: Real
     """Confidence, 0 to 1."""
     track_id: Int64 | None = None
     """Identity kept by a tracker."""

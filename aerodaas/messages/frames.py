@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.errors import SourceError
-from aerodaas.geometry.arrays import Int64
 from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.json_types import Int64
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.records import fast_pickle
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field
 
-from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.messages.frames import Header
+from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.records import fast_pickle
 from aerodaas.messages.vehicle import Setpoint
 from aerodaas.messages.waypoints import Waypoint

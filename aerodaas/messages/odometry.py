@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.geometry.frames import Vector
+from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.records import fast_pickle
 
 __all__ = ["Battery", "GpsFix", "Odom", "Odometry"]

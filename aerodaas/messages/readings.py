@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.messages.frames import Header
+from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.records import fast_pickle
 
 __all__ = ["Alert", "Readings"]

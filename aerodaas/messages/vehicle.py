@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.clock import Clock
-from aerodaas.geometry.arrays import Int64, Real
 from aerodaas.geometry.frames import Vector
+from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import Gimbal, GimbalAttitude, PhotoCamera
 from aerodaas.messages.records import SECRET, fast_pickle

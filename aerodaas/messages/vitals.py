@@ -10,7 +10,7 @@ from typing import Any
 import psutil
 
 from aerodaas.clock import host_time_ns
-from aerodaas.geometry.arrays import Int64
+from aerodaas.messages.json_types import Int64
 from aerodaas.messages.records import fast_pickle
 
 __all__ = ["GpuLoad", "Vitals", "read_gpus", "read_vitals"]

@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from aerodaas.errors import InvalidWaypointError
-from aerodaas.geometry.arrays import Int64
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
+from aerodaas.messages.json_types import Int64
 from aerodaas.messages.payload import GimbalTarget, LensTarget
 from aerodaas.messages.records import fast_pickle, shared_pickle
 

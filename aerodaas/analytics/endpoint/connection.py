@@ -13,10 +13,10 @@ from http import HTTPStatus
 import httpx
 from pydantic import SecretStr
 
-from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.config.model import EndpointConfig
 from aerodaas.config.secrets import SecretUrl, cleaned
 from aerodaas.errors import ConfigError, EndpointError
+from aerodaas.http_client import http_client, http_errors, read_at_most
 
 __all__ = ["Connection", "Reply"]
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, ClassVar
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
 from aerodaas.clock import seconds
-from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.http_client import http_client, http_errors, read_at_most
 from aerodaas.messages.frames import Header
 from aerodaas.messages.odometry import GpsFix
 from aerodaas.messages.readings import Alert

@@ -79,7 +79,7 @@ class _Charge(TypedDict):
     current: Gap
 
 
-def _count_or_none(value: object) -> int:
+def _count_or_zero(value: object) -> int:
     """A number of satellites; 0, which is none that is known, for anything else."""
     return value if type(value) is int and 0 <= value < 1 << 63 else 0
 
@@ -91,7 +91,7 @@ class _Fix(TypedDict):
     altitude: Gap
     horizontal_sigma: NotRequired[Gap]
     vertical_sigma: NotRequired[Gap]
-    satellites: NotRequired[Annotated[int, BeforeValidator(_count_or_none)]]
+    satellites: NotRequired[Annotated[int, BeforeValidator(_count_or_zero)]]
 
 
 @with_config(_OPEN)

@@ -12,8 +12,8 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import httpx
 import pytest
 
-from aerodaas.config.http_client import http_client, http_errors, read_at_most
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.http_client import http_client, http_errors, read_at_most
 
 
 @pytest.fixture
