@@ -20,23 +20,25 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.guest_item import GuestItem
-from aerodaas.messages.mission import BatteryOutlook, Decision, MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, Decision, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.readings import Alert, Readings
 from aerodaas.messages.schema import MessageError, json_of, message_of
-from aerodaas.messages.vehicle import Traffic, VehicleState
+from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import (
     FollowedTarget,
+    HeightReference,
     NavigationType,
     SchedulingType,
+    TargetState,
     VelocityCommand,
     Waypoint,
+    WaypointType,
 )
 
-__all__ = ["KNOWN_CLASSES", "ItemError", "decoded", "encoded"]
+__all__ = ["KNOWN_CLASSES", "decoded", "encoded"]
 
-ItemError = MessageError
 KNOWN_CLASSES: dict[str, type] = {
     one.__name__: one
     for one in (
@@ -61,6 +63,20 @@ KNOWN_CLASSES: dict[str, type] = {
     )
 }
 """Classes of messages that may be sent, by name."""
+_ENUMERATIONS: dict[str, type[enum.Enum]] = {
+    one.__name__: one
+    for one in (
+        FlightEnd,
+        HeightReference,
+        MissionState,
+        NavigationType,
+        SchedulingType,
+        TargetState,
+        VehicleMode,
+        WaypointType,
+    )
+}
+"""Enumerations whose members may be sent outside a message's field, by name."""
 _DEEPEST = 12
 _LONGEST = 100_000
 """Most parts of one item."""
@@ -82,13 +98,13 @@ def encoded(item: object, opaque: Callable[[object], GuestItem]) -> Any:  # noqa
         opaque: Wraps an item of another class.
 
     Returns:
-        A value of the types that JSON has. A member of an enumeration of texts is its value.
+        A value of the types that JSON has.
 
     Raises:
-        ItemError: If a field of a message holds what JSON cannot.
+        MessageError: If a field of a message holds what JSON cannot.
     """
     try:
-        return _hidden(item) if isinstance(item, GuestItem) else _written(item)
+        return _written(item)
     except (_UnknownError, RecursionError):
         return _hidden(opaque(item))
 
@@ -101,26 +117,37 @@ def _hidden(item: GuestItem) -> dict[str, Any]:
 def _written(item: object) -> Any:  # noqa: ANN401 - JSON
     if isinstance(item, np.generic):
         item = item.item()
-    if isinstance(item, enum.Enum) and isinstance(item, str):
-        item = item.value
     if type(item) is float and not math.isfinite(item):
         # JSON has no such numbers, and strict readers refuse what Python writes for them.
         return {"is": "float", "of": repr(item)}
     if type(item) is list:
         return [_written(one) for one in item]
-    return item if item is None or type(item) in _PLAIN else _tagged(item)
+    if item is None or type(item) in _PLAIN:
+        return item
+    if isinstance(item, GuestItem):
+        return _hidden(item)
+    return _tagged(item)
 
 
 def _tagged(item: object) -> dict[str, Any]:
     name = type(item).__name__
+    content: Any = None
     if KNOWN_CLASSES.get(name) is type(item):
-        return {"is": name, "of": json_of(item)}
-    if isinstance(item, tuple):
-        return {"is": "tuple", "of": [_written(one) for one in item]}
-    if type(item) is dict and all(isinstance(key, str) for key in item):
-        return {"is": name, "of": {key: _written(one) for key, one in item.items()}}
-    if isinstance(item, bytes):
-        return {"is": "bytes", "of": base64.b64encode(item).decode()}
+        content = json_of(item)
+    elif isinstance(item, enum.Enum) and _ENUMERATIONS.get(name) is type(item):
+        content = item.value
+    # A tuple of a class of its own, a named one, has more than its parts.
+    elif type(item) is tuple:
+        content = [_written(one) for one in item]
+    elif type(item) is dict and all(isinstance(key, str) for key in item):
+        content = {key: _written(one) for key, one in item.items()}
+    elif isinstance(item, bytes):
+        content = base64.b64encode(item).decode()
+    return _of_own_form(item) if content is None else {"is": name, "of": content}
+
+
+def _of_own_form(item: object) -> dict[str, Any]:
+    """Write what has more than a class and a content."""
     if isinstance(item, AeroNavigation) and item.stream is None:
         return {
             "is": "AeroNavigation",
@@ -146,14 +173,14 @@ def decoded(content: Any) -> Any:  # noqa: ANN401 - JSON to any item
         The item; each field of a message is checked.
 
     Raises:
-        ItemError: If it is malformed, too deep or too large, or of a class that is not known.
+        MessageError: If it is malformed, too deep or too large, or of a class that is not known.
     """
     try:
         return _Reader().read(content)
-    except ItemError:
+    except MessageError:
         raise
     except Exception as error:  # noqa: BLE001 - a stranger's numbers in any constructor
-        raise ItemError(f"malformed item: {type(error).__name__}: {error}"[:300]) from None
+        raise MessageError(f"malformed item: {type(error).__name__}: {error}"[:300]) from None
 
 
 class _Reader:
@@ -163,7 +190,7 @@ class _Reader:
         self._parts = 0
 
     def read(self, content: Any, depth: int = 0) -> Any:  # noqa: ANN401 - JSON
-        self._count(depth)
+        self._count(_DEEPEST - depth)
         if content is None or isinstance(content, bool | int | float | str):
             return content
         if isinstance(content, list):
@@ -173,6 +200,7 @@ class _Reader:
 
     def _tagged(self, kind: Any, content: Any, depth: int) -> Any:  # noqa: ANN401 - JSON
         if kind in KNOWN_CLASSES:
+            self._count_plain(content["of"], 2 * _DEEPEST - depth)
             return message_of(KNOWN_CLASSES[kind], content["of"])
         if kind == "tuple":
             return tuple(self.read(one, depth + 1) for one in content["of"])
@@ -187,38 +215,41 @@ class _Reader:
     def _guest_item(self, content: Mapping[str, Any], depth: int) -> GuestItem:
         name = content["kind"]
         if not isinstance(name, str) or not name.isidentifier():
-            raise ItemError("a class without a name")
-        self._count_plain(content["value"], depth)
+            raise MessageError("a class without a name")
+        self._count_plain(content["value"], 2 * _DEEPEST - depth)
         data = base64.b64decode(content["data"], validate=True)
         return GuestItem(name[:_LONGEST_NAME], content["value"], data)
 
-    def _count_plain(self, value: Any, depth: int) -> None:  # noqa: ANN401 - JSON
-        self._count(depth // 2)
+    def _count_plain(self, value: Any, levels: int) -> None:  # noqa: ANN401 - JSON
+        self._count(levels)
         if isinstance(value, dict | list):
             for one in value.values() if isinstance(value, dict) else value:
-                self._count_plain(one, depth + 1)
+                self._count_plain(one, levels - 1)
 
-    def _count(self, depth: int) -> None:
+    def _count(self, levels: int) -> None:
+        """Count one part, which may have so many levels below it."""
         self._parts += 1
-        if depth > _DEEPEST or self._parts > _LONGEST:
-            raise ItemError(f"more than {_DEEPEST} levels or {_LONGEST} parts in one item")
+        if levels < 0 or self._parts > _LONGEST:
+            raise MessageError(f"too many levels, or more than {_LONGEST} parts, in one item")
 
 
-def _leaf(kind: object, content: Any) -> Any:  # noqa: ANN401 - JSON to a value without items within
+def _leaf(kind: Any, content: Any) -> Any:  # noqa: ANN401 - JSON to a value without items within
     inner = content.get("of") if isinstance(content, dict) else None
     if kind == "float" and inner in _NOT_FINITE:
         return float(inner)
+    if kind in _ENUMERATIONS:
+        return _ENUMERATIONS[kind](inner)
     if kind == "bytes" and isinstance(inner, str):
         return base64.b64decode(inner, validate=True)
     if kind == "array":
         return _array(content)
-    raise ItemError(f"there is no class {str(kind)[:40]!r} that may be sent")
+    raise MessageError(f"there is no class {str(kind)[:40]!r} that may be sent")
 
 
 def _navigation(content: Mapping[str, Any], items: list[Any]) -> AeroNavigation:
     priority = content["priority"]
     if not (priority is None or type(priority) is int):
-        raise ItemError("navigation of a priority that is no number")
+        raise MessageError("navigation of a priority that is no number")
     return AeroNavigation(
         NavigationType(content["type"]),
         items,
@@ -230,9 +261,9 @@ def _navigation(content: Mapping[str, Any], items: list[Any]) -> AeroNavigation:
 def _array(content: Mapping[str, Any]) -> np.ndarray[Any, Any]:
     kind = np.dtype(str(content["type"])[:8])
     if kind.kind not in _KINDS:
-        raise ItemError(f"an array of {kind}")
+        raise MessageError(f"an array of {kind}")
     shape = [int(one) for one in content["shape"]]
     whole = base64.b64decode(content["data"], validate=True)
     if len(shape) > _DEEPEST or any(one < 0 for one in shape):
-        raise ItemError("an array of an impossible shape")
+        raise MessageError("an array of an impossible shape")
     return np.frombuffer(whole, kind).reshape(shape)

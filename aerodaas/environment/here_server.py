@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from aerodaas.analytics.guests.works import Works
 from aerodaas.analytics.here.relay import oversize
-from aerodaas.analytics.item_json import ItemError
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.errors import failure_line
 from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import plain
 
@@ -87,14 +87,14 @@ class HereServer:
     def _answer(self, request: dict[str, Any], blob: bytes) -> dict[str, Any]:
         key = str(request.get("key"))
         if key not in self._locks:
-            raise ItemError(f"there is no analysis {key[:80]!r} here")
+            raise MessageError(f"there is no analysis {key[:80]!r} here")
         item = unpack(request.get("item"), blob)
         with self._locks[key]:
             if request.get("do") == "met":
                 return self._works.met(key, item)
             vehicle, now = unpack(request.get("vehicle")), request.get("now")
             if not isinstance(vehicle, VehicleState | None) or not isinstance(now, int):
-                raise ItemError("a question without the vehicle's state or its time")
+                raise MessageError("a question without the vehicle's state or its time")
             on: ComputeKind = "cloud" if request.get("on") == "cloud" else "edge"
             return self._works.process(key, item, now, vehicle, on)
 
@@ -110,13 +110,13 @@ class HereServer:
     def revealed(self, item: object) -> object:
         """The application's own object that a GuestItem stands for; anything else as it is.
 
-        Raises ItemError for one that is no longer kept.
+        Raises MessageError for one that is no longer kept.
         """
         if not isinstance(item, GuestItem):
             return item
         with self._keeping:
             if item.data not in self._kept:
-                raise ItemError(f"a {item.kind} that is no longer kept here")
+                raise MessageError(f"a {item.kind} that is no longer kept here")
             return self._kept[item.data]
 
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.analytics.base import Context
-from aerodaas.analytics.item_json import ItemError, decoded
+from aerodaas.analytics.item_json import decoded
 from aerodaas.errors import ModelError
 from aerodaas.messages.frames import Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.readings import Alert
+from aerodaas.messages.schema import MessageError
 
 __all__ = ["AnswerReader", "AnsweredCondition"]
 
@@ -66,8 +67,8 @@ class AnswerReader:
     def read(self, answer: dict[str, Any], context: Context) -> Any:  # noqa: ANN401 - any item
         """Tell the answer's alerts and return its result.
 
-        Raises ModelError for a failure that it tells of, ItemError for a result that is malformed
-        or of another class than was declared.
+        Raises ModelError for a failure that it tells of, MessageError for a malformed result or
+        of another class than was declared.
         """
         for text, values in _alerts(answer.get("alerts")):
             self._tell(text, values, context)
@@ -76,7 +77,7 @@ class AnswerReader:
             raise ModelError(f"{self._title}: {str(failed)[:_TEXT]}")
         result = decoded(answer.get("item"))
         if not self._is_declared(result):
-            raise ItemError(
+            raise MessageError(
                 f"{self._title}: {self._key} declares {self._produces.__name__} and sent "
                 f"{_named(result)}"
             )

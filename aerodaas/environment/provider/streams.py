@@ -9,12 +9,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.analytics.wire_items import ItemError, unpack
+from aerodaas.analytics.wire_items import unpack
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.live import ReceivedItem
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, failure_line
+from aerodaas.messages.schema import MessageError
 
 __all__ = ["WireReader"]
 
@@ -44,7 +45,7 @@ class WireReader:
             follower: Keeps up with the mission.
             stream: Name of the stream.
             revealed: Returns the application's own object for what stands for it on the wire, and
-                anything else as it is; raises ItemError.
+                anything else as it is; raises MessageError.
         """
         self._client = client
         self._follower = follower
@@ -123,7 +124,7 @@ class WireReader:
         if not wrong:
             try:
                 item = self._revealed(unpack(message.content, message.blob))
-            except ItemError as error:
+            except MessageError as error:
                 wrong = str(error)
         if wrong:
             warnings.warn(f"{self._stream}: an item is left out: {wrong}", stacklevel=2)

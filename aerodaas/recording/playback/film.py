@@ -8,12 +8,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.analytics.wire_items import ItemError, pack
+from aerodaas.analytics.wire_items import pack
 from aerodaas.cameras.images import VIDEO_SCHEMAS, picture_bytes
 from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_size
 from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.schema import MessageError
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.pictures import Shot, detections, shots
 from aerodaas.recording.playback.page_items import (
@@ -224,7 +225,7 @@ def _packed(stream: str, shot: Shot) -> Packed | None:
         if image is None:
             return None
         _, data = pack(Frame(shot.header, image))
-    except (SourceError, ItemError):
+    except (SourceError, MessageError):
         return None
     return {**message, "item": _picture(shot, data), "blob": True}, data
 

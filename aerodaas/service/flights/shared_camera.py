@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
-from aerodaas.analytics.wire_items import ItemError, unpack
+from aerodaas.analytics.wire_items import unpack
 from aerodaas.cameras.base import Picture
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
@@ -18,6 +18,7 @@ from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.schema import MessageError
 from aerodaas.service.flights.order import Attached
 
 __all__ = ["SharedCamera", "SharedCameraSettings", "attached_config"]
@@ -101,7 +102,7 @@ class SharedCamera:
         except GuestError:
             self.finished = True
             return None
-        except ItemError:
+        except MessageError:
             self.skipped += 1
             return None
         if not isinstance(item, Frame):

@@ -12,7 +12,7 @@ import pytest
 
 from aerodaas.analytics.guests.channel import LARGEST_TEXT, Channel, GuestError
 from aerodaas.analytics.guests.document import read_document
-from aerodaas.analytics.item_json import ItemError, decoded, encoded
+from aerodaas.analytics.item_json import decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import GraphError
 from aerodaas.messages.detections import Detection, Detections
@@ -20,6 +20,7 @@ from aerodaas.messages.frames import Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.readings import Readings
+from aerodaas.messages.schema import MessageError
 from aerodaas.messages.waypoints import (
     NavigationItem,
     SchedulingType,
@@ -103,11 +104,12 @@ def deep(levels: int) -> Any:  # noqa: ANN401 - JSON
         [0] * 200_000,
         {"is": []},
         deep(40),
+        {"is": "Alert", "of": {"values": {"a": [0] * 200_000}}},
     ],
 )
 def test_malformed_items_are_refused(content: object) -> None:
     """By one error."""
-    with pytest.raises(ItemError):
+    with pytest.raises(MessageError):
         decoded(content)
 
 

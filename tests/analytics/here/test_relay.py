@@ -16,12 +16,12 @@ from aerodaas.analytics.guests.answers import AnsweredCondition
 from aerodaas.analytics.guests.works import Works
 from aerodaas.analytics.here.analysis import HERE, HereAnalysis, HereConditions, HereSite
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
-from aerodaas.analytics.item_json import ItemError
 from aerodaas.analytics.wire_items import pack
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, ModelError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
 
 READINGS = Readings(5, {"height": 2.0})
@@ -263,7 +263,7 @@ def test_a_wrong_answer_is_an_error_of_the_analysis(
         user.connection.answered({**answer, "number": number}, blob)
 
     threading.Thread(target=reply).start()
-    with pytest.raises((ModelError, ItemError), match=said):
+    with pytest.raises((ModelError, MessageError), match=said):
         work.process(1, flight)
     user.say = lambda _: {"item": None}
     assert work.process(2, flight) is None

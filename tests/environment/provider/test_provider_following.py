@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from provider_stub import MISSION, Stub, mission
 
-from aerodaas.analytics.wire_items import ItemError, pack
+from aerodaas.analytics.wire_items import pack
 from aerodaas.environment.provider import pauses as module
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
@@ -19,6 +19,7 @@ from aerodaas.errors import ConfigError, MissionError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.schema import MessageError
 from aerodaas.protocol.schemas import MissionPhase
 
 SECONDS = 20.0
@@ -164,7 +165,7 @@ def test_the_applications_own_items_are_its_own_again(client: ProviderClient, st
 
     def revealed(item: object) -> object:
         if isinstance(item, GuestItem) and item.data == b"2":
-            raise ItemError("an Own that is no longer kept here")
+            raise MessageError("an Own that is no longer kept here")
         return own if isinstance(item, GuestItem) else item
 
     stub.items = heads(GuestItem("Own", 1, b"2"), GuestItem("Own", 1, b"1"), "well")

@@ -20,13 +20,14 @@ from aerodaas.analytics.guests.document import (
     GuestTrigger,
     read_document,
 )
-from aerodaas.analytics.item_json import ItemError, decoded, encoded
+from aerodaas.analytics.item_json import decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import GraphError
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.readings import Readings
+from aerodaas.messages.schema import MessageError
 from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 
@@ -74,7 +75,7 @@ def run(data: bytes) -> None:
             content, _ = Channel(ours).receive(1.0)
         except GuestError:
             return
-    with contextlib.suppress(ItemError):
+    with contextlib.suppress(MessageError):
         decoded(content.get("item"))
     with contextlib.suppress(GraphError):
         read_document(content.get("document"))
