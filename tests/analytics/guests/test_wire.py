@@ -19,8 +19,8 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.readings import Readings
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.schema import MessageError, json_of
 from aerodaas.messages.waypoints import (
     NavigationItem,
     SchedulingType,
@@ -104,7 +104,7 @@ def deep(levels: int) -> Any:  # noqa: ANN401 - JSON
         [0] * 200_000,
         {"is": []},
         deep(40),
-        {"is": "Alert", "of": {"values": {"a": [0] * 200_000}}},
+        {"is": "Alert", "of": {**json_of(Alert(HEADER, "a", "b")), "values": {"a": [0] * 200_000}}},
     ],
 )
 def test_malformed_items_are_refused(content: object) -> None:
