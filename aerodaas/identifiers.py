@@ -25,7 +25,6 @@ __all__ = [
     "internal",
     "is_internal",
     "require_name",
-    "safe_name",
     "short",
     "told",
 ]
@@ -111,9 +110,3 @@ def require_name(name: str, owner: str) -> str:
             "a name is made of letters, digits, _ and -, a letter first"
         )
     return name
-
-
-def safe_name(text: str) -> str:
-    """A name as like `text` as may be, such as that of an application's file."""
-    name = re.sub(r"[^\w\-]", "_", text)
-    return name if _NAME.fullmatch(name) else f"_{name}"[:64]

@@ -1,6 +1,8 @@
-"""Crowd Watch: how many people are where a drone flies; a guest of the application that flies it.
+"""Crowd Watch: how many people are where another application's drone flies.
 
-aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py --grant crowd_watch=sense,compute
+It navigates no drone. It senses by the cameras of a flight at a provider, by that mission's id:
+
+aerodaas submit apps/crowd_watch.py --attach MISSION
 """
 
 from aerodaas import Environment
@@ -8,7 +10,7 @@ from aerodaas.analytics import CrowdDensityAnalytics, OnnxDetector
 
 
 def main() -> None:
-    """Build the dataflow and join the owner's flight."""
+    """Build the dataflow, and sense beside the application that flies the drone."""
     env = Environment("environments/disaster.json")
     edge = env.get_compute_resource_by_id("edge")
     drone = env.get_robot_by_id("quadrotor_base")

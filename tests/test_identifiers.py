@@ -14,11 +14,10 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from aerodaas import AeroNavigation, Analytics, Environment, Waypoint
 from aerodaas.analytics.base import Context
-from aerodaas.analytics.guests.document import GuestDocument
 from aerodaas.config.model import validated
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.errors import ConfigError, GraphError
-from aerodaas.identifiers import INTERNAL, ScopedWord, Word, is_internal, require_name, safe_name
+from aerodaas.identifiers import INTERNAL, ScopedWord, Word, is_internal, require_name
 from aerodaas.protocol.schemas import AccountIn, GrantIn, MissionIn
 from aerodaas.recording.encoding import stream_of, topic
 from aerodaas.runtime import stream_names as _names
@@ -66,12 +65,6 @@ def test_names_that_could_be_taken_for_others_are_refused(name: str, tmp_path: P
         data = env.get_robot_by_id("drone").get_sensor_by_id("state").get_data_stream()
         with pytest.raises(GraphError, match="cannot be called"):
             Anything(name).analyse(data)
-
-
-@given(st.text())
-def test_any_file_name_makes_a_name(text: str) -> None:
-    """A guest is named after its file, whatever that is called."""
-    assert require_name(safe_name(text), "guest")
 
 
 @given(streams, ids)
@@ -156,7 +149,7 @@ def test_a_name_of_a_document_has_at_most_64_characters_a_letter_first(a: str, b
         assert _takes(SCOPED_WORD, text) == bool(re.fullmatch(rf"{_PART}(/{_PART})?", text))
 
 
-@pytest.mark.parametrize("model", [MissionDocument, GuestDocument, MissionIn, GrantIn, AccountIn])
+@pytest.mark.parametrize("model", [MissionDocument, MissionIn, GrantIn, AccountIn])
 def test_no_pattern_of_a_document_counts_letters_of_all_scripts(model: type[BaseModel]) -> None:
     """Each that does takes megabytes of every process that imports the model."""
     text = str(model.model_json_schema())

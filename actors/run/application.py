@@ -77,16 +77,13 @@ def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa
     return _definitions.named(attributes[name])
 
 
-def capture(
-    graph: Graph, config: EnvironmentConfig, *plugins: object, by_value: bool = False
-) -> Application:
-    """Collect the definitions of the application and its guests, in their own process.
+def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Application:
+    """Collect the definitions of the application, in its own process.
 
     Args:
         graph: The application's dataflow.
         config: Its environment, whose plug-ins may be the application's own.
         plugins: Instances of its classes outside the graph, such as schedulers.
-        by_value: Whether all own modules travel by value, to a process that is not of Ray's job.
     """
     used = [*_used(graph), *plugins]
     files = _main_files(used)
@@ -99,7 +96,7 @@ def capture(
         names += _imports_of(namespace, folders)
     own = own_modules(names, folders)
     # Ray runs a container with nothing of its own in it.
-    by_value = by_value or any(env.image_uri for env in _environments(graph, config))
+    by_value = any(env.image_uri for env in _environments(graph, config))
     late = {name for name in own if by_value or not ray_cluster.brings(name, own[name])}
     definitions: dict[str, bytes] = {}
     attributes: dict[str, dict[str, str]] = {}
@@ -166,7 +163,7 @@ def _used(graph: Graph) -> list[object]:
 
 
 def _main_files(used: Iterable[object]) -> list[dict[str, Any]]:
-    """Namespaces of files that run as `__main__`: the application's and its guests'."""
+    """Namespaces of files that run as `__main__`: the application's own."""
     files: dict[int, dict[str, Any]] = {}
     main = sys.modules.get("__main__")
     if main is not None:

@@ -1,7 +1,7 @@
 """Items of streams as JSON, between processes that do not trust each other.
 
 A message is `{"is": CLASS, "of": FIELDS}`, whose fields are as `aerodaas.messages.schema` has them.
-Nothing is a pickle. What is of another class becomes a GuestItem, whose content stays with its
+Nothing is a pickle. What is of another class becomes a OpaqueItem, whose content stays with its
 author.
 """
 
@@ -19,9 +19,9 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
-from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.mission import BatteryOutlook, Decision, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.readings import Alert, Readings
 from aerodaas.messages.schema import MessageError, json_of, message_of
@@ -90,7 +90,7 @@ class _UnknownError(Exception):
     """An object is of a class that is not known."""
 
 
-def encoded(item: object, opaque: Callable[[object], GuestItem]) -> Any:  # noqa: ANN401 - JSON
+def encoded(item: object, opaque: Callable[[object], OpaqueItem]) -> Any:  # noqa: ANN401 - JSON
     """Write an item as JSON.
 
     Args:
@@ -109,9 +109,9 @@ def encoded(item: object, opaque: Callable[[object], GuestItem]) -> Any:  # noqa
         return _hidden(opaque(item))
 
 
-def _hidden(item: GuestItem) -> dict[str, Any]:
+def _hidden(item: OpaqueItem) -> dict[str, Any]:
     data = base64.b64encode(item.data).decode()
-    return {"is": "GuestItem", "kind": item.kind, "value": item.value, "data": data}
+    return {"is": "OpaqueItem", "kind": item.kind, "value": item.value, "data": data}
 
 
 def _written(item: object) -> Any:  # noqa: ANN401 - JSON
@@ -124,7 +124,7 @@ def _written(item: object) -> Any:  # noqa: ANN401 - JSON
         return [_written(one) for one in item]
     if item is None or type(item) in _PLAIN:
         return item
-    if isinstance(item, GuestItem):
+    if isinstance(item, OpaqueItem):
         return _hidden(item)
     return _tagged(item)
 
@@ -208,17 +208,17 @@ class _Reader:
             return {key: self.read(one, depth + 1) for key, one in content["of"].items()}
         if kind == "AeroNavigation":
             return _navigation(content, self.read(content["of"], depth + 1))
-        if kind == "GuestItem":
-            return self._guest_item(content, depth)
+        if kind == "OpaqueItem":
+            return self._opaque_item(content, depth)
         return _leaf(kind, content)
 
-    def _guest_item(self, content: Mapping[str, Any], depth: int) -> GuestItem:
+    def _opaque_item(self, content: Mapping[str, Any], depth: int) -> OpaqueItem:
         name = content["kind"]
         if not isinstance(name, str) or not name.isidentifier():
             raise MessageError("a class without a name")
         self._count_plain(content["value"], 2 * _DEEPEST - depth)
         data = base64.b64decode(content["data"], validate=True)
-        return GuestItem(name[:_LONGEST_NAME], content["value"], data)
+        return OpaqueItem(name[:_LONGEST_NAME], content["value"], data)
 
     def _count_plain(self, value: Any, levels: int) -> None:  # noqa: ANN401 - JSON
         self._count(levels)

@@ -18,8 +18,8 @@ from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_
 from aerodaas.errors import AeroDaaSError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.schema import MessageError, json_of, message_of
 
 __all__ = ["pack", "unpack"]
@@ -82,7 +82,7 @@ def unpack(content: Any, blob: bytes = b"") -> Any:  # noqa: ANN401 - JSON to an
         raise MessageError(f"malformed frame: {type(error).__name__}: {error}"[:300]) from None
 
 
-def _refused(item: object) -> GuestItem:
+def _refused(item: object) -> OpaqueItem:
     raise MessageError(
         f"{type(item).__name__} is of no class that goes over the wire, or holds one"
     )

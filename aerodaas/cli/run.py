@@ -69,22 +69,6 @@ def run(
     address: Annotated[
         str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
     ] = None,
-    guest: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Another's application, in a process of its own, that shares what --grant gives."
-        ),
-    ] = None,
-    grant: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="GUEST=RIGHT,…",
-            help="What a guest, named after its file, may have: `sense`, `compute` and `fly`, "
-            "each alone or as `sense:SENSOR`, `sense:ROBOT`, `compute:ID`, `fly:ROBOT`; and how "
-            "much: `analyses:4`, `memory:2048` (MB), `rate:20` (Hz of a source of its own). "
-            "Without it, nothing.",
-        ),
-    ] = None,
     setting: Overrides = None,
     view: Annotated[  # noqa: FBT002
         bool, typer.Option("--view/--no-view", help="Show the flight on the terminal.")
@@ -124,11 +108,9 @@ def run(
         aerodaas run farm_survey --seeds 16 --csv farm.csv
         aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run situation_awareness --scheduler margin --set simulation.network=outage:60-90
-        aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
     """
-    from aerodaas.config.grants import parse_words  # noqa: PLC0415 - slow to load
-    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
+    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - slow to load
     from aerodaas.ros.link import domain_of  # noqa: PLC0415 - as above
 
     application = find_application(application)
@@ -148,8 +130,6 @@ def run(
         live=live_address if live else None,
         ros2=domain_of(None) if ros2 else None,
         console=console_address if console else None,
-        guests=tuple(find_application(path).resolve() for path in guest or ()),
-        grants=parse_words(grant or ()),
         application=application.resolve(),
     )
     if seeds is not None:

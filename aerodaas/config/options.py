@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
-    from aerodaas.config.grants import Catalogue
     from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["LiveViews", "ProviderOptions", "RunOptions", "Speed", "current_options"]
@@ -110,12 +109,6 @@ class RunOptions:
     """Analytics scheduler instead of the application's own."""
     model: Path | None = None
     """ONNX model for every detector, instead of its own."""
-    guests: tuple[Path, ...] = ()
-    """Applications of others, in processes of their own."""
-    grants: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    """Rights by guest, such as `sense:cam1`; a guest without any has none."""
-    catalogue: Catalogue | None = None
-    """In a guest's process: what it was granted, in the place of an environment file."""
     provider: ProviderOptions = field(default_factory=ProviderOptions)
     """For flights on a provider's drones."""
     application: Path | None = None

@@ -5,12 +5,12 @@ Addresses, paths, nodes, drivers and their settings, plug-ins, packages and secr
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterable
 from typing import Any
 
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 
-__all__ = ["calibration", "catalogue", "redacted"]
+__all__ = ["calibration", "catalogue"]
 
 _CALIBRATION = (
     *("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"),
@@ -33,37 +33,14 @@ def catalogue(config: EnvironmentConfig) -> EnvironmentConfig:
     an endpoint stand in it as words that name the setting and lead nowhere. A camera without a
     source of pictures is left out.
     """
-    sensors = [
-        one.full_id
-        for one in config.all_sensors()
-        if one.type != "camera" or config.has_pictures(one)
-    ]
-    compute = "auto" if config.compute == "auto" else [_resource(one) for one in config.compute]
-    return redacted(config, sensors=sensors, compute=compute, paths=True)
-
-
-def redacted(
-    config: EnvironmentConfig,
-    *,
-    sensors: Collection[str],
-    compute: object,
-    paths: bool = False,
-) -> EnvironmentConfig:
-    """An environment with all robots, but these sensors and compute resources alone.
-
-    Args:
-        config: The environment.
-        sensors: Full ids of the sensors that are shown.
-        compute: The compute resources as in an environment file.
-        paths: Whether the `path` of a sensor that is no camera is shown, as a word.
-    """
     whole = config.model_dump(mode="json", by_alias=True)
     ids = {"start", "start_yaw", "limits", "mission", "id"}
-    shown = {one.full_id: _sensor(one, paths=paths) for one in config.all_sensors()}
-    kept = {name: one for name, one in shown.items() if name in sensors}
+
+    def shown(sensors: Iterable[SensorConfig]) -> list[dict[str, Any]]:
+        return [_sensor(one) for one in sensors if one.type != "camera" or config.has_pictures(one)]
+
     robots = [
-        {key: value for key, value in one.items() if key in ids}
-        | {"sensors": [kept[name] for s in robot.sensors if (name := s.full_id) in kept]}
+        {key: value for key, value in one.items() if key in ids} | {"sensors": shown(robot.sensors)}
         for one, robot in zip(whole["robots"], config.robots, strict=True)
     ]
     return EnvironmentConfig.model_validate(
@@ -71,16 +48,18 @@ def redacted(
             "name": config.name,
             "home": whole["home"],
             "robots": robots,
-            "sensors": [kept[name] for s in config.sensors if (name := s.full_id) in kept],
-            "compute": compute,
+            "sensors": shown(config.sensors),
+            "compute": "auto"
+            if config.compute == "auto"
+            else [_resource(one) for one in config.compute],
         }
     )
 
 
-def _sensor(sensor: SensorConfig, *, paths: bool) -> dict[str, Any]:
+def _sensor(sensor: SensorConfig) -> dict[str, Any]:
     settings = calibration(sensor)
     camera = sensor.type == "camera"
-    if paths and not camera and sensor.settings.get("path"):
+    if not camera and sensor.settings.get("path"):
         settings["path"] = _NOWHERE.format(f"{sensor.full_id.replace('/', '-')}.path")
     return {
         "id": sensor.id,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import load_plugin
-from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line, refusal
+from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line
 from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
@@ -33,7 +33,6 @@ from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectorySched
 
 if TYPE_CHECKING:
     from aerodaas.console.view import ConsoleView
-    from aerodaas.environment.guests import GuestNote
 
 __all__ = ["Environment"]
 
@@ -62,8 +61,6 @@ class Environment(PaperNames, IEnvironment):
         self.line = application_line()
         """The application's line that made it, as `file:line: code`."""
         self.config: EnvironmentConfig = source.config
-        self.guest_notes: list[GuestNote] = []
-        """What the owner is to be told of guests once a recording is open."""
         check_environment(self.config, source.place)
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
@@ -384,7 +381,6 @@ class Environment(PaperNames, IEnvironment):
         refuses.
         """
         graph = self.graph
-        self._require_granted(edge.robot)
         require_actuators(self.config, edge)
         self._require_flying(edge.robot)
         graph.navigation.append(edge)
@@ -397,24 +393,6 @@ class Environment(PaperNames, IEnvironment):
         except BaseException:
             graph.navigation.remove(edge)
             raise
-
-    def _admit(self) -> None:
-        options = current_options.get()
-        if options.guests:
-            from aerodaas.environment.guests import admit_guests  # noqa: PLC0415 - only with guests
-
-            self.guest_notes = admit_guests(options, self)
-
-    def _require_granted(self, robot: str, line: str = "") -> None:
-        """Raise GraphError, with the line, if a guest would navigate what it was not granted."""
-        catalogue = current_options.get().catalogue
-        if catalogue is None or robot in catalogue.grants.fly:
-            return
-        message = (
-            f"{catalogue.guest} is a guest and may not command {robot}, which its owner navigates "
-            f"(--grant {catalogue.guest}=fly:{robot} would allow it)"
-        )
-        raise GraphError(f"{message}\n  at {line}") if line else refusal(message)
 
     def _require_flying(self, robot: str) -> None:
         graph = self.graph
@@ -445,7 +423,6 @@ class Environment(PaperNames, IEnvironment):
     def launched(self) -> MissionRun:
         """Start the mission of every robot that navigates, once; returns it."""
         if self._mission is None and not self._only_built():
-            self._admit()
             return self._start()
         assert self._mission is not None  # noqa: S101 - it flies, or what stands in for it
         return self._mission
@@ -505,12 +482,8 @@ class Environment(PaperNames, IEnvironment):
         named = [edge.robot for edge in self.graph.navigation]
         named += [entry.robot for entry in entries if entry.robot is not None]
         robots = list(dict.fromkeys(named))
-        if not robots and current_options.get().catalogue is not None:
-            # A guest need not name the only robot that there is.
-            robots = list(self._robots)
         if robots:
             for one in entries:
-                self._require_granted(_addressee(one, robots), one.line)
                 require_actuators(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()

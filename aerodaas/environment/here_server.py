@@ -7,17 +7,22 @@ stands between them. The provider's questions are data, as its own graph's answe
 from __future__ import annotations
 
 import copy
+import math
 import secrets
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from aerodaas.analytics.guests.works import Works
+import numpy as np
+
 from aerodaas.analytics.here.relay import oversize
+from aerodaas.analytics.item_json import encoded
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.errors import failure_line
-from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import plain
@@ -26,6 +31,7 @@ if TYPE_CHECKING:
     from aerodaas.analytics.base import Analytics, ComputeKind
     from aerodaas.dataflow.mission_document import MissionDocument
     from aerodaas.environment.environment import Environment
+    from aerodaas.messages.readings import Alert
 
 __all__ = ["HereServer"]
 
@@ -41,29 +47,30 @@ class HereServer:
 
         As in a flight of its own, each analysis is a copy of the application's.
         """
-        graph = environment.graph
-        works: dict[str, Analytics[Any]] = {}
-        conditions = {}
+        self._analyses: dict[str, Analytics[Any]] = {}
+        self._conditions: dict[str, list[Callable[[Any], bool] | None]] = {}
+        """Conditions of each analysis' triggers, in order; None for one that all results meet."""
         for entry in document.analyses:
-            work = graph.nodes[entry.id].work
+            work = environment.graph.nodes[entry.id].work
             if entry.here is not None:
-                works[entry.id] = copy.deepcopy(work)
-            conditions[entry.id] = [
+                self._analyses[entry.id] = copy.deepcopy(work)
+            self._conditions[entry.id] = [
                 one.when if trigger.at_users_side else _elsewhere
                 for one, trigger in zip(work.given_triggers, entry.triggers, strict=True)
             ]
         self._kept: OrderedDict[bytes, object] = OrderedDict()
         self._keeping = threading.Lock()
-        self._works = Works(works, conditions, self._hidden, self.revealed)
-        self._locks = {key: threading.Lock() for key in conditions}
+        self._locks = {key: threading.Lock() for key in self._conditions}
 
     def open(self) -> None:
         """Open all analyses, before the connection is made; raises what one raises."""
-        self._works.open()
+        for analysis in self._analyses.values():
+            analysis.open()
 
     def close(self) -> None:
         """Close all analyses; raises what one raises."""
-        self._works.close()
+        for analysis in self._analyses.values():
+            analysis.close()
 
     def answer(self, request: dict[str, Any], blob: bytes) -> tuple[dict[str, Any], bytes]:
         """Answer one question of the relay; never raises.
@@ -71,7 +78,9 @@ class HereServer:
         Questions for one analysis are answered in turn; several threads may ask for several.
 
         Returns:
-            The answer, which goes back as it is, and an empty blob.
+            The answer, which goes back as it is, and an empty blob. It has the result as JSON
+            (`item`), the numbers of the conditions that it meets (`fired`) and `alerts`; or how
+            the analysis or a condition has `failed`.
         """
         began = time.perf_counter()
         try:
@@ -91,33 +100,97 @@ class HereServer:
         item = unpack(request.get("item"), blob)
         with self._locks[key]:
             if request.get("do") == "met":
-                return self._works.met(key, item)
+                return self._met(key, item)
             vehicle, now = unpack(request.get("vehicle")), request.get("now")
             if not isinstance(vehicle, VehicleState | None) or not isinstance(now, int):
                 raise MessageError("a question without the vehicle's state or its time")
             on: ComputeKind = "cloud" if request.get("on") == "cloud" else "edge"
-            return self._works.process(key, item, now, vehicle, on)
+            return self._process(key, item, _Context(now, vehicle, on))
 
-    def _hidden(self, item: object) -> GuestItem:
+    def _process(self, key: str, item: object, context: _Context) -> dict[str, Any]:
+        """Answer for one item; it is None for an analysis that is a source of its own."""
+        try:
+            result = self._analyses[key].process(self.revealed(item), context)
+            fired = self._fired(key, result)
+            answer = {"item": encoded(result, self._hidden), "fired": fired}
+        except Exception as error:  # noqa: BLE001 - an application's analysis may raise anything
+            answer = {"failed": failure_line(error)}
+        return {**answer, "alerts": context.alerts}
+
+    def _met(self, key: str, result: object) -> dict[str, Any]:
+        """Answer which conditions a result of an analysis elsewhere meets."""
+        try:
+            return {"fired": self._fired(key, self.revealed(result))}
+        except Exception as error:  # noqa: BLE001 - an application's condition may raise anything
+            return {"failed": failure_line(error)}
+
+    def _fired(self, key: str, result: object) -> list[int]:
+        return [
+            number
+            for number, when in enumerate(self._conditions[key])
+            if result is not None and (when is None or when(result))
+        ]
+
+    def _hidden(self, item: object) -> OpaqueItem:
         """Keep an item of the application's own class; what leaves is a number for it."""
         name = secrets.token_bytes(8)
         with self._keeping:
             self._kept[name] = item
             while len(self._kept) > _KEPT:
                 self._kept.popitem(last=False)
-        return GuestItem(type(item).__name__, plain(item), name)
+        return OpaqueItem(type(item).__name__, plain(item), name)
 
     def revealed(self, item: object) -> object:
-        """The application's own object that a GuestItem stands for; anything else as it is.
+        """The application's own object that an OpaqueItem stands for; anything else as it is.
 
         Raises MessageError for one that is no longer kept.
         """
-        if not isinstance(item, GuestItem):
+        if not isinstance(item, OpaqueItem):
             return item
         with self._keeping:
             if item.data not in self._kept:
                 raise MessageError(f"a {item.kind} that is no longer kept here")
             return self._kept[item.data]
+
+
+@dataclass
+class _Context:
+    """Services for an application's analysis, for one item."""
+
+    _now: int
+    _vehicle: VehicleState | None
+    kind: ComputeKind
+    alerts: list[dict[str, Any]] = field(default_factory=list)
+    """Alerts as JSON, which go with the result."""
+
+    def now(self) -> int:
+        """Mission time of the item, nanoseconds."""
+        return self._now
+
+    def vehicle(self) -> VehicleState | None:
+        """State of the vehicle at the item, where it may be known."""
+        return self._vehicle
+
+    def alert(self, alert: Alert) -> None:
+        """Send an alert's text and figures with the result."""
+        text = f"{alert.kind}: {alert.text}"
+        self.alerts.append({"text": text, "values": _figures(alert.values)})
+
+
+def _figures(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Figures as JSON has them: numbers and texts, and the words of anything else."""
+    figures = {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in values.items()
+    }
+    return {
+        str(name): value if type(value) in {bool, int, str} or _is_finite(value) else str(value)
+        for name, value in figures.items()
+    }
+
+
+def _is_finite(value: object) -> bool:
+    return type(value) is float and math.isfinite(value)
 
 
 def _elsewhere(result: object) -> bool:

@@ -1,8 +1,8 @@
 """Offering of an environment that is ready to start to whoever builds it without flying it.
 
-`aerodaas check`, `graph`, `compile` and `submit` and a guest's process run an application for its
-graph alone. Its file then runs up to the call that would wait for the flight: no hook runs, nothing
-starts, and what stands after that call does not run either.
+`aerodaas check`, `graph`, `compile` and `submit` run an application for its graph alone. Its file
+then runs up to the call that would wait for the flight: no hook runs, nothing starts, and what
+stands after that call does not run either.
 """
 
 from __future__ import annotations

@@ -146,11 +146,10 @@ class Robot(PaperNames, IRobot):
     ) -> None:
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
-        With `wait=False`, return as soon as it flies; as a guest of another application, which
-        flies, at once. While the mission flies, this waits for it; after its end, it flies again:
-        the navigation given to `navigate` since, or else the same. `speed` is that of
-        `Environment.start_mission`. Raises the project's errors; whatever happens, the drone is
-        landed and the recording closed first.
+        With `wait=False`, return as soon as it flies. While the mission flies, this waits for it;
+        after its end, it flies again: the navigation given to `navigate` since, or else the same.
+        `speed` is that of `Environment.start_mission`. Raises the project's errors; whatever
+        happens, the drone is landed and the recording closed first.
         """
         self._environment.start_mission(hook, wait=wait, speed=speed)
 

@@ -37,7 +37,6 @@ from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import Answer, Command, End
 from aerodaas.ros.link import require_dds
 from aerodaas.runtime.checks import check_served
-from aerodaas.runtime.stream_names import is_guest_actor
 
 if TYPE_CHECKING:
     from aerodaas.actors.run.flight import Flight
@@ -162,8 +161,6 @@ class Run:
                 )
             return reader
 
-        for note in self._environment.guest_notes:
-            flight.note(note.kind, note.text)
         for text in self.graph.unused:
             flight.note("unused", text)
         self.graph.reader = read
@@ -536,16 +533,11 @@ class Run:
 
     def _raise_problems(self) -> None:
         assert self._flight is not None  # noqa: S101 - launched
-        # A guest's failures are its own: they are alerts, and do not fail its owner's run.
-        problems = [
-            str(report.error)
-            for name, report in self._flight.reports().items()
-            if report.error and not is_guest_actor(name)
-        ]
+        reports = self._flight.reports().values()
+        problems = [str(report.error) for report in reports if report.error]
         problems += [
             line
-            for name, report in self._flight.reports().items()
-            if not is_guest_actor(name)
+            for report in reports
             for line in (*report.values.get("last_errors", ()), *report.problems)
         ]
         robots = self.state.robots if self.state else {}

@@ -1,4 +1,4 @@
-"""Where an environment comes from: a file, a provider's catalogue, a recording, a grant."""
+"""Where an environment comes from: a file, a provider's catalogue, a recording."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ class EnvironmentSource:
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
-        if options.catalogue is not None:
-            config = options.catalogue.config
-        elif options.replay is None:
+        if options.replay is None:
             given = options.config or EnvironmentConfig.load(file)
             config = overridden(given, settings)
         else:
@@ -88,5 +86,5 @@ def _url(path: str | Path, options: RunOptions) -> str | None:
     """The provider to ask; None where the environment is another."""
     if options.provider.url is not None:
         return options.provider.url
-    given = options.environment or options.config or options.catalogue or options.replay
+    given = options.environment or options.config or options.replay
     return str(path) if given is None and is_url(path) else None

@@ -18,11 +18,9 @@ __all__ = [
     "secrets_of",
     "shared_pickle",
     "valued",
-    "without_secrets",
 ]
 
 C = TypeVar("C", bound=type[Any])
-R = TypeVar("R")
 SECRET: Mapping[str, bool] = {"secret": True}
 """Metadata of a dataclass' field that is recorded nowhere, and never sent to others."""
 _PLAIN = frozenset({bool, float, int, str})
@@ -59,14 +57,6 @@ def secrets_of(cls: type) -> frozenset[str]:
     """Names of a class' fields that are `SECRET`; none of what is no dataclass."""
     fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
     return frozenset(one.name for one in fields if one.metadata.get("secret"))
-
-
-def without_secrets(record: R) -> R:
-    """The same record for others to see: each field that is `SECRET` has its default."""
-    kind: Any = type(record)
-    secret = secrets_of(kind)
-    defaults = {one.name: one.default for one in dataclasses.fields(kind) if one.name in secret}
-    return dataclasses.replace(record, **defaults)  # type: ignore[type-var]
 
 
 def valued(cls: C) -> C:

@@ -7,7 +7,6 @@ from typing import Any
 
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import (
     ComputeConfig,
     RobotConfig,
@@ -43,7 +42,6 @@ from aerodaas.runtime.stream_names import (
     alert_stream,
     done_stream,
     end_stream,
-    guest_actor,
     state_stream,
     task_stream,
     trigger_stream,
@@ -334,12 +332,11 @@ class _Planner:
 
         Those of one place share one. Apart are `isolated` analyses, those with an environment of
         their own, those that the dispatcher manages (an executor that hangs keeps no camera
-        waiting), cameras that decode what a stranger may send, and each guest's analyses.
+        waiting), and cameras that decode what a stranger may send.
         """
         cameras: dict[Placement, list[CameraSpec]] = {}
         analyses: dict[Placement, list[AnalysisSpec]] = {}
         managed: dict[Placement, list[AnalysisSpec]] = {}
-        guests: dict[str, list[AnalysisSpec]] = {}
         apart = []
         for camera in self.cameras():
             if self.is_confined(camera):
@@ -352,9 +349,7 @@ class _Planner:
                 self.analysis_spec(node),
                 self.place_of(node),
             )
-            if isinstance(node.work, GuestAnalysis):
-                guests.setdefault(node.work.guest, []).append(spec)
-            elif node.work.isolated or env is not None:
+            if node.work.isolated or env is not None:
                 apart.append(ActorPlan(f"analytics/{node.id}", place, (), (spec,), env))
             else:
                 group = managed if self.is_managed(node) else analyses
@@ -362,11 +357,6 @@ class _Planner:
         apart += [
             ActorPlan(f"analytics/{place.node or place.kind}", place, (), tuple(specs))
             for place, specs in managed.items()
-        ]
-        # Never beside the owner's or another guest's: one's end is that of its actor.
-        apart += [
-            ActorPlan(guest_actor(guest), self.edge_of(None), (), tuple(specs))
-            for guest, specs in guests.items()
         ]
         home = [Placement()] if self.recorded else []
         places: list[Placement] = list(dict.fromkeys([*cameras, *analyses, *home]))

@@ -9,8 +9,6 @@ __all__ = [
     "alert_stream",
     "done_stream",
     "end_stream",
-    "guest_actor",
-    "is_guest_actor",
     "photo_stream",
     "reply_stream",
     "request_stream",
@@ -25,7 +23,6 @@ __all__ = [
 
 DECISIONS = f"{INTERNAL}decisions"
 """Stream of the analytics scheduler's decisions and their outcomes."""
-_GUESTS = "guest/"
 
 
 def state_stream(robot: str) -> str:
@@ -81,16 +78,6 @@ def done_stream(node: str) -> str:
 def alert_stream(actor: str) -> str:
     """Name of the stream of a part's alerts; in real time a part is an actor."""
     return f"{INTERNAL}alerts/{actor}"
-
-
-def guest_actor(guest: str) -> str:
-    """Name of the actor of a guest's analyses."""
-    return f"{_GUESTS}{guest}"
-
-
-def is_guest_actor(actor: str) -> bool:
-    """Whether an actor of this name runs a guest's analyses."""
-    return actor.startswith(_GUESTS)
 
 
 def vitals_stream(actor: str) -> str:

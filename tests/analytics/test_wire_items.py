@@ -27,12 +27,12 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.mission import BatteryOutlook, Decision, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.schema import MessageError, json_of
 from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import (
     NavigationType,
@@ -130,7 +130,7 @@ nested = st.recursive(
     ),
     max_leaves=8,
 )
-hidden = st.builds(GuestItem, st.just("Own"), st.none() | st.text(max_size=4), st.binary())
+hidden = st.builds(OpaqueItem, st.just("Own"), st.none() | st.text(max_size=4), st.binary())
 items: st.SearchStrategy[object] = st.one_of(
     *(nested, headers, odometry, batteries, detections, states, statuses, readings, alerts),
     *(decisions, waypoints, commands, hidden),
@@ -186,14 +186,14 @@ class Level(str, enum.Enum):
 @pytest.mark.parametrize("item", [Seen(2), Level.HIGH, [Seen(2)]])
 def test_a_tuple_or_text_of_another_class_stays_with_its_author(item: object) -> None:
     """Its class would be lost on the way."""
-    hidden = GuestItem("Own", None, b"")
+    hidden = OpaqueItem("Own", None, b"")
     assert decoded(encoded(item, lambda _: hidden)) == hidden
 
 
 def test_a_hidden_item_may_stand_among_others() -> None:
     """As an answer that is handed on has it."""
-    item = [1, GuestItem("Own", None, b"x")]
-    assert decoded(encoded(item, lambda _: GuestItem("Other", None, b""))) == item
+    item = [1, OpaqueItem("Own", None, b"x")]
+    assert decoded(encoded(item, lambda _: OpaqueItem("Other", None, b""))) == item
 
 
 def kinds(hint: Any) -> Iterator[Any]:  # noqa: ANN401 - an annotation
@@ -304,6 +304,51 @@ def test_no_other_class_goes_over_the_wire(item: object) -> None:
     """It is refused, and never pickled."""
     with pytest.raises(MessageError, match="no class that goes over the wire"):
         pack(item)
+
+
+ALERT = json_of(Alert(Header(3, 4, "drone/cam"), "a", "b"))
+
+
+def deep(levels: int) -> Any:  # noqa: ANN401 - JSON
+    """Lists in lists."""
+    content: Any = 1
+    for _ in range(levels):
+        content = [content]
+    return content
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"is": "Popen", "of": {"args": "true"}},
+        {"is": "Waypoint", "of": {"id": "a", "x": float("nan"), "y": 0, "z": 0}},
+        {"is": "Waypoint", "of": {"id": "a", "x": 10**400, "y": 0, "z": 0}},
+        {"is": "Waypoint", "of": {"id": "a", "x": "1", "y": 0, "z": 0}},
+        {"is": "Waypoint", "of": {"id": "a", "x": 1, "y": 0, "z": 0, "__class__": 1}},
+        {"is": "Waypoint", "of": {}},
+        {"is": "AeroNavigation", "of": [1.0], "scheduling": "ordered"},
+        {"is": "AeroNavigation", "of": []},
+        {"is": "array", "type": "O", "shape": [1], "data": ""},
+        {"is": "array", "type": "<f8", "shape": [2**62], "data": ""},
+        {"is": "array", "type": "<f8", "shape": [-1], "data": ""},
+        {"is": "OpaqueItem", "kind": "a b", "value": 1, "data": ""},
+        {"is": "Readings", "of": {"stamp": 1, "values": {"a": []}}},
+        [0] * 200_000,
+        {"is": []},
+        deep(40),
+        {
+            "is": "Alert",
+            "of": {
+                **json_of(Alert(Header(3, 4, "drone/cam"), "a", "b")),
+                "values": {"a": [0] * 200_000},
+            },
+        },
+    ],
+)
+def test_malformed_items_are_refused(content: object) -> None:
+    """By one error."""
+    with pytest.raises(MessageError):
+        decoded(content)
 
 
 @given(items | frames(), st.randoms(use_true_random=False))

@@ -10,10 +10,7 @@ import pytest
 from flying import FLAT, robot
 
 from aerodaas.cli.app import main
-from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.document.flying import compile_application
-from aerodaas.environment.environment import Environment
-from aerodaas.environment.guests import admit_guests
 from aerodaas.errors import GraphError
 
 APPLICATION = """
@@ -112,42 +109,3 @@ def test_a_document_is_refused_without_running_a_hook(
     assert (code, ran) == (2, ["constructor"])
     with pytest.raises(GraphError, match="no hooks of on_start, on_end or start_mission"):
         compile_application(Path("app.py"), [])
-
-
-def admission(text: str, folder: Path) -> list[str]:
-    """Why a guest with this file was left out."""
-    (folder / "guest").mkdir()
-    guest = folder / "guest" / "theirs.py"
-    guest.write_text(text)
-    (folder / "environment.json").write_text(json.dumps({**FLAT, "robots": [robot()]}))
-    options = RunOptions(guests=(guest,), grants={"theirs": ("fly:drone",)}, view=False)
-    token = current_options.set(options)
-    try:
-        env = Environment(folder / "environment.json")
-        notes = admit_guests(options, env)
-    finally:
-        current_options.reset(token)
-    return [note.text for note in notes if note.kind == "guest_refused"]
-
-
-GUEST = """
-from pathlib import Path
-from aerodaas import AeroListData, Environment, Waypoint
-
-drone = Environment("environment.json").get_robot_by_id("drone")
-drone.navigate(AeroListData([Waypoint("a", 2, 0, 2)]))
-"""
-
-
-def test_a_guests_hooks_never_run(tmp_path: Path) -> None:
-    """Its file ends before the flight: it is refused, as with a callback, before one has run."""
-    hooked = GUEST + 'drone.start_mission(lambda: Path("hook").touch())\n'
-    (refused,) = admission(hooked, tmp_path)
-    assert "would never run" in refused
-    assert not list(tmp_path.rglob("hook"))
-
-
-def test_a_guests_file_ends_at_its_start(tmp_path: Path) -> None:
-    """What stands below belongs to the time after a flight."""
-    assert admission(GUEST + 'drone.start_mission()\nPath("later").touch()\n', tmp_path) == []
-    assert not list(tmp_path.rglob("later"))

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.here_server import HereServer
@@ -41,7 +41,7 @@ def main() -> None:
     while True:
         try:
             request, blob = channel.receive()
-        except GuestError:
+        except ChannelError:
             break
         answer, rest = server.answer(request, blob)
         count += 1

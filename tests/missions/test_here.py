@@ -18,8 +18,8 @@ import pytest
 from flying import FLAT, Flyer, recorded
 
 from aerodaas import Environment
-from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.here.analysis import HereSite
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.document.building import build_mission
@@ -108,7 +108,7 @@ class User:
         user = relay.attach(self._channel.send)
 
         def listen() -> None:
-            with suppress(GuestError):
+            with suppress(ChannelError):
                 while True:
                     user.answered(*self._channel.receive())
             user.detach()

@@ -166,11 +166,11 @@ def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """As many at once as the provider has cores; nobody waits for all that others have sent."""
     made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
     made.store.tenants.add(Tenant("city"))
-    made.store.accounts.add(Account("guest", "city", Role.PILOT, frozenset(Scope), 0.0))
+    made.store.accounts.add(Account("warden", "city", Role.PILOT, frozenset(Scope), 0.0))
     farm = [made.submit("one") for _ in range(3)]
     made.turns(1)
     city = made.desk.submit(
-        replace(PILOT, account="guest", tenant="city"),
+        replace(PILOT, account="warden", tenant="city"),
         MissionIn.model_validate({"document": document("two", (5, 0))}),
     )
     made.turns()

@@ -1,4 +1,4 @@
-"""Schedulers, cameras, conditions, sources and guests of a stranger's own, wherever they lie."""
+"""Schedulers, cameras, conditions and sources of a stranger's own, wherever they lie."""
 
 from __future__ import annotations
 
@@ -113,28 +113,6 @@ class Square:
     value: float
     of: str
 """
-GUEST = """
-class Reading:
-    def __init__(self, red):
-        self.red = red
-
-
-class Red(Analytics[Reading]):
-    def process(self, item, context):
-        return Reading(float(item.image[..., 0].mean()))
-
-
-class Twice(Analytics[Reading]):
-    isolated = True
-
-    def process(self, item, context):
-        assert isinstance(item, Reading)
-        return Reading(2 * item.red)
-
-
-Twice().deploy(edge).analyse(Red().deploy(edge).analyse(camera))
-drone.start_mission()
-"""
 
 
 def environment(**camera: Any) -> dict[str, Any]:  # noqa: ANN401
@@ -146,9 +124,8 @@ def environment(**camera: Any) -> dict[str, Any]:  # noqa: ANN401
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
-    """One flight in simulated time with plug-ins of every kind that it has, and a guest."""
+    """One flight in simulated time with plug-ins of every kind that it has."""
     folder = tmp_path_factory.mktemp("plugins")
-    guests = folder / "elsewhere"
     write(
         folder,
         {
@@ -159,9 +136,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
         },
         environment(driver="all_of_them:Stripes", settings={"light": 120}),
     )
-    write(guests, {"guest.py": HEAD + GUEST})
-    granted = ("--grant", "guest=sense:camera,compute")
-    return fly(folder, "all_of_them.py", "--guest", "elsewhere/guest.py", *granted)
+    return fly(folder, "all_of_them.py")
 
 
 def test_all_of_them_fly(flown: Flown) -> None:
@@ -177,10 +152,8 @@ def test_all_of_them_fly(flown: Flown) -> None:
         ("drone/measure", ("Reading", {"value": 120.0})),
         ("drone/woken", ("Reading", {"value": -120.0})),
         ("drone/squared", ("Square", {"value": 14400.0, "of": "Reading"})),
-        ("drone/guest_red", ("Reading", {"red": 120.0})),
-        ("drone/guest_twice", ("Reading", {"red": 240.0})),
     ],
-    ids=["camera and scheduler", "condition", "plug-in folder", "guest", "guest of two processes"],
+    ids=["camera and scheduler", "condition", "plug-in folder"],
 )
 def test_what_they_made_is_recorded(
     flown: Flown, stream: str, expected: tuple[str, object]

@@ -1,7 +1,8 @@
 """HereAnalysis: stands for an analysis at the user's side in a provider's graph, and asks it.
 
 It is the work of a node. Its `process` sends the item to the flight's relay and waits for the
-answer; a user's side that is missing or slow yields no results, which is told once.
+answer, which is checked. A user's side that is missing or slow yields no results, which is told
+once.
 """
 
 from __future__ import annotations
@@ -13,19 +14,30 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.analytics.guests.answers import AnswerReader
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
+from aerodaas.analytics.item_json import decoded
 from aerodaas.analytics.wire_items import pack
 from aerodaas.errors import ModelError
-from aerodaas.messages.readings import Readings
+from aerodaas.messages.frames import Header
+from aerodaas.messages.opaque_item import OpaqueItem
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.schema import MessageError
 
-__all__ = ["HERE", "HereAnalysis", "HereConditions", "HereSite"]
+__all__ = ["AnsweredCondition", "HereAnalysis", "HereConditions", "HereSite"]
 
-HERE = "here"
-"""The user's side as an author of answers, and the kind of its alerts."""
+_HERE = "here"
+"""Source and kind of the alerts of the user's side."""
 _ITEM = 4.0
 """Wall seconds for one item; longer than the relay waits, and shorter than the alert of a hung
 analysis."""
+_ALERTS = 100
+"""Most alerts of one analysis in a flight."""
+_FIGURES = 32
+"""Most figures of one alert."""
+_TEXT = 500
+"""Most characters of an alert, a figure's name or text, and a failure."""
+_fired: dict[str, frozenset[int]] = {}
+"""Triggers whose condition the newest result met, by the analysis' id."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +48,21 @@ class HereSite:
     """The relay's Unix socket, on the machine of the flight's process."""
     lossless: bool = False
     """Send frames as PNG rather than JPEG; a flight in simulated time is repeatable only so."""
+
+
+@dataclass(frozen=True)
+class AnsweredCondition:
+    """Condition of a trigger that the user's side has evaluated with its result."""
+
+    key: str
+    """Id of the analysis in the document."""
+    number: int
+    """Number of the trigger among the analysis' own, from 0."""
+
+    def __call__(self, result: object) -> bool:
+        """Whether the newest result met it."""
+        del result
+        return self.number in _fired.get(self.key, ())
 
 
 class HereAnalysis(Analytics[Any]):
@@ -58,9 +85,9 @@ class HereAnalysis(Analytics[Any]):
         self.item = produces
         self.sees_vehicle = sees_vehicle
         self._site = site
-        self._answers = AnswerReader(HERE, key, produces, kind=HERE, title="the user's side")
         self._channel: Channel | None = None
         self._told = False
+        self._alerts = 0
 
     def open(self) -> None:
         """Connect to the relay; raises ModelError if it is not on this machine."""
@@ -73,8 +100,12 @@ class HereAnalysis(Analytics[Any]):
             ) from None
 
     def process(self, item: Any, context: Context) -> Any:  # noqa: ANN401 - any result
-        """Ask the user's side; None, and an error once, while it does not answer."""
-        self._answers.forget()
+        """Ask the user's side; None, and an error once, while it does not answer.
+
+        Raises ModelError for a failure there, MessageError for a malformed result or one of
+        another class than was declared.
+        """
+        _fired.pop(self.key, None)
         content, blob = pack(item, lossless=self._site.lossless)
         vehicle, _ = pack(context.vehicle() if self.sees_vehicle else None)
         request = {
@@ -101,7 +132,39 @@ class HereAnalysis(Analytics[Any]):
             self._channel.close()
 
     def _result(self, answer: dict[str, Any], context: Context) -> Any:  # noqa: ANN401
-        return self._answers.read(answer, context)
+        """Publish the answer's alerts and return its result, both checked."""
+        for text, figures in _alerts(answer.get("alerts")):
+            self._publish_alert(text, figures, context)
+        failed = answer.get("failed")
+        if failed:
+            raise ModelError(f"the user's side: {str(failed)[:_TEXT]}")
+        result = decoded(answer.get("item"))
+        if not self._is_declared(result):
+            raise MessageError(
+                f"the user's side: {self.key} declares {self.item.__name__} and sent "
+                f"{_class_name(result)}"
+            )
+        fired = answer.get("fired")
+        numbers = fired if isinstance(fired, list) else []
+        _fired[self.key] = frozenset(number for number in numbers if type(number) is int)
+        return result
+
+    def _publish_alert(self, text: str, figures: dict[str, Any], context: Context) -> None:
+        self._alerts += 1
+        if self._alerts > _ALERTS + 1:
+            return
+        if self._alerts > _ALERTS:
+            text = (
+                f"{self.key} has told {_ALERTS} alerts, the most of one analysis: its next ones "
+                "are left out"
+            )
+            figures = {}
+        header = Header(self._alerts, context.now(), _HERE)
+        context.alert(Alert(header, _HERE, f"{_HERE}: {text}", figures))
+
+    def _is_declared(self, result: object) -> bool:
+        declared = (int, float) if self.item is float else self.item
+        return result is None or isinstance(result, declared)
 
     def _connected(self) -> Channel:
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -118,7 +181,7 @@ class HereAnalysis(Analytics[Any]):
                 self._channel = self._connected()
             self._channel.send(request, blob, _ITEM)
             answer, _ = self._channel.receive(_ITEM)
-        except (GuestError, OSError) as error:
+        except (ChannelError, OSError) as error:
             # The next answer on this connection could be that to the last question.
             with contextlib.suppress(OSError):
                 if self._channel is not None:
@@ -138,6 +201,31 @@ class HereConditions(HereAnalysis):
     _asks = "met"
 
     def _result(self, answer: dict[str, Any], context: Context) -> Readings | None:
-        self._answers.read(answer, context)
+        super()._result(answer, context)
         met = len(answer.get("fired", ()))
         return Readings(context.now(), {"met": met}) if met else None
+
+
+def _class_name(result: object) -> str:
+    if not isinstance(result, OpaqueItem):
+        return type(result).__name__
+    return (
+        f"{result.kind} of the application's own, or one that holds an object of a class of its "
+        "own: send those of AeroDaaS, or declare object"
+    )
+
+
+def _alerts(content: object) -> list[tuple[str, dict[str, Any]]]:
+    """Texts and figures of alerts; what is no alert's JSON is its own text."""
+    alerts = content if isinstance(content, list) else []
+    parts = [one if isinstance(one, dict) else {"text": one} for one in alerts]
+    return [(str(one.get("text"))[:_TEXT], _figures(one.get("values"))) for one in parts]
+
+
+def _figures(content: object) -> dict[str, Any]:
+    pairs = list(content.items())[:_FIGURES] if isinstance(content, dict) else []
+    return {
+        name[:_TEXT]: value[:_TEXT] if isinstance(value, str) else value
+        for name, value in pairs
+        if isinstance(name, str) and isinstance(value, bool | int | float | str)
+    }

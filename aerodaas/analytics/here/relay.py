@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.errors import ConfigError
 
 __all__ = ["LARGEST_ANSWER", "HereRelay", "HereTimes", "HereUser", "Send", "oversize"]
@@ -239,7 +239,7 @@ class HereRelay:
             while True:
                 request, blob = channel.receive()
                 channel.send(self.ask(request, blob))
-        except GuestError:
+        except ChannelError:
             return
         finally:
             with self._lock:

@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.base import Analytics
-from aerodaas.analytics.guests.answers import AnsweredCondition
-from aerodaas.analytics.here.analysis import HERE, HereAnalysis, HereConditions, HereSite
+from aerodaas.analytics.here.analysis import (
+    AnsweredCondition,
+    HereAnalysis,
+    HereConditions,
+    HereSite,
+)
 from aerodaas.config.checked import checked
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import current_options
@@ -142,9 +146,7 @@ class _Builder:
         for number, one in enumerate(entry.triggers):
             if one.at_users_side:
                 watch = watch or self._conditions(entry.id)
-                watch.trigger(
-                    self._target(entry.id, one), AnsweredCondition(HERE, entry.id, number)
-                )
+                watch.trigger(self._target(entry.id, one), AnsweredCondition(entry.id, number))
             else:
                 when = None if one.when is None else self._values.value(one.when, entry.id)
                 source.trigger(self._target(entry.id, one), when)

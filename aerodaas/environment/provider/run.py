@@ -58,7 +58,6 @@ _OWN = (
     "simulated_time",
     "scheduler",
     "model",
-    "guests",
 )
 """Options of a run by one's own runtime."""
 

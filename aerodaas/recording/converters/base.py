@@ -13,7 +13,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import RecordingConfig
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.envelope import Message
-from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.rotation import Rotation
@@ -57,8 +57,8 @@ def convert(item: object, message: Message[Any], session: Session) -> Iterator[E
     value = {
         "stamp": message.header.stamp,
         "source": message.header.source,
-        "type": item.kind if isinstance(item, GuestItem) else type(item).__name__,
-        "value": plain(item.value if isinstance(item, GuestItem) else item),
+        "type": item.kind if isinstance(item, OpaqueItem) else type(item).__name__,
+        "value": plain(item.value if isinstance(item, OpaqueItem) else item),
     }
     yield Entry(topic(message.stream, "value"), VALUE, json_bytes(value))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.analytics.base import Analytics
-from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
 from aerodaas.dataflow.graph import Node
 from aerodaas.runtime.dispatch.frame_codec import Codec
@@ -42,8 +41,6 @@ def allowed(node: Node, compute: Mapping[str, ComputeConfig]) -> list[ComputeCon
     The one that it is deployed on; if deployed on an edge, every cloud node, and every endpoint
     that has a model for it.
     """
-    if isinstance(node.work, GuestAnalysis):
-        return []  # the guest's process is on the edge
     own = compute[node.compute] if node.compute is not None else None
     if own is not None and own.kind != "edge":
         return [own]

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 from pydantic import ValidationError
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.clock import host_time_ns, seconds
@@ -147,7 +147,7 @@ class ControlServer:
                     watching[purpose](channel, first)
                 finally:
                     self._watching.release()
-        except (GuestError, OSError):
+        except (ChannelError, OSError):
             return
         except Exception:  # noqa: BLE001 - a mistake, which is told of
             _log.exception("what was asked for at the flight's control socket failed")
@@ -273,7 +273,7 @@ class ControlServer:
         gone = threading.Event()
 
         def ask() -> None:
-            with contextlib.suppress(GuestError):
+            with contextlib.suppress(ChannelError):
                 while not gone.is_set():
                     with contextlib.suppress(queue.Empty):
                         question, blob = questions.get(timeout=0.5)

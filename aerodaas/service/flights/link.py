@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.errors import ConfigError, MissionError
@@ -129,7 +129,7 @@ class FlightLink:
                 lane.channel.send(request, timeout=_ANSWER_SECONDS)
                 answer, _ = lane.channel.receive(_ANSWER_SECONDS)
                 return AnswerOut.model_validate(answer)
-            except (GuestError, OSError, ValidationError) as error:
+            except (ChannelError, OSError, ValidationError) as error:
                 lane.drop()
                 raise MissionError(f"the flight's process does not answer: {error}") from None
 
@@ -143,7 +143,7 @@ class FlightLink:
         """
         try:
             channel = self._connected("items", stream=stream, form=form.value)
-        except (GuestError, OSError) as error:
+        except (ChannelError, OSError) as error:
             raise MissionError(f"the flight's process does not answer: {error}") from None
         with contextlib.closing(channel):
             first, _ = self._received(channel)
@@ -156,7 +156,7 @@ class FlightLink:
     def _received(self, channel: Channel) -> tuple[dict[str, Any], bytes]:
         try:
             return channel.receive(_SILENT_SECONDS)
-        except GuestError as error:
+        except ChannelError as error:
             raise MissionError(f"the flight's stream has ended: {error}") from None
 
     def _connected(self, purpose: str, **more: str) -> Channel:
@@ -176,7 +176,7 @@ class FlightLink:
         while not self._closed.is_set():
             try:
                 self._follow_once()
-            except (GuestError, OSError):
+            except (ChannelError, OSError):
                 pass  # Before the process listens and after its end there is nobody to connect to.
             except Exception as error:  # noqa: BLE001 - news that are not as agreed, of any kind
                 trouble.tell(f"{self._folder.path.name}: its news cannot be read", error)

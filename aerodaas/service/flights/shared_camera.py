@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.cameras.base import Picture
 from aerodaas.config.checked import checked
@@ -71,7 +71,7 @@ class SharedCamera:
             wanted = {"for": "share", "mission": settings.mission, "stream": settings.stream}
             self._channel.send(wanted, timeout=_CONNECT_SECONDS)
             answer, _ = self._channel.receive(_CONNECT_SECONDS)
-        except (OSError, GuestError) as error:
+        except (OSError, ChannelError) as error:
             connection.close()
             raise SourceError(f"{settings.stream}: its flight does not answer: {error}") from None
         if "refused" in answer:
@@ -99,7 +99,7 @@ class SharedCamera:
             if not message:
                 return None
             item = unpack(message.get("item"), blob)
-        except GuestError:
+        except ChannelError:
             self.finished = True
             return None
         except MessageError:

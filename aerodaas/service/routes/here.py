@@ -7,7 +7,7 @@ import contextlib
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
-from aerodaas.analytics.guests.channel import GuestError
+from aerodaas.analytics.here.channel import ChannelError
 from aerodaas.console.jobs import end_jobs
 from aerodaas.console.live import until_refused
 from aerodaas.errors import AeroDaaSError
@@ -78,7 +78,7 @@ class HereRoutes:
             folder = self._desk.flight(mission)
             if folder is not None:
                 # The flight may not have begun to listen, or have ended.
-                with contextlib.suppress(GuestError):
+                with contextlib.suppress(ChannelError):
                     await user.be_asked(folder)
             await asyncio.sleep(_AGAIN_SECONDS)
 
@@ -91,7 +91,7 @@ class _User:
         self._channel: AsyncChannel | None = None
 
     async def be_asked(self, folder: FlightFolder) -> None:
-        """Carry questions to the user; raises GuestError when the flight has ended."""
+        """Carry questions to the user; raises ChannelError when the flight has ended."""
         channel = self._channel = await AsyncChannel.connect(folder, "here")
         try:
             while True:
@@ -112,5 +112,5 @@ class _User:
         while True:
             answer = (await self._socket.receive_text()).encode()
             if self._channel is not None:
-                with contextlib.suppress(GuestError):
+                with contextlib.suppress(ChannelError):
                     await self._channel.send(answer)

@@ -17,8 +17,8 @@ from aerodaas.environment.provider.here import HereLink
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.guest_item import GuestItem
 from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.schema import MessageError
 from aerodaas.protocol.schemas import MissionPhase
 
@@ -164,11 +164,11 @@ def test_the_applications_own_items_are_its_own_again(client: ProviderClient, st
     own = object()
 
     def revealed(item: object) -> object:
-        if isinstance(item, GuestItem) and item.data == b"2":
+        if isinstance(item, OpaqueItem) and item.data == b"2":
             raise MessageError("an Own that is no longer kept here")
-        return own if isinstance(item, GuestItem) else item
+        return own if isinstance(item, OpaqueItem) else item
 
-    stub.items = heads(GuestItem("Own", 1, b"2"), GuestItem("Own", 1, b"1"), "well")
+    stub.items = heads(OpaqueItem("Own", 1, b"2"), OpaqueItem("Own", 1, b"1"), "well")
     follower = following(client)
     with pytest.warns(UserWarning, match="left out: an Own that is no longer kept here"):
         found = WireReader(client, follower, "drone/own", revealed).next(SECONDS)

@@ -140,10 +140,10 @@ class Flight:
 
 @pytest.fixture
 def flight() -> Iterator[Flight]:
-    """A flight that shares its camera with the mission `guest`."""
+    """A flight that shares its camera with the mission `crowd`."""
     with tempfile.TemporaryDirectory(prefix="share-", dir="/tmp") as folder:
         made = Flight(Path(folder))
-        made.link.ask(do="share", mission="guest", streams=["one/cam"])
+        made.link.ask(do="share", mission="crowd", streams=["one/cam"])
         yield made
         made.close()
 
@@ -170,7 +170,7 @@ def test_the_list_before_take_off_goes_to_the_service(flight: Flight) -> None:
 
 def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight) -> None:
     """A reader that stands still costs the flight nothing."""
-    camera = flight.camera("guest")
+    camera = flight.camera("crowd")
     camera.open()
     first, second = camera.capture(10**10, None), camera.capture(10**10, None)
     assert first is not None
@@ -184,21 +184,21 @@ def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight
 
 def test_what_is_withdrawn_ends_with_the_next_picture(flight: Flight) -> None:
     """The flight itself sends no more, and opens no more."""
-    camera = flight.camera("guest")
+    camera = flight.camera("crowd")
     camera.open()
     assert camera.capture(0, None) is not None
-    assert flight.link.ask(do="withdraw", mission="guest").accepted
+    assert flight.link.ask(do="withdraw", mission="crowd").accepted
     assert camera.capture(0, None) is None
     assert camera.finished
-    with pytest.raises(SourceError, match="one/cam is not shared with guest"):
-        flight.camera("guest").open()
+    with pytest.raises(SourceError, match="one/cam is not shared with crowd"):
+        flight.camera("crowd").open()
 
 
 @pytest.mark.parametrize(
     ("mission", "stream", "told"),
     [
         ("stranger", "one/cam", "one/cam is not shared with stranger"),
-        ("guest", "one/belly", "one/belly is not shared with guest"),
+        ("crowd", "one/belly", "one/belly is not shared with crowd"),
     ],
 )
 def test_what_is_not_shared_is_refused_by_the_flight(
@@ -302,12 +302,12 @@ def _shows(view: Any) -> bool:  # noqa: ANN401 - a generator
 
 def test_a_camera_ends_with_its_flight(flight: Flight) -> None:
     """However that ends."""
-    camera = flight.camera("guest")
+    camera = flight.camera("crowd")
     camera.open()
     flight.over = True
     assert camera.capture(0, None) is None
     assert camera.finished
-    late = flight.camera("guest")
+    late = flight.camera("crowd")
     flight.close()
     with pytest.raises(SourceError, match="its flight does not answer"):
         late.open()
@@ -320,13 +320,13 @@ def test_nothing_is_shared_once_the_drones_come_home(flight: Flight) -> None:
     assert (answer.accepted, answer.text) == (False, "the drones come home: the lease has ended")
     with pytest.raises(SourceError, match="not shared with late"):
         flight.camera("late").open()
-    assert flight.link.ask(do="withdraw", mission="guest").accepted
+    assert flight.link.ask(do="withdraw", mission="crowd").accepted
 
 
 def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
     """No address, driver or setting of a vehicle; no camera that is not shared."""
     to = Attached(mission="m", control=Path("control"), sensors=["one/cam"])
-    config = attached_config(EnvironmentConfig.model_validate(FLEET), to, "guest")
+    config = attached_config(EnvironmentConfig.model_validate(FLEET), to, "crowd")
     assert [robot.id for robot in config.robots] == ["one"]
     assert [one.full_id for one in config.all_sensors()] == ["one/cam"]
     text = config.model_dump_json()
@@ -337,7 +337,7 @@ def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
 def test_readers_do_not_wait_for_each_other(flight: Flight) -> None:
     """One that has asked and does not take its picture holds up nobody."""
     flight.link.ask(do="share", mission="slow", streams=["one/cam"])
-    slow, quick = flight.camera("slow"), flight.camera("guest")
+    slow, quick = flight.camera("slow"), flight.camera("crowd")
     slow.open()
     quick.open()
     assert slow._channel is not None

@@ -1,4 +1,4 @@
-"""Channel of bounded messages between an owner's process and a guest's: JSON and one blob each."""
+"""Channel: bounded messages over a Unix socket, of JSON and one blob each."""
 
 from __future__ import annotations
 
@@ -10,59 +10,59 @@ from typing import Any
 
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["HEAD", "LARGEST_BLOB", "LARGEST_TEXT", "Channel", "GuestError"]
+__all__ = ["HEAD", "LARGEST_TEXT", "Channel", "ChannelError"]
 
 LARGEST_TEXT = 4 << 20
 """Bytes of a message's JSON."""
-LARGEST_BLOB = 64 << 20
-"""Bytes of a message's blob: a program with its models, or a picture."""
+_LARGEST_BLOB = 64 << 20
+"""Bytes of a message's blob: a picture."""
 HEAD = struct.Struct("<II")
 """Before each message: bytes of its JSON, and of its blob."""
 
 
-class GuestError(AeroDaaSError):
-    """A guest's process has ended, is silent, or sent what is no valid message."""
+class ChannelError(AeroDaaSError):
+    """The other process has ended, is silent, or sent what is no valid message."""
 
 
 class Channel:
-    """One end of a Unix socket pair."""
+    """One end of a connection."""
 
     def __init__(self, connection: socket.socket) -> None:
         """Exchange messages over `connection`."""
         self._socket = connection
 
     def send(self, text: dict[str, Any], blob: bytes = b"", timeout: float | None = None) -> None:
-        """Send one message; raises GuestError if it is too large or not taken in time."""
+        """Send one message; raises ChannelError if it is too large or not taken in time."""
         data = json.dumps(text).encode()
-        if len(data) > LARGEST_TEXT or len(blob) > LARGEST_BLOB:
-            raise GuestError(f"a message of {len(data)} and {len(blob)} bytes is too large")
+        if len(data) > LARGEST_TEXT or len(blob) > _LARGEST_BLOB:
+            raise ChannelError(f"a message of {len(data)} and {len(blob)} bytes is too large")
         try:
             self._socket.settimeout(timeout)
             self._socket.sendall(HEAD.pack(len(data), len(blob)) + data + blob)
         except TimeoutError:
-            raise GuestError(f"took no message for {timeout:g} s") from None
+            raise ChannelError(f"took no message for {timeout:g} s") from None
         except OSError as error:
-            raise GuestError(f"its process has ended ({error.strerror})") from None
+            raise ChannelError(f"its process has ended ({error.strerror})") from None
 
     def receive(self, timeout: float | None = None) -> tuple[dict[str, Any], bytes]:
-        """Receive one message; raises GuestError for none in time, and for a malformed one."""
+        """Receive one message; raises ChannelError for none in time, and for a malformed one."""
         data, blob = self.receive_bytes(timeout)
         try:
             found = json.loads(data)
         except (ValueError, RecursionError):
-            raise GuestError("sent a message that is not JSON") from None
+            raise ChannelError("sent a message that is not JSON") from None
         if not isinstance(found, dict):
-            raise GuestError("sent a message that is no JSON object")
+            raise ChannelError("sent a message that is no JSON object")
         return found, blob
 
     def receive_bytes(self, timeout: float | None = None) -> tuple[bytes, bytes]:
         """As `receive`, with the JSON as it came."""
         until = None if timeout is None else time.monotonic() + timeout
         text, blob = HEAD.unpack(self._read(HEAD.size, until))
-        if text > LARGEST_TEXT or blob > LARGEST_BLOB:
-            raise GuestError(
+        if text > LARGEST_TEXT or blob > _LARGEST_BLOB:
+            raise ChannelError(
                 f"sent a message of {text} and {blob} bytes; the most are {LARGEST_TEXT} and "
-                f"{LARGEST_BLOB}"
+                f"{_LARGEST_BLOB}"
             )
         return self._read(text, until), self._read(blob, until)
 
@@ -80,13 +80,13 @@ class Channel:
             except TimeoutError:
                 part = b""
                 if until is not None and time.monotonic() >= until:
-                    raise GuestError("did not answer in time") from None
+                    raise ChannelError("did not answer in time") from None
                 continue
             except OSError as error:
-                raise GuestError(f"its process has ended ({error.strerror})") from None
+                raise ChannelError(f"its process has ended ({error.strerror})") from None
             if not part:
-                raise GuestError("its process has ended")
+                raise ChannelError("its process has ended")
             data += part
             if until is not None and time.monotonic() > until and len(data) < size:
-                raise GuestError("did not answer in time")
+                raise ChannelError("did not answer in time")
         return bytes(data)

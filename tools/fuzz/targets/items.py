@@ -1,4 +1,4 @@
-"""What a guest's process sends its owner: messages of the channel, documents, and results."""
+"""Items as another process sends them: messages of the channel, each with an item and its blob."""
 
 from __future__ import annotations
 
@@ -6,38 +6,28 @@ import contextlib
 import json
 import random
 import socket
-import struct
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
-from aerodaas.analytics.guests.document import (
-    GuestDocument,
-    GuestNavigation,
-    GuestNode,
-    GuestTrigger,
-    read_document,
-)
-from aerodaas.analytics.item_json import decoded, encoded
+from aerodaas.analytics.here.channel import HEAD, Channel, ChannelError
+from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.errors import GraphError
 from aerodaas.messages.detections import Detection, Detections
-from aerodaas.messages.frames import Header
-from aerodaas.messages.guest_item import GuestItem
+from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Readings
 from aerodaas.messages.schema import MessageError
 from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 
-_HEAD = struct.Struct("<II")
 _BYTES = 0.2
 """Share of mutations that change a byte."""
 
 
 def seeds() -> Iterable[bytes]:
-    """Messages as a guest's process sends them."""
+    """Messages as the user's side and a flight send them."""
     header = Header(1, 2, "drone/cam")
     points = np.zeros((3, 3), np.float32)
     people = (Detection((0.0, 1.0, 2.0, 3.0), "person", 0.5, keypoints=points),)
@@ -45,26 +35,17 @@ def seeds() -> Iterable[bytes]:
         Detections(header, people, 64, 48),
         Readings(5, {"count": 1.0}),
         AeroNavigation(data=[Waypoint("a", 1, 2, 3, yaw=0.5), VelocityCommand(1.0)]),
-        GuestItem,
+        OpaqueItem("Own", {"a": 1}, b"x"),
+        (float("nan"), b"x", np.zeros(2)),
+        Frame(header, np.zeros((4, 6, 3), np.uint8), depth=np.ones((4, 6), np.uint16)),
     ]
     for item in items:
-        content = encoded(item, lambda _: GuestItem("Own", {"a": 1}, b"x"))
-        yield _message({"item": content, "fired": [0], "alerts": ["a"]})
-    node = GuestNode(
-        id="drone/a",
-        robot="drone",
-        inputs=["drone/cam"],
-        compute="edge",
-        navigation=True,
-        triggers=[GuestTrigger(target="drone", method="end_mission")],
-    )
-    flight = GuestNavigation(robot="drone", stream="drone/a", waypoints=[])
-    document = GuestDocument(version=1, nodes=[node], navigation=[flight])
-    yield _message({"document": document.model_dump(mode="json")})
+        content, blob = pack(item, lossless=True)
+        yield _message({"item": content}, blob)
 
 
 def run(data: bytes) -> None:
-    """Receive a message as the owner does, and read what it holds."""
+    """Receive a message and read its item."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
         theirs.settimeout(0.0)
@@ -72,30 +53,29 @@ def run(data: bytes) -> None:
             theirs.send(data)
         theirs.close()
         try:
-            content, _ = Channel(ours).receive(1.0)
-        except GuestError:
+            content, blob = Channel(ours).receive(1.0)
+        except ChannelError:
             return
     with contextlib.suppress(MessageError):
-        decoded(content.get("item"))
-    with contextlib.suppress(GraphError):
-        read_document(content.get("document"))
+        unpack(content.get("item"), blob)
 
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
     """Change one value of the JSON, and one byte now and then."""
-    size, _ = _HEAD.unpack_from(data) if len(data) >= _HEAD.size else (0, 0)
+    size, _ = HEAD.unpack_from(data) if len(data) >= HEAD.size else (0, 0)
+    end = HEAD.size + size
     try:
-        content = json.loads(data[_HEAD.size : _HEAD.size + size])
+        content = json.loads(data[HEAD.size : end])
     except (ValueError, RecursionError):
         return flip_byte(data, rng)
     if rng.random() < _BYTES or not change_value(content, rng, (*VALUES, {"is": "tuple"})):
         return flip_byte(data, rng)
     try:
-        return _message(content)
+        return _message(content, data[end:])
     except (ValueError, RecursionError):  # it holds itself
         return flip_byte(data, rng)
 
 
-def _message(content: Any) -> bytes:  # noqa: ANN401 - JSON
+def _message(content: Any, blob: bytes) -> bytes:  # noqa: ANN401 - JSON
     text = json.dumps(content).encode()
-    return _HEAD.pack(len(text), 0) + text
+    return HEAD.pack(len(text), len(blob)) + text + blob
