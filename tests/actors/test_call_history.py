@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 import psutil
+import pytest
 import ray
 
 _CALLS = 10_000
@@ -32,6 +33,7 @@ def _head() -> psutil.Process:
     return heads[0]
 
 
+@pytest.mark.slow
 def test_the_head_does_not_grow_with_each_call(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """Its memory is the same after 10,000 calls of an actor without task events, as ours are."""
     remote: Any = ray.remote

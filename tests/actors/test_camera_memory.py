@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from flying import FLAT, Flyer, hop, robot
 
 from aerodaas import Environment
@@ -46,6 +47,7 @@ class StreamCamera(OwnCamera):
     most_memory = _MOST
 
 
+@pytest.mark.slow
 def test_the_sensors_process_is_bounded_before_the_camera_opens(flyer: Flyer) -> None:
     """By what its camera says; one that says nothing may take what it needs."""
     own, stream = flyer.folder / "own", flyer.folder / "stream"

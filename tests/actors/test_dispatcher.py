@@ -151,7 +151,13 @@ def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patien
     dispatcher.close()
 
 
-@pytest.mark.parametrize("speed", [None, 1.0], ids=["simulated time", "real time"])
+@pytest.mark.parametrize(
+    "speed",
+    [
+        pytest.param(None, id="simulated time"),
+        pytest.param(1.0, id="real time", marks=pytest.mark.slow),
+    ],
+)
 def test_tasks_name_their_frames(flyer: Flyer, speed: float | None) -> None:
     """Each analysis works on the frame that its task is about, and no frame is published again.
 

@@ -60,7 +60,7 @@ def test_a_slow_start_is_not_taken_for_a_dead_application(
     assert flight.alerts == []
 
 
-@pytest.fixture(params=["in shared memory", "by asking"])
+@pytest.fixture(params=["in shared memory", pytest.param("by asking", marks=pytest.mark.slow)])
 def reads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """How the application reads: as beside the drone, or as from another node."""
     if request.param == "by asking":

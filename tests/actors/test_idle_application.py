@@ -23,6 +23,7 @@ def _hover(env: Environment) -> None:
     env.get_robot_by_id("drone").navigate(hop((1, 0), hover=600))
 
 
+@pytest.mark.slow
 def test_an_idle_application_looks_once_a_second_and_leaves_no_records(
     flyer: Flyer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from aerodaas.actors.drone.planner import PlannerExecutor
 pytestmark = pytest.mark.wall_clock
 
 
+@pytest.mark.slow
 def test_planner_survives_what_it_is_asked(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """Results and errors come back; after a hang and a death the next call is answered."""
     with PlannerExecutor(patience=5.0) as planner:

@@ -59,6 +59,7 @@ class Noted:
         return False
 
 
+@pytest.mark.slow
 def test_a_secret_is_in_the_environment_and_in_no_file(flyer: Flyer) -> None:
     """It is there before the analysis itself; what an interpreter needs at its start is known."""
     said = flyer.folder / "said"

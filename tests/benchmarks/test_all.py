@@ -65,6 +65,7 @@ def printed(now: dict[str, Any], before: dict[str, Any] | None) -> str:
     return out.getvalue() + "\n".join(comparison.notes())
 
 
+@pytest.mark.slow
 def test_one_that_fails_is_told_and_the_others_run(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -153,6 +154,7 @@ def test_further_files_come_after_the_first(
     assert reports == [1, 2]
 
 
+@pytest.mark.slow
 def test_a_benchmark_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """With all that it has started."""
     monkeypatch.setattr(suite_run, "_PATIENCE", 2.0)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from bench_runs import run_benchmark
 
 
+@pytest.mark.slow
 def test_a_meeting_is_measured_and_drawn(tmp_path: Path) -> None:
     """Contact without the guard, none with it; both in one run of the same seeds."""
     path, picture = tmp_path / "meetings.json", tmp_path / "meeting.png"

@@ -54,6 +54,7 @@ def project(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_survivor_is_told_from_the_killed(project: Path) -> None:
     """By its line in the file and by what changed; no trace of the run stays."""
     before = sorted(project.rglob("*"))
@@ -71,6 +72,7 @@ def test_a_survivor_is_told_from_the_killed(project: Path) -> None:
     assert sorted(project.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_what_cannot_be_measured_is_refused(project: Path) -> None:
     """Tests that fail as it is, no tests at all, and no file."""
     source = str(project / "parts" / "ages.py")

@@ -56,13 +56,13 @@ def test_its_options_exist(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "shorter"),
     [
-        ("start", "--runs 1 --flights 0"),
         ("decision", "--scheduler margin --rounds 10"),
         ("lab", "--scheduler edf"),
         ("vision", "--rounds 1"),
         *(
             pytest.param(name, shorter, marks=pytest.mark.slow)
             for name, shorter in (
+                ("start", "--runs 1 --flights 0"),
                 ("start", "--runs 1 --flights 1"),
                 ("latency", "--seconds 2"),
                 ("hop", ""),

@@ -153,6 +153,7 @@ def test_what_somebody_planted_is_not_used(second: SecondUser, plant: str) -> No
         path.unlink() if plant == "link" else path.rmdir()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("runtime", "streams")
 def test_a_second_user_runs_beside_the_first(second: SecondUser) -> None:
     """A Ray of their own, with a token of their own; and the first one's refuses them."""

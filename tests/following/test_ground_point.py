@@ -154,6 +154,7 @@ def test_below_the_lens_it_is_sharpest() -> None:
     assert ahead.major > 3 * ahead.minor
 
 
+@pytest.mark.slow
 @given(st.floats(15, 60), st.floats(-15, 15), angles, st.floats(0.1, 2))
 @example(40.0, 0.0, 1.0, 1.0)
 def test_its_error_is_that_of_many_wrong_cameras(

@@ -9,7 +9,7 @@ import pytest
 from tools.fuzz.campaign import fuzz
 from tools.fuzz.target import CORPUS, load_target, target_names
 
-_SECONDS = float(os.environ.get("AERODAAS_FUZZ_SECONDS", "2.5"))
+_SECONDS = float(os.environ.get("AERODAAS_FUZZ_SECONDS", "0.3"))
 
 
 @pytest.mark.parametrize("target", target_names())

@@ -21,11 +21,13 @@ def replayed() -> Result:
     return replay(_TARGET, [b"-", *(bytes([way]) + b"__!" for way in b"rdlbnmsax"), b"-"], _LIMITS)
 
 
+@pytest.mark.slow
 def test_every_input_is_run_whatever_the_others_do(replayed: Result) -> None:
     """Crashes and hangs end a process, not the campaign."""
     assert replayed.inputs == 11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("way", "kind", "title"),
     [
@@ -50,6 +52,7 @@ def test_each_way_of_failing_is_told_with_its_input(
     assert "broken_target.py" in found.trace
 
 
+@pytest.mark.slow
 def test_a_finding_is_made_smaller(replayed: Result) -> None:
     """Down to the bytes without which it fails in another way, or not at all."""
     assert b"r!" in {one.data for one in replayed.findings}

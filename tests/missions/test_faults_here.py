@@ -186,6 +186,7 @@ def done(run: Run) -> int:
     return int(outcomes.get("done", 0))
 
 
+@pytest.mark.slow
 def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
     """It is lost after four times what it should take, not for good, and used once it goes on."""
     task = {"benefit": 10, "deadline": 1000, "edge_time": 50}

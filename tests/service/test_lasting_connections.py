@@ -124,7 +124,8 @@ class Service:
     def socket(self, path: str, token: str) -> Iterator[ClientConnection]:
         """A WebSocket."""
         url = f"ws://127.0.0.1:{self.port}/v1/missions/{path}"
-        with connect(url, additional_headers={"Authorization": f"Bearer {token}"}) as found:
+        headers = {"Authorization": f"Bearer {token}"}
+        with connect(url, additional_headers=headers, open_timeout=ENOUGH) as found:
             yield found
 
     def status(self, method: str, path: str, token: str, body: object = None) -> int:

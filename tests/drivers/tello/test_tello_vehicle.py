@@ -63,6 +63,7 @@ def test_it_is_a_vehicle_with_honest_capabilities() -> None:
         vehicle.read()
 
 
+@pytest.mark.slow
 def test_a_whole_flight() -> None:
     """Up, to places in ENU whatever the Tello's own axes, a velocity, and down."""
     options = TelloOptions(start=(1.0, 2.0, 0.0), start_yaw=90.0, switched_on_yaw=40.0)
@@ -336,6 +337,7 @@ def test_a_port_that_is_taken_is_named() -> None:
         TelloVehicle(robot, EnvironmentConfig(robots=[robot])).connect()
 
 
+@pytest.mark.slow
 def test_two_tellos_on_one_host_with_the_default_ports() -> None:
     """SDK 2.0 in station mode: one address of this host for each."""
     with (

@@ -27,6 +27,7 @@ def test_what_only_development_needs_is_listed_and_told_apart() -> None:
     assert "aerodaas" not in kinds
 
 
+@pytest.mark.slow
 def test_no_exception_outlives_its_reason() -> None:
     """Each is for a licence that a dependency has."""
     used = {

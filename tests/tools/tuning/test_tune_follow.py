@@ -61,6 +61,7 @@ def test_the_same_seed_flies_the_same() -> None:
     assert not np.array_equal(one.place, other.place)
 
 
+@pytest.mark.slow
 def test_bad_gains_are_mended() -> None:
     """From sluggish gains, a few trials find better ones on walks that the search has not seen."""
     task = FollowTask(speeds=(1.0,), duration=24.0, rate=5.0)
