@@ -24,6 +24,7 @@ __all__ = [
     "ModelError",
     "RecordingError",
     "SchedulerError",
+    "SilentError",
     "SourceError",
     "UnknownIdError",
     "UnreachableError",
@@ -130,6 +131,10 @@ class VehicleError(AeroDaaSError):
 
 class MissionError(AeroDaaSError):
     """A mission failed in flight; the drone was held, returned or landed before this was raised."""
+
+
+class SilentError(MissionError):
+    """A drone or an actor did not answer in time; it may be busy."""
 
 
 class IncompleteError(MissionError):

@@ -26,11 +26,11 @@ import typer
 from _recording_app import RATE, SIZE, Seen, draw_pictures, environment
 from _report import Report
 
-import aerodaas.console
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.recording.reader import Recording
+from aerodaas.service.http import page as console_page
 from tools.browser import Browser, Page
 
 UNITS = {"median": "", "p99": "", "count": ""}
@@ -38,7 +38,7 @@ CAMERA = "drone0/camera0"
 _FAR = 350.0
 """Metres to a waypoint that is not reached while anything is measured."""
 _SETTLE = 2.0
-_PAGE = Path(aerodaas.console.__file__).parent / "page"
+_PAGE = Path(console_page.__file__).parent / "page"
 _WATCH_VIDEO = """(() => {
   window.delays = [];
   const screen = document.querySelector('[data-testid=video]');

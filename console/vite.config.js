@@ -3,7 +3,7 @@ import { defineConfig } from "vite";
 export default defineConfig({
   base: "./",
   build: {
-    outDir: "../aerodaas/console/page",
+    outDir: "../aerodaas/service/http/page",
     emptyOutDir: true,
     // One name for each file: the server knows them, and what ships can be compared.
     rollupOptions: {

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from aerodaas.console.viewer import RecordingServer
 from aerodaas.recording.reader import Recording
+from aerodaas.service.own.recordings import RecordingServer
 
 __all__ = ["served"]
 

@@ -16,15 +16,16 @@ from fastapi.responses import JSONResponse
 from starlette.websockets import WebSocketDisconnect
 from typing_extensions import Self
 
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.messages.health import Verdict
 from aerodaas.protocol.schemas import (
+    AnswerOut,
     CommandIn,
     FleetOut,
     MissionIn,
     MissionOut,
     MissionPhase,
     RobotOut,
+    StatusOut,
 )
 
 TOKEN = "t0k3n"  # noqa: S105 - of these tests alone

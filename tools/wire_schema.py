@@ -13,13 +13,13 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
-from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
+    AnswerOut,
     CommandIn,
     FleetOut,
     MissionOut,

@@ -33,7 +33,6 @@ from aerodaas.actors.run.environment_options import environment_options
 from aerodaas.actors.run.live import live_source
 from aerodaas.actors.run.losses import (
     DeadError,
-    SilentError,
     SuspensionMonitor,
     actor_silent,
     drone_lost,
@@ -42,7 +41,7 @@ from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 from aerodaas.clock import host_time_ns
 from aerodaas.config.options import LiveViews
-from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.errors import AeroDaaSError, MissionError, SilentError
 from aerodaas.messages.frames import Header
 from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import Answer, Command

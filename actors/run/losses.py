@@ -10,7 +10,6 @@ from aerodaas.runtime.reports import ActorReport
 __all__ = [
     "ALONE",
     "DeadError",
-    "SilentError",
     "SuspensionMonitor",
     "actor_silent",
     "drone_lost",
@@ -20,10 +19,6 @@ ALONE = "alone"
 """Key of a drone actor's report: each vehicle's behaviour without its actor, by robot."""
 _FROZEN = 5.0
 """Seconds without a heartbeat after which the drones consider the application dead."""
-
-
-class SilentError(MissionError):
-    """An actor did not answer in time; it may be busy."""
 
 
 class DeadError(MissionError):

@@ -10,9 +10,9 @@ import ray
 from ray.exceptions import GetTimeoutError, RayActorError, RayTaskError
 
 from aerodaas.actors.base import ActorInfo
-from aerodaas.actors.run.losses import DeadError, SilentError
+from aerodaas.actors.run.losses import DeadError
 from aerodaas.clock import NANOSECONDS, host_time_ns
-from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.errors import AeroDaaSError, MissionError, SilentError
 from aerodaas.runtime.reports import ActorReport
 
 __all__ = ["Member", "ask", "require_clock", "routes"]

@@ -13,7 +13,7 @@ from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig
-    from aerodaas.service.access import OidcSettings
+    from aerodaas.service.access.oidc import OidcSettings
 
 __all__ = ["serve"]
 
@@ -172,7 +172,7 @@ def _oidc(
 ) -> OidcSettings | None:
     """What an issuer is trusted with; raises ConfigError for options that do not fit."""
     from aerodaas.protocol.schemas import Role  # noqa: PLC0415 - slow to load
-    from aerodaas.service.access import OidcSettings  # noqa: PLC0415 - as above
+    from aerodaas.service.access.oidc import OidcSettings  # noqa: PLC0415 - as above
 
     if (issuer is None) != (audience is None):
         raise ConfigError(

@@ -41,9 +41,9 @@ def view(
     from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only here
 
     require_extra("remote", "aerodaas view")
-    from aerodaas.console.viewer import RecordingServer  # noqa: PLC0415 - slow to load
     from aerodaas.recording.reader import Recording  # noqa: PLC0415 - as above
     from aerodaas.runtime.checks import check_served  # noqa: PLC0415 - slow to load
+    from aerodaas.service.own.recordings import RecordingServer  # noqa: PLC0415 - slow to load
 
     check_served("--address", address)
     with contextlib.ExitStack() as opened:

@@ -32,7 +32,7 @@ from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
 
 if TYPE_CHECKING:
-    from aerodaas.console.view import ConsoleView
+    from aerodaas.service.own.view import ConsoleView
 
 __all__ = ["Environment"]
 
@@ -255,7 +255,7 @@ class Environment(PaperNames, IEnvironment):
             MissionError: If nothing flies, or a provider does, whose own address has the console.
             ConfigError: If the extra `remote` is missing, or the address cannot be listened on.
         """
-        from aerodaas.console.view import ConsoleView  # noqa: PLC0415 - only where asked for
+        from aerodaas.service.own.view import ConsoleView  # noqa: PLC0415 - only where asked for
 
         if self.provider is not None:
             raise MissionError(

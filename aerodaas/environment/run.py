@@ -40,13 +40,13 @@ from aerodaas.runtime.checks import check_served
 
 if TYPE_CHECKING:
     from aerodaas.actors.run.flight import Flight
-    from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment
     from aerodaas.runtime.inline_flight import InlineFlight
     from aerodaas.runtime.live import LiveReader
     from aerodaas.runtime.plan import FlightPlan
     from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+    from aerodaas.service.own.server import ConsoleServer
     from aerodaas.terminal.console import FlightView
 
 MakeFlight: TypeAlias = "Callable[..., Flight | InlineFlight]"
@@ -217,7 +217,7 @@ class Run:
         """The console's server, listening, if it is asked for."""
         if self.options.console is None:
             return None
-        from aerodaas.console.server import ConsoleServer  # noqa: PLC0415 - only where asked for
+        from aerodaas.service.own.server import ConsoleServer  # noqa: PLC0415 - only where asked for
 
         return ConsoleServer(self.options.console)
 
@@ -241,7 +241,7 @@ class Run:
         require_extra("remote", "the console")
         check_served("address", address)
         if self._console is None:
-            from aerodaas.console.server import ConsoleServer  # noqa: PLC0415 - only where asked
+            from aerodaas.service.own.server import ConsoleServer  # noqa: PLC0415 - only where asked
 
             self._start_console(ConsoleServer(address, framed=True))
         assert self._console is not None  # noqa: S101 - started

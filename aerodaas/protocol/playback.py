@@ -10,10 +10,9 @@ from typing import Any
 
 from pydantic import Field
 
-from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut, TrafficOut
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, OutlookOut, StatusOut, StreamKind, TrafficOut
 
 __all__ = [
     "AlertOut",

@@ -11,7 +11,13 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import (
+    AnswerOut,
+    OutlookOut,
+    StatusOut,
+    TrafficOut,
+    WaypointsIn,
+)
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
@@ -24,6 +30,7 @@ __all__ = [
     "AccountIn",
     "AccountOut",
     "AnalyticsOut",
+    "AnswerOut",
     "Area",
     "AuditOut",
     "CommandIn",
@@ -37,16 +44,19 @@ __all__ = [
     "MissionOut",
     "MissionPhase",
     "NavigationIn",
+    "OutlookOut",
     "RefusalOut",
     "RobotOut",
     "Role",
     "Scope",
     "SilencePolicy",
+    "StatusOut",
     "StreamKind",
     "TenantChange",
     "TenantOut",
     "TokenIn",
     "TokenOut",
+    "TrafficOut",
     "UsageOut",
     "VerdictOut",
     "Word",

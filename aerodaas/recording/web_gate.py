@@ -8,9 +8,8 @@ import threading
 from contextlib import suppress
 from http import HTTPStatus
 
-from aerodaas.analytics.remote.denial import answer_of
-from aerodaas.analytics.remote.guard import host_name, is_loopback, is_served
-from aerodaas.analytics.remote.listening import listen
+from aerodaas.http_server.addresses import host_name, is_loopback, is_served, listen
+from aerodaas.http_server.denial import answer_of
 
 __all__ = ["WebGate"]
 

@@ -12,7 +12,7 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 from typing import Any, TypeVar
 
-from aerodaas.errors import MissionError
+from aerodaas.errors import MissionError, SilentError
 
 __all__ = ["LoopCalls", "LoopOverError"]
 
@@ -42,7 +42,7 @@ class LoopCalls:
     def ask(self, call: Callable[[], T], timeout: float) -> T:
         """Execute `call` in the loop and return its result; raises the exceptions of the call.
 
-        Raises LoopOverError if the loop is over, and MissionError if it does not answer within
+        Raises LoopOverError if the loop is over, and SilentError if it does not answer within
         `timeout` wall seconds; a call that has not started by then is withdrawn.
         """
         answer: Future[T] = Future()
@@ -58,7 +58,7 @@ class LoopCalls:
             if answer.done() and not withdrawn:
                 return answer.result()
         said = "withdrawn" if withdrawn else "it may still be carried out"
-        raise MissionError(f"the drone's loop did not answer within {timeout:g} s: {said}")
+        raise SilentError(f"the drone's loop did not answer within {timeout:g} s: {said}")
 
     def serve(self) -> int:
         """Execute the queued calls, in the loop's thread; returns their number."""

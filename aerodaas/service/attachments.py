@@ -15,7 +15,7 @@ from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config.plugins import load_plugin
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
-from aerodaas.service.access import Principal, sees
+from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import Attached

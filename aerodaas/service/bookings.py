@@ -14,7 +14,8 @@ from aerodaas.clock import WallOffset
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.private_file import write_private
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
-from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access.principal import Principal, sees
+from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook

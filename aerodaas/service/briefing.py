@@ -7,7 +7,7 @@ from pathlib import Path
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.protocol.schemas import Role, Scope
-from aerodaas.service.access import Principal, require
+from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import (

@@ -12,13 +12,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
+    AnswerOut,
     CommandIn,
     LeaseState,
     LinkState,
@@ -29,12 +30,15 @@ from aerodaas.protocol.schemas import (
     PictureForm,
     Role,
     Scope,
+    StatusOut,
 )
-from aerodaas.service.access import Principal, require, sees
+from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.attachments import Attachments
+from aerodaas.service.backend import PilotCommand
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder
@@ -218,29 +222,29 @@ class MissionDesk:
         one.cancel_flight(reason)
         return shown(one)
 
-    def command(self, principal: Principal, mission: str, command: CommandIn) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
-        return self._ask(principal, mission, do=command.command, robot=command.robot)
-
-    def fly(
-        self,
-        principal: Principal,
-        mission: str,
-        what: NavigationIn | RearrangeIn | ActuateIn | ControlsIn,
-    ) -> AnswerOut:
-        """Change what a flying mission does; raises MissionError if it is lost."""
-        words = {
+        # Without the lock, which may be held for long: a drone that is to come home comes home.
+        link = self._flown(principal, mission).follow()
+        operator = principal.role.reaches(Role.OPERATOR)
+        if isinstance(command, CommandIn):
+            return link.ask(operator=operator, do=command.command, robot=command.robot)
+        words: dict[type[PilotCommand], str] = {
             NavigationIn: "fly",
             RearrangeIn: "rearrange",
             ActuateIn: "actuate",
             ControlsIn: "controls",
         }
-        content = what.model_dump(mode="json")
-        return self._ask(principal, mission, do=words[type(what)], content=content)
+        content = command.model_dump(mode="json")
+        return link.ask(operator=operator, do=words[type(command)], content=content)
 
-    def order(self, principal: Principal, mission: str) -> FlightOrder:
-        """The order of a mission that flies and that this account may command."""
-        return FlightOrder.read(self._flown(principal, mission).flight.order)
+    def require_pilot(self, principal: Principal, mission: str) -> None:
+        """Raise RefusedError unless a mission flies and this account may command it."""
+        self._flown(principal, mission)
+
+    def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
+        """The environment of a mission that flies and that this account may command."""
+        return environment_of(FlightOrder.read(self._flown(principal, mission).flight.order))
 
     def grant(
         self, principal: Principal, mission: str, tenant: str, sensors: list[str] | None
@@ -263,11 +267,6 @@ class MissionDesk:
         own = {one.full_id for one in self._settings.config.all_sensors() if one.robot == robot}
         return host.row.id, [one for one in self._attachments.shared(host, tenant) if one in own]
 
-    def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
-        # Without the lock, which may be held for long: a drone that is to come home comes home.
-        link = self._flown(principal, mission).follow()
-        return link.ask(operator=principal.role.reaches(Role.OPERATOR), **request)
-
     def _flown(self, principal: Principal, mission: str) -> ActiveMission:
         """A flying mission; raises RefusedError unless this account may command it."""
         self._require_own(principal, mission)
@@ -280,8 +279,14 @@ class MissionDesk:
         return one
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
-        """A mission that this account may see; raises RefusedError for any other."""
-        return shown(self._seen(principal, mission))
+        """A mission that this account may see; its own user counts as present.
+
+        Raises RefusedError for any other mission.
+        """
+        found = shown(self._seen(principal, mission))
+        if _is_user(principal, found):
+            self.hear(mission)
+        return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
         """What lies below a mission that this account may see."""
@@ -328,8 +333,7 @@ class MissionDesk:
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
-        found = self.shown(mission)
-        return found.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
+        return _is_user(principal, self.shown(mission))
 
     def require_users_side(self, principal: Principal, mission: str) -> None:
         """Raise RefusedError unless this account may answer for a mission's user.
@@ -641,6 +645,10 @@ class MissionDesk:
         tenant = self._seen(principal, mission).row.tenant
         if tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"{mission} is {tenant}'s: you may watch it")
+
+
+def _is_user(principal: Principal, mission: MissionOut) -> bool:
+    return mission.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
 
 
 def _may_fly(last: StatusOut) -> bool:

@@ -8,9 +8,11 @@ from typing import Any
 
 from aerodaas.config.actuators import permitted
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import FleetOut, LinkState, RobotOut
-from aerodaas.service.access import Principal, sees
+from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.garage import Garage
@@ -30,8 +32,10 @@ class FleetView:
         garage: Garage,
         bookings: Bookings,
         desk: MissionDesk,
+        accounts: Accounts,
     ) -> None:
         """Show `catalogue`, and the drones of `config`; to a tenant its `actuators`."""
+        self._accounts = accounts
         self._actuators = actuators
         self._config = config
         self._catalogue = catalogue
@@ -39,9 +43,20 @@ class FleetView:
         self._bookings = bookings
         self._desk = desk
 
-    @cached_property
-    def scenery(self) -> SceneryOut:
+    def account(self, principal: Principal) -> AccountOut:
+        """The account that asks."""
+        return self._accounts.get(principal.account)
+
+    def preflight(self, robot: str) -> PreflightOut:
+        """A robot's health before take-off; raises RefusedError for an unknown robot."""
+        return self._garage.preflight(robot)
+
+    def fleet_scenery(self) -> SceneryOut:
         """What lies below the fleet on a map; raises ConfigError if its world cannot be read."""
+        return self._scenery
+
+    @cached_property
+    def _scenery(self) -> SceneryOut:
         return SceneryOut.of(self._config)
 
     def seen_by(self, principal: Principal) -> FleetOut:

@@ -9,12 +9,11 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import LinkState
+from aerodaas.protocol.schemas import LinkState, StatusOut
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.store import RobotState, Store

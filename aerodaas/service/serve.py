@@ -7,14 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from aerodaas.analytics.here.relay import LARGEST_ANSWER
-from aerodaas.analytics.remote.guard import is_loopback
-from aerodaas.analytics.remote.listening import listen
-from aerodaas.analytics.remote.serving import web_server
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import link_of
 from aerodaas.errors import ConfigError, SourceError
-from aerodaas.service.access import Accounts
-from aerodaas.service.app import build_service
+from aerodaas.http_server.addresses import is_loopback, listen
+from aerodaas.http_server.server import web_server
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.provider import build_service
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.service.access import OidcSettings
+from aerodaas.service.access.oidc import OidcSettings
 
 __all__ = ["ServiceSettings"]
 

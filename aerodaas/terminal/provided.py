@@ -12,13 +12,12 @@ import numpy as np
 from rich.console import Console
 from typing_extensions import Self
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.clock import NANOSECONDS
 from aerodaas.messages.mission import GROUNDED, BatteryOutlook, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.protocol.schemas import MissionOut, MissionPhase, StatusOut
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.progress import download_view
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot

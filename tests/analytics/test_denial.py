@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.analytics.remote.denial import answer_of, closing_reason, deny
+from aerodaas.http_server.denial import answer_of, closing_reason, deny
 
 LONG = "ä" * 300
 

@@ -21,11 +21,11 @@ from typer.testing import CliRunner
 
 from aerodaas.analytics.remote.analytics import RemoteAnalytics
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
-from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.cli.app import app as cli
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, MissionError, SourceError
+from aerodaas.http_server.addresses import is_loopback
 from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState

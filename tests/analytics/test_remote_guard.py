@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from aerodaas.analytics.remote.attempts import WrongTokens
-from aerodaas.analytics.remote.guard import Guard, HostGuard, Receive, Scope, Send, is_served
+from aerodaas.http_server.addresses import Guard, HostGuard, Receive, Scope, Send, is_served
+from aerodaas.http_server.wrong_tokens import WrongTokens
 
 TOKEN = "correct-horse-battery"  # noqa: S105 - this test's own
 

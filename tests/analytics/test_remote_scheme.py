@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from aerodaas.analytics.remote.guard import Guard, Receive, Scope, Send
+from aerodaas.http_server.addresses import Guard, Receive, Scope, Send
 
 TOKEN = "correct-horse-battery"  # noqa: S105 - this test's own
 

@@ -14,10 +14,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from aerodaas.analytics.remote import serving
-from aerodaas.analytics.remote.guard import App, Receive, Scope, Send
-from aerodaas.analytics.remote.listening import listen
-from aerodaas.analytics.remote.serving import web_server
+from aerodaas.http_server import server as serving
+from aerodaas.http_server.addresses import App, Receive, Scope, Send, listen
+from aerodaas.http_server.server import web_server
 
 PATIENCE = 0.5
 _MOST = 2

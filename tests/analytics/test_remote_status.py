@@ -12,10 +12,10 @@ from filled import filled
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.protocol.schemas import StatusOut
 
 SHARES = st.floats(0, 1)
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.console.server import ConsoleServer
 from aerodaas.dataflow.graph import Graph
 from aerodaas.errors import MissionError
 from aerodaas.messages.health import HealthReport
@@ -20,6 +19,7 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, Command
+from aerodaas.service.own.server import ConsoleServer
 
 __all__ = ["Run", "console"]
 

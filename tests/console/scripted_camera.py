@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from hovering import console
 
-from aerodaas.console.server import ConsoleServer
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
+from aerodaas.service.own.server import ConsoleServer
 
 __all__ = ["SHOWN", "Reader", "camera_console", "require_own_frames"]
 

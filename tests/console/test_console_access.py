@@ -18,12 +18,12 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.console.access import bearer
-from aerodaas.console.server import ConsoleServer
 from aerodaas.errors import ConfigError
 from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause
+from aerodaas.service.http.bearer import bearer
+from aerodaas.service.own.server import ConsoleServer
 
 HOVER = {"robot": "drone", "command": "pause"}
 
@@ -133,7 +133,7 @@ def test_a_viewer_watches_and_does_not_fly(flying: tuple[ConsoleServer, Run]) ->
     visit = {"robot": "drone", "waypoints": [{"id": "a", "x": 1.0, "y": 1.0, "z": 1.0}]}
     for route, body in (("commands", HOVER), ("navigation", visit)):
         status, _, answer = ask(address, f"/v1/missions/own/{route}", body)
-        assert (status, answer["text"]) == (403, "this needs the role pilot; you are viewer")
+        assert (status, answer["text"]) == (403, "this needs the role pilot; viewer is viewer")
     assert not flying[1].commands
 
 

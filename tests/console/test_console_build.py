@@ -12,19 +12,19 @@ from required import needs_peer, peer
 from scripted_camera import camera_console
 
 from aerodaas.config.model import RecordingConfig
-from aerodaas.console.viewer import RecordingServer
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.service.own.recordings import RecordingServer
 from tools.browser import Browser, Page
 from tools.wire_schema import SCHEMA, schema_text
 
 _ROOT = Path(__file__).resolve().parents[2]
 _SOURCE = _ROOT / "console"
-_PAGE = _ROOT / "aerodaas" / "console" / "page"
+_PAGE = _ROOT / "aerodaas" / "service" / "http" / "page"
 
 
 def test_the_wires_types_are_the_services() -> None:

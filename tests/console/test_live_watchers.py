@@ -10,8 +10,9 @@ from typing import Any, cast
 import pytest
 from fastapi import WebSocket, WebSocketDisconnect
 
-from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import LiveSession
+from aerodaas.service.backend import Missions
+from aerodaas.service.live.hub import StreamHub
+from aerodaas.service.live.session import LiveSession
 
 _RATE = 20.0
 
@@ -66,7 +67,9 @@ async def _watched(check: Callable[[_Mission, list[_Socket]], Awaitable[None]], 
     sockets = [_Socket() for _ in range(count)]
     tasks = [
         asyncio.create_task(
-            LiveSession(cast("WebSocket", one), mission, hub, "m").run(_RATE, [], own=False)
+            LiveSession(cast("WebSocket", one), cast("Missions", mission), hub, "m").run(
+                _RATE, [], own=False
+            )
         )
         for one in sockets
     ]
@@ -132,7 +135,7 @@ def _view(socket: _Socket, mission: _Mission) -> None:
 
     async def view() -> None:
         hub = StreamHub(lambda *_: iter(()))
-        session = LiveSession(cast("WebSocket", socket), mission, hub, "m")
+        session = LiveSession(cast("WebSocket", socket), cast("Missions", mission), hub, "m")
         await asyncio.wait_for(session.run(_RATE, [], own=False), 20.0)
 
     asyncio.run(view())

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from map_archives import archive_bytes, tiles_around, write_archive
 from test_console_access import ask
 
-from aerodaas.console.map_archive import require_pictures
 from aerodaas.errors import ConfigError
+from aerodaas.service.http.map_archive import require_pictures
 
 HOME = {"latitude": 50.1, "longitude": 8.6}
 TILES = tiles_around(50.1, 8.6, 2)

@@ -14,7 +14,6 @@ from grounds import ground
 
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.console.packed_reader import PackedReader, ground_of
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
@@ -23,6 +22,7 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
 from aerodaas.protocol.schemas import PictureForm
+from aerodaas.service.live.packed_reader import PackedReader, ground_of
 from aerodaas.terrain.ground import Ground
 
 SOURCE = "drone/cam"

@@ -13,13 +13,13 @@ import pytest
 from numpy.typing import NDArray
 
 from aerodaas.analytics.wire_items import pack
-from aerodaas.console import packed_reader
-from aerodaas.console.hub import StreamHub, Watcher
-from aerodaas.console.packed_reader import PackedReader
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.recording.h264 import H264Encoder
+from aerodaas.service.live import packed_reader
+from aerodaas.service.live.hub import StreamHub, Watcher
+from aerodaas.service.live.packed_reader import PackedReader
 
 GROUP = 30
 """Pictures from one key frame to the next."""

@@ -15,9 +15,9 @@ from nbclient import NotebookClient
 
 from aerodaas import Environment
 from aerodaas.config.options import RunOptions
-from aerodaas.console.server import ConsoleServer
 from aerodaas.environment.run import Run
 from aerodaas.errors import ConfigError, MissionError
+from aerodaas.service.own.server import ConsoleServer
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))

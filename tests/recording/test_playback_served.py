@@ -17,13 +17,13 @@ from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
-from aerodaas.console import playback
-from aerodaas.console.playback import Player, Players
-from aerodaas.console.viewer import RecordingServer
 from aerodaas.errors import ConfigError, RecordingError
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.schemas import MissionOut
 from aerodaas.recording.reader import Recording
+from aerodaas.service.live import playback
+from aerodaas.service.live.playback import Player, Players
+from aerodaas.service.own.recordings import RecordingServer
 
 PLAYBACK = "/v1/missions/own/playback"
 PICTURE = f"{PLAYBACK}/picture?stream=tello/camera&at="
@@ -104,7 +104,7 @@ def test_the_flight_is_told_and_its_pictures_are_shown(page: str) -> None:
 @pytest.mark.parametrize(
     ("query", "status", "word"),
     [
-        ("?stream=tello/other&at=1", 409, "tello/other"),
+        ("?stream=tello/other&at=1", 422, "tello/other"),
         ("?stream=tello/camera&at=-1", 422, "at"),
         ("?stream=tello/camera&at=1e3", 422, "at"),
         (f"?stream=tello/camera&at={2 * 10**18}", 422, "at"),

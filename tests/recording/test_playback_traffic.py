@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.analytics.remote.schemas import TrafficOut
 from aerodaas.clock import NANOSECONDS
 from aerodaas.messages.vehicle import Traffic
+from aerodaas.protocol.schemas import TrafficOut
 from aerodaas.recording.playback.track import Room, TrackBuilder
 
 NOWHERE = {"x": 0.0, "y": 0.0, "z": 0.0}

@@ -11,19 +11,22 @@ from typing import Any, cast
 import pytest
 from served import document, fleet, robot
 
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.protocol.schemas import (
+    AnswerOut,
     LinkState,
     MissionIn,
     MissionOut,
     MissionPhase,
     Role,
     Scope,
+    StatusOut,
     StreamKind,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service.access import Principal, Quotas
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.principal import Principal
+from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
@@ -125,7 +128,13 @@ class Provider:
             monitor=cast("FleetMonitor", self.monitor),
         )
         self.fleet = FleetView(
-            config, {"robots": []}, self.settings.actuators, self.garage, self.bookings, self.desk
+            config,
+            {"robots": []},
+            self.settings.actuators,
+            self.garage,
+            self.bookings,
+            self.desk,
+            Accounts(self.store),
         )
 
     def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401

@@ -184,6 +184,6 @@ def process_of(provider: Served, mission: str) -> psutil.Process:
     folder = str(provider.folder / "s" / "m" / mission)
     for process in psutil.process_iter(["cmdline"]):
         line = process.info["cmdline"] or [""]
-        if "aerodaas.service.flights" in line and line[-1].startswith(folder):
+        if "aerodaas.flights" in line and line[-1].startswith(folder):
             return process
     raise AssertionError(mission)

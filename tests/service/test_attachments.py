@@ -10,7 +10,7 @@ import pytest
 from desks import PILOT, Link, Provider
 
 from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
-from aerodaas.service.access import Principal
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.store import Account, Tenant
@@ -160,10 +160,10 @@ def test_an_attached_mission_takes_no_command(provider: Provider) -> None:
     host = provider.flying(grants=GRANT)
     mission = attached(provider, host)
     with pytest.raises(RefusedError, match=f"attached to {host.id}: it senses only") as refused:
-        provider.desk.command(CITY, mission.id, CommandIn(robot="one", command="land"))
+        provider.desk.fly(CITY, mission.id, CommandIn(robot="one", command="land"))
     assert refused.value.status == 403
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.command(CITY, host.id, CommandIn(robot="one", command="land"))
+        provider.desk.fly(CITY, host.id, CommandIn(robot="one", command="land"))
     with pytest.raises(RefusedError, match="senses only: attach to a mission in flight"):
         provider.desk.submit(CITY, watching(mission.id))
     assert all(one["do"] in {"share", "withdraw"} for one in asked(provider, host))

@@ -28,7 +28,8 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.service import mission as missions
 from aerodaas.service import models
-from aerodaas.service.access import Principal, Quotas
+from aerodaas.service.access.principal import Principal
+from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError

@@ -12,10 +12,9 @@ from typing import Any
 import pytest
 from desks import PILOT, Provider
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role, StatusOut
 from aerodaas.service import garage as garages
 from aerodaas.service.errors import RefusedError
 

@@ -11,10 +11,9 @@ from typing import Any, cast
 import pytest
 from desks import PILOT, Link, Monitor, Provider
 
-from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.errors import MissionError
-from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
-from aerodaas.service.access import Principal
+from aerodaas.protocol.schemas import AnswerOut, LeaseIn, LinkState, MissionPhase, Role, Scope
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.mission import ActiveMission

@@ -19,26 +19,35 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
-from aerodaas.analytics.remote.listening import listen
-from aerodaas.analytics.remote.schemas import AnswerOut
-from aerodaas.analytics.remote.serving import web_server
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.console import controls as hand
-from aerodaas.console import live
+from aerodaas.http_server.addresses import listen
+from aerodaas.http_server.server import web_server
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
-from aerodaas.service import gate, serve
+from aerodaas.protocol.schemas import (
+    AccountIn,
+    AnswerOut,
+    FleetOut,
+    MissionPhase,
+    Role,
+    Scope,
+    TokenIn,
+)
 from aerodaas.service import mission as missions
-from aerodaas.service.access import Accounts, Principal
-from aerodaas.service.app import build_service
+from aerodaas.service import serve
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.control import ControlServer, Flown
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.http import bodies, gate
+from aerodaas.service.live import controls as hand
+from aerodaas.service.live import session
 from aerodaas.service.models import ModelShelf
-from aerodaas.service.routes import bodies, here
+from aerodaas.service.provider import build_service
+from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -170,7 +179,7 @@ def until(look: Callable[[], object]) -> None:
 @pytest.fixture
 def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A service that looks at its connections often."""
-    for module in (live, hand):
+    for module in (session, hand):
         monkeypatch.setattr(module, "_RENEWAL_SECONDS", 0.1)
     monkeypatch.setattr(here, "_AGAIN_SECONDS", 0.05)
     monkeypatch.setattr(missions, "start_process", lambda *_, **__: Process())
@@ -529,19 +538,18 @@ def test_a_command_waits_for_nothing_that_the_desk_does(service: Service) -> Non
     flight.close()
 
 
-def test_an_account_has_so_many_views_and_an_operator_all(
-    service: Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_account_has_so_many_views_and_an_operator_all(service: Service) -> None:
     """One that ends makes room for the next one."""
-    monkeypatch.setattr(gate, "_MOST_LASTING", 2)
+    most = gate.Bounds().lasting
     mission = service.submit()
     viewer = service.token("vera", role=Role.VIEWER)
     operator = service.token("olga", role=Role.OPERATOR)
     with contextlib.ExitStack() as stack:
         first = stack.enter_context(service.socket(f"{mission}/live", viewer))
-        stack.enter_context(service.socket(f"{mission}/live", viewer))
+        for _ in range(most - 1):
+            stack.enter_context(service.socket(f"{mission}/live", viewer))
         assert not _opens(service, mission, viewer)
-        for _ in range(4):
+        for _ in range(most + 1):
             stack.enter_context(service.socket(f"{mission}/live", operator))
         first.close()
         until(lambda: _opens(service, mission, viewer))

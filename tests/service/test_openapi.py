@@ -22,8 +22,9 @@ from schemathesis.specs.openapi.checks import (
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.service import app as apps
-from aerodaas.service.access import Accounts
+from aerodaas.service import provider
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.http import admission
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -44,7 +45,7 @@ _CHECKS = [
 @pytest.fixture
 def interface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Schema and content of a service with two drones, in which nothing moves on; for its admin."""
-    monkeypatch.setattr(apps, "_BURST", 1e9)
+    monkeypatch.setattr(admission, "_BURST", 1e9)
     path = tmp_path / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
     config = EnvironmentConfig.load(path)
@@ -52,7 +53,7 @@ def interface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     wanted.state.mkdir()
     with Store.open(tmp_path / "service.db") as store:
         token = Accounts(store).first_token()
-        app = apps.build_service(wanted, store)
+        app = provider.build_service(wanted, store)
         headers = {"Authorization": f"Bearer {token}"}
         schema = schemathesis.openapi.from_asgi("/v1/openapi.json", app, headers=headers)
         schema.config.update(headers=headers)

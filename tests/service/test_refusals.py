@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from aerodaas.protocol.schemas import LeaseIn, MissionIn, NavigationIn, TenantChange
 from aerodaas.service.errors import StoreError, without_folders
-from aerodaas.service.routes.refusals import refuse
+from aerodaas.service.http.refusals import refuse
 
 
 def refused(error: Exception) -> tuple[int, str]:

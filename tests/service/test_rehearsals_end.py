@@ -27,7 +27,7 @@ def rehearsal_of(provider: Served) -> psutil.Process:
     until = time.monotonic() + SECONDS
     while time.monotonic() < until:
         for process in psutil.Process(provider.process.pid).children():
-            if "aerodaas.service.flights" in process.cmdline():
+            if "aerodaas.flights" in process.cmdline():
                 return process
         time.sleep(0.05)
     raise AssertionError(provider.log.read_text())

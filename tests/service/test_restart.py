@@ -17,7 +17,7 @@ from test_desk import PILOT, Desk
 
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
-from aerodaas.service.access import Principal
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.locks import RobotLocks
@@ -213,7 +213,7 @@ def ordered(folder: Path) -> FlightFolder:
 
 def fly(folder: FlightFolder) -> str:
     """Run the process of a flight to its end; returns what it said."""
-    command = [sys.executable, "-m", "aerodaas.service.flights", str(folder.path)]
+    command = [sys.executable, "-m", "aerodaas.flights", str(folder.path)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120).stderr
 
 

@@ -57,7 +57,7 @@ def process_of(provider: Served, id_: str) -> psutil.Process:
     words = str(provider.folder / "s" / "m" / id_)
     for process in psutil.process_iter(["cmdline"]):
         line = process.info["cmdline"] or []
-        if "aerodaas.service.flights" in line and line[-1].startswith(words):
+        if "aerodaas.flights" in line and line[-1].startswith(words):
             return process
     raise AssertionError(id_)
 

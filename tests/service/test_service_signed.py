@@ -48,7 +48,7 @@ def test_a_signed_vehicle_is_watched_and_flown(monkeypatch: pytest.MonkeyPatch) 
         held = list(holders())
         ended = provider.until_phase(id_)
         assert (ended["phase"], ended["reason"]) == ("landed", "")
-        known = (" serve ", "aerodaas.service.monitor", "aerodaas.service.flights")
+        known = (" serve ", "aerodaas.service.monitor", "aerodaas.flights")
         assert {next((one for one in known if one in line), line) for line in held} == {*known}
         files = [path for path in provider.folder.rglob("*") if path.is_file()]
         assert any(path.suffix == ".mcap" for path in files)

@@ -12,7 +12,10 @@ from desks import PILOT, Provider
 
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.schemas import AccountIn, LeaseIn, LeaseState, LinkState, TokenIn
-from aerodaas.service.access import Access, Accounts, Audit, Quotas
+from aerodaas.service.access.access import Access
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder

@@ -15,11 +15,10 @@ from pydantic import ValidationError
 from aerodaas.analytics.base import Context, ResourceUse
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE
-from aerodaas.analytics.remote.guard import Guard, is_loopback
-from aerodaas.analytics.remote.listening import listen
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.http_server.addresses import Guard, is_loopback, listen
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.readings import Alert
 
@@ -118,7 +117,7 @@ class RemoteAnalytics(CommandingAnalytics):
     def begin(self, mission: MissionLink) -> None:
         """Start the server in a thread."""
         from aerodaas.analytics.remote.app import build_app  # noqa: PLC0415 - only in the actor
-        from aerodaas.analytics.remote.serving import web_server  # noqa: PLC0415
+        from aerodaas.http_server.server import web_server  # noqa: PLC0415
 
         assert self._socket is not None  # noqa: S101 - open came first
         token = self._settings.token.get_secret_value() if self._settings.token else None

@@ -13,9 +13,9 @@ from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException as AnyHTTPException
 
 from aerodaas.analytics.commanding import MissionLink
-from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
 from aerodaas.errors import InvalidWaypointError
+from aerodaas.http_server.denial import malformed
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import (

@@ -13,7 +13,6 @@ from urllib.parse import quote, urlencode
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
@@ -25,6 +24,7 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
+    AnswerOut,
     AuditOut,
     CommandIn,
     FleetOut,

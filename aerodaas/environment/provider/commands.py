@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
-from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import GraphError, InvalidWaypointError
@@ -22,7 +21,7 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
-from aerodaas.protocol.schemas import CommandIn, NavigationIn
+from aerodaas.protocol.schemas import AnswerOut, CommandIn, NavigationIn
 
 __all__ = ["send_command"]
 

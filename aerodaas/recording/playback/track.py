@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut, TrafficOut
 from aerodaas.clock import seconds
 from aerodaas.protocol.playback import GpsOut, HeardOut, PlaceOut, TrackOut
+from aerodaas.protocol.schemas import OutlookOut, StatusOut, TrafficOut
 
 __all__ = ["ROW_SECONDS", "Room", "TrackBuilder"]
 

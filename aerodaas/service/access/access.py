@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from http import HTTPStatus
 
-from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.http_server.wrong_tokens import WrongTokens
 from aerodaas.protocol.schemas import Scope
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit

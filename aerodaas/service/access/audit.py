@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from aerodaas.analytics.remote.schemas import AnswerOut
-from aerodaas.protocol.schemas import AuditOut
+from aerodaas.protocol.schemas import AnswerOut, AuditOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import AuditEntry, Store

@@ -20,14 +20,20 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, PictureForm, StreamKind
+from aerodaas.protocol.schemas import (
+    AnalyticsOut,
+    AnswerOut,
+    NavigationIn,
+    PictureForm,
+    StatusOut,
+    StreamKind,
+)
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch

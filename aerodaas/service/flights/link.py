@@ -13,11 +13,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerodaas.analytics.here.channel import Channel, ChannelError
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, AnswerOut, PictureForm, StatusOut, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.trouble import TroubleLog
 

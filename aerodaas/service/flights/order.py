@@ -7,11 +7,10 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
-from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
+from aerodaas.protocol.schemas import Area, SilencePolicy, StatusOut, VerdictOut
 from aerodaas.service.limits import TenantLimits
 
 __all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome", "Progress"]

@@ -37,7 +37,7 @@ def start_process(folder: FlightFolder, *, tied: bool, vehicles: bool) -> subpro
     """
     with folder.log.open("ab") as log:
         return subprocess.Popen(  # noqa: S603 - our own module
-            [sys.executable, "-m", "aerodaas.service.flights", str(folder.path)],
+            [sys.executable, "-m", "aerodaas.flights", str(folder.path)],
             stdin=subprocess.PIPE if tied else subprocess.DEVNULL,
             stdout=log,
             stderr=log,

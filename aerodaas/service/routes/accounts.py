@@ -20,10 +20,11 @@ from aerodaas.protocol.schemas import (
     TokenOut,
     UsageOut,
 )
-from aerodaas.service.access import Accounts, Audit, usage_csv
-from aerodaas.service.access.usage import usage_out
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.bodies import BoundedRoute
+from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.usage import usage_csv, usage_out
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.bodies import api_router
 from aerodaas.service.store import Store, Tenant
 
 __all__ = ["AccountRoutes"]
@@ -55,7 +56,7 @@ class AccountRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1", tags=["accounts"], route_class=BoundedRoute)
+        router = api_router("/v1", "accounts")
         router.add_api_route("/accounts", self.accounts)
         router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
         router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])

@@ -8,16 +8,16 @@ import contextlib
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from aerodaas.analytics.here.channel import ChannelError
-from aerodaas.console.jobs import end_jobs
-from aerodaas.console.live import until_refused
 from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role, Scope
-from aerodaas.service.access import Principal
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import refuse
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.refusals import refuse
+from aerodaas.service.live.jobs import end_jobs
+from aerodaas.service.live.session import until_refused
 
 __all__ = ["HereRoutes"]
 

@@ -8,11 +8,11 @@ from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseOut, Role, Scope
-from aerodaas.service.access import Audit
+from aerodaas.service.access.audit import Audit
 from aerodaas.service.bookings import Bookings
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.bodies import api_router
 from aerodaas.service.leases import lease_out
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.bodies import BoundedRoute
 
 __all__ = ["LeaseRoutes"]
 
@@ -38,7 +38,7 @@ class LeaseRoutes:
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1/leases", tags=["leases"], route_class=BoundedRoute)
+        router = api_router("/v1/leases", "leases")
         router.add_api_route("", self.request, methods=["POST"], status_code=201)
         router.add_api_route("", self.leases)
         router.add_api_route("/{lease}", self.lease)

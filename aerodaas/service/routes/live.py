@@ -1,4 +1,4 @@
-"""Live view of a mission: its state at each change, and the items of its streams."""
+"""WebSockets of a mission: its live view, and the controls of a robot by hand."""
 
 from __future__ import annotations
 
@@ -6,30 +6,33 @@ import asyncio
 
 from fastapi import APIRouter, WebSocket
 
-from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import Form, LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.errors import AeroDaaSError
-from aerodaas.protocol.schemas import PictureForm, Role, Scope
-from aerodaas.service.desk import MissionDesk
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import refuse
+from aerodaas.protocol.piloting import ControlsIn
+from aerodaas.protocol.schemas import AnswerOut, PictureForm, Role, Scope, Word
+from aerodaas.service.backend import Missions
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.refusals import refuse
+from aerodaas.service.live.controls import ControlCommand, ControlSession, told_of_controls
+from aerodaas.service.live.hub import StreamHub
+from aerodaas.service.live.session import Form, LiveSession, Rate, StreamNames, wanted_streams
 
 __all__ = ["LiveRoutes"]
 
 
 class LiveRoutes:
-    """Route `/v1/missions/{id}/live`."""
+    """Routes `/v1/missions/{id}/live` and `/v1/missions/{id}/controls`."""
 
-    def __init__(self, desk: MissionDesk, hub: StreamHub, admission: Admission) -> None:
-        """Show the desk's missions, and the hub's streams."""
-        self._desk = desk
-        self._hub = hub
+    def __init__(self, missions: Missions, admission: Admission) -> None:
+        """Show and command `missions`."""
+        self._missions = missions
+        self._hub = StreamHub(missions.items)
         self._admission = admission
 
     def router(self) -> APIRouter:
-        """The route."""
-        router = APIRouter()
-        router.add_api_websocket_route("/v1/missions/{mission}/live", self.live)
+        """The routes."""
+        router = APIRouter(prefix="/v1/missions")
+        router.add_api_websocket_route("/{mission}/live", self.live)
+        router.add_api_websocket_route("/{mission}/controls", self.controls)
         return router
 
     async def live(
@@ -49,16 +52,41 @@ class LiveRoutes:
         scope = Scope.SENSE if wanted else None
         try:
             principal = self._admission.require(socket, Role.VIEWER, scope)
-            await asyncio.to_thread(self._desk.mission, principal, mission)
-            own = await asyncio.to_thread(self._desk.flies, principal, mission)
+            await asyncio.to_thread(self._missions.mission, principal, mission)
+            own = await asyncio.to_thread(self._missions.flies, principal, mission)
         except AeroDaaSError as error:
             await refuse(socket.scope, socket.send, error)
             return
 
         def allowed() -> bool:
             return self._admission.stays(
-                socket, Role.VIEWER, scope, lambda who: self._desk.mission(who, mission)
+                socket, Role.VIEWER, scope, lambda who: self._missions.mission(who, mission)
             )
 
-        session = LiveSession(socket, self._desk, self._hub, mission)
+        session = LiveSession(socket, self._missions, self._hub, mission)
         await session.run(rate, wanted, own=own, allowed=allowed)
+
+    async def controls(self, socket: WebSocket, mission: str, robot: Word) -> None:
+        """Have a robot flown by hand, until the sender lets go or falls silent."""
+        try:
+            principal = self._admission.require(socket, Role.PILOT, Scope.FLY)
+            with self._admission.auditing(principal, socket):
+                await asyncio.to_thread(self._missions.require_pilot, principal, mission)
+        except AeroDaaSError as error:
+            await refuse(socket.scope, socket.send, error)
+            return
+
+        def give(command: ControlCommand) -> AnswerOut:
+            # As the account is now: an operator's hand does not outlive the role.
+            sender = self._admission.require(socket, Role.PILOT, Scope.FLY)
+            answer = self._missions.fly(sender, mission, ControlsIn.of(robot, command))
+            if told_of_controls(command):
+                target = f"{mission}/{robot}"
+                self._admission.note_answer(sender, "controls", target, answer)
+            return answer
+
+        def renew() -> None:
+            self._admission.enter(socket)
+            self._admission.require(socket, Role.PILOT, Scope.FLY)
+
+        await ControlSession(socket, principal.account, give, renew).run()

@@ -1,207 +1,122 @@
-"""Missions: submission, commands, recordings."""
+"""Missions, and what a pilot does with a flying one: commands, waypoints, surveys, their order."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, BackgroundTasks, Header, Request
-from fastapi.responses import FileResponse, Response
+from fastapi import APIRouter, BackgroundTasks, Request
 
-from aerodaas.analytics.remote.schemas import AnswerOut
-from aerodaas.console.playback import (
-    Moment,
-    Player,
-    Players,
-    Stream,
-    flight_answer,
-    picture_answer,
-)
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
+    AnswerOut,
     CommandIn,
-    GrantIn,
-    MissionIn,
     MissionOut,
     NavigationIn,
     Role,
     Scope,
-    Word,
 )
-from aerodaas.service.access import Audit
-from aerodaas.service.desk import MissionDesk
-from aerodaas.service.idempotency import read_key
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.bodies import BoundedRoute
+from aerodaas.service.backend import Missions, PilotCommand, ShownMissions
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.bodies import api_router
+from aerodaas.service.live.surveys import SurveyPlanner
 
-__all__ = ["MissionRoutes"]
+__all__ = ["MissionRoutes", "PilotingRoutes"]
 
 
 class MissionRoutes:
-    """Routes below `/v1/missions`."""
+    """Routes `/v1/missions`, `/v1/missions/{id}` and `/v1/missions/{id}/scenery`."""
 
-    def __init__(self, desk: MissionDesk, admission: Admission, audit: Audit) -> None:
-        """Answer from the desk."""
-        self._desk = desk
+    def __init__(self, missions: ShownMissions, admission: Admission) -> None:
+        """Show `missions`."""
+        self._missions = missions
         self._admission = admission
-        self._audit = audit
-        self._players = Players()
 
     def router(self) -> APIRouter:
         """The routes."""
-        router = APIRouter(prefix="/v1/missions", tags=["missions"], route_class=BoundedRoute)
-        router.add_api_route("", self.submit, methods=["POST"], status_code=202)
+        router = api_router("/v1/missions", "missions")
         router.add_api_route("", self.missions)
         router.add_api_route("/{mission}", self.mission)
         router.add_api_route("/{mission}/scenery", self.scenery)
-        router.add_api_route("/{mission}", self.cancel, methods=["DELETE"])
-        router.add_api_route("/{mission}/approve", self.approve, methods=["POST"])
-        router.add_api_route("/{mission}/commands", self.command, methods=["POST"])
-        router.add_api_route("/{mission}/navigation", self.navigation, methods=["POST"])
-        grants = "/{mission}/grants/{tenant}"
-        router.add_api_route(grants, self.grant, methods=["PUT"])
-        router.add_api_route(grants, self.withdraw, methods=["DELETE"])
-        files: dict[str, Any] = {"response_class": FileResponse}
-        router.add_api_route("/{mission}/recording", self.recording, **files)
-        router.add_api_route(
-            "/{mission}/recording", self.delete_recording, methods=["DELETE"], status_code=204
-        )
-        router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
-        bare: dict[str, Any] = {"response_model": None}
-        router.add_api_route("/{mission}/playback", self.playback, **bare)
-        router.add_api_route("/{mission}/playback/picture", self.moment, **bare)
         return router
-
-    def submit(
-        self,
-        wanted: MissionIn,
-        request: Request,
-        idempotency_key: Annotated[str | None, Header()] = None,
-    ) -> MissionOut:
-        """Submit a mission document to be rehearsed and flown.
-
-        The same document with the same `Idempotency-Key` is the same mission, however often it
-        is sent.
-        """
-        scope = Scope.FLY if wanted.attach is None else Scope.SENSE
-        principal = self._admission.require(request, Role.PILOT, scope)
-        with self._admission.auditing(principal, request):
-            found = self._desk.submit(principal, wanted, read_key(idempotency_key))
-        self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
-        return found
 
     def missions(self, request: Request) -> list[MissionOut]:
         """All missions that the account may see, newest first."""
-        return self._desk.missions(self._admission.require(request, Role.VIEWER))
+        return self._missions.missions(self._admission.require(request, Role.VIEWER))
 
     def mission(self, mission: str, request: Request) -> MissionOut:
-        """One mission with its newest state."""
-        principal = self._admission.require(request, Role.VIEWER)
-        found = self._desk.mission(principal, mission)
-        if self._desk.flies(principal, mission):
-            self._desk.hear(mission)
-        return found
+        """One mission with its newest state; its own user counts as present."""
+        return self._missions.mission(self._admission.require(request, Role.VIEWER), mission)
 
     def scenery(self, mission: str, request: Request) -> SceneryOut:
         """What lies below a mission on the map."""
-        return self._desk.scenery(self._admission.require(request, Role.VIEWER), mission)
+        return self._missions.scenery(self._admission.require(request, Role.VIEWER), mission)
 
-    def cancel(self, mission: str, request: Request) -> MissionOut:
-        """Cancel a mission; drones in flight come home."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        with self._admission.auditing(principal, request):
-            found = self._desk.cancel(principal, mission)
-        self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
-        return found
 
-    def approve(self, mission: str, request: Request) -> MissionOut:
-        """Approve a mission that waits for an operator."""
-        principal = self._admission.require(request, Role.OPERATOR)
-        with self._admission.auditing(principal, request):
-            found = self._desk.approve(principal, mission)
-        self._audit.write(principal, "mission.approve", mission, accepted=True)
-        return found
+class PilotingRoutes:
+    """Routes `/v1/missions/{id}/commands`, `navigation`, `plan`, `actuators` and `survey`."""
 
-    def grant(self, mission: str, tenant: Word, body: GrantIn, request: Request) -> MissionOut:
-        """Let a tenant attach missions to this one's cameras, and no others than these."""
-        principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
-        with self._admission.auditing(principal, request):
-            found = self._desk.grant(principal, mission, tenant, body.sensors)
-        said = f"to {tenant}: {', '.join(body.sensors) or 'all cameras'}"
-        self._audit.write(principal, "mission.grant", mission, said, accepted=True)
-        return found
+    def __init__(self, missions: Missions, admission: Admission) -> None:
+        """Command `missions`."""
+        self._missions = missions
+        self._admission = admission
+        self._surveys = SurveyPlanner()
 
-    def withdraw(self, mission: str, tenant: Word, request: Request) -> MissionOut:
-        """Withdraw what a tenant was granted; what it has attached gets no further picture."""
-        principal = self._admission.require(request, Role.PILOT)
-        with self._admission.auditing(principal, request):
-            found = self._desk.grant(principal, mission, tenant, None)
-        said = f"from {tenant}"
-        self._audit.write(
-            principal, "mission.withdraw", mission, said, accepted=True, required=False
-        )
-        return found
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = api_router("/v1/missions", "missions")
+        posted: dict[str, Any] = {"methods": ["POST"]}
+        router.add_api_route("/{mission}/commands", self.command, **posted)
+        router.add_api_route("/{mission}/navigation", self.navigation, **posted)
+        router.add_api_route("/{mission}/plan", self.rearrange, **posted)
+        router.add_api_route("/{mission}/actuators", self.actuate, **posted)
+        router.add_api_route("/{mission}/survey", self.survey, **posted)
+        return router
 
     def command(
         self, mission: str, body: CommandIn, request: Request, later: BackgroundTasks
     ) -> AnswerOut:
         """Give one of the mission's robots a command; answers what the drone said."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        with self._admission.auditing(principal, request):
-            answer = self._desk.command(principal, mission, body)
-        later.add_task(
-            self._audit.note_answer, principal, body.command, f"{mission}/{body.robot}", answer
-        )
-        return answer
+        return self._fly(mission, body, body.command, request, later)
 
     def navigation(
         self, mission: str, body: NavigationIn, request: Request, later: BackgroundTasks
     ) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
+        return self._fly(mission, body, "navigation", request, later)
+
+    def rearrange(
+        self, mission: str, body: RearrangeIn, request: Request, later: BackgroundTasks
+    ) -> AnswerOut:
+        """Change the order of a robot's coming waypoints, or remove some."""
+        return self._fly(mission, body, "plan", request, later)
+
+    def actuate(
+        self, mission: str, body: ActuateIn, request: Request, later: BackgroundTasks
+    ) -> AnswerOut:
+        """Move an actuator that the account may move."""
+        return self._fly(mission, body, "actuate", request, later, f"/{body.actuator}")
+
+    def survey(self, mission: str, body: SurveyIn, request: Request) -> SurveyOut:
+        """Plan the survey of an area by one of the mission's robots; nothing is flown."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        with self._admission.auditing(principal, request):
-            answer = self._desk.fly(principal, mission, body)
-        later.add_task(
-            self._audit.note_answer, principal, "navigation", f"{mission}/{body.robot}", answer
-        )
-        return answer
+        config = self._missions.environment(principal, mission)
+        status = self._missions.mission(principal, mission).status.get(body.robot)
+        return self._surveys.plan(body, config, status)
 
-    def recording(self, mission: str, request: Request) -> FileResponse:
-        """The flight's recording, an MCAP file, once it is over."""
-        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
-        path = self._desk.file(principal, mission, "recording")
-        return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
-
-    def delete_recording(self, mission: str, request: Request) -> None:
-        """Remove the recording of a mission that is over."""
-        principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
-        with self._admission.auditing(principal, request):
-            self._desk.delete_recording(principal, mission)
-        self._audit.write(principal, "recording.delete", mission, accepted=True)
-
-    def picture(self, mission: str, request: Request) -> FileResponse:
-        """Picture of the rehearsed flight."""
-        principal = self._admission.require(request, Role.VIEWER)
-        return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
-
-    def playback(self, mission: str, request: Request) -> Response:
-        """The recorded flight as a page plays it, once it is over; how far it has been read."""
-        return flight_answer(self._player(mission, request))
-
-    def moment(
+    def _fly(
         self,
         mission: str,
+        body: PilotCommand,
+        action: str,
         request: Request,
-        stream: Stream,
-        at: Moment,
-        depth: bool = False,  # noqa: FBT001, FBT002 - of an address
-    ) -> Response:
-        """The last picture of a stream captured at or before a mission time, in nanoseconds.
-
-        One line of JSON with what was found in it and the picture's header; after it its depth as a
-        PNG, if wanted and measured, and a JPEG.
-        """
-        return picture_answer(self._player(mission, request), stream, at, depth=depth)
-
-    def _player(self, mission: str, request: Request) -> Player:
-        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
-        return self._players.of(mission, self._desk.file(principal, mission, "recording"))
+        later: BackgroundTasks,
+        part: str = "",
+    ) -> AnswerOut:
+        """Have a robot do what its pilot asks; audited as `action` on the robot, or its `part`."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        with self._admission.auditing(principal, request):
+            answer = self._missions.fly(principal, mission, body)
+        target = f"{mission}/{body.robot}{part}"
+        later.add_task(self._admission.note_answer, principal, action, target, answer)
+        return answer

@@ -17,7 +17,6 @@ from provider_stub import CATALOGUE, MISSION, TOKEN, Stub, mission
 from aerodaas import AeroNavigation, Environment, NavigationType, OrderedScheduler, Waypoint
 from aerodaas.analytics import MonitoringAnalytics, VipDetectionAnalytics
 from aerodaas.analytics.models import DETECTOR
-from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
 from aerodaas.environment.provider import client as client_module
@@ -32,7 +31,7 @@ from aerodaas.errors import (
     UnknownIdError,
 )
 from aerodaas.mission.commands import AddNavigation
-from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
+from aerodaas.protocol.schemas import AnswerOut, MissionPhase, NavigationIn, VerdictOut
 
 
 @pytest.fixture(autouse=True)

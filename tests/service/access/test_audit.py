@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from aerodaas.protocol.schemas import Role, Scope
-from aerodaas.service.access import Audit, Principal
+from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import AuditEntry, Store
 

@@ -10,7 +10,8 @@ from datetime import datetime, timezone
 import pytest
 
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.service.access import Quotas, usage_csv, usage_out
+from aerodaas.service.access.quotas import Quotas
+from aerodaas.service.access.usage import usage_csv, usage_out
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 

@@ -8,7 +8,7 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
-from aerodaas.service.access import RateLimiter
+from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.errors import RefusedError
 
 

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.analytics.wire_items import pack
 from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig
@@ -23,7 +22,7 @@ from aerodaas.errors import ConfigError, MissionError, SourceError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import PictureForm
+from aerodaas.protocol.schemas import PictureForm, StatusOut
 from aerodaas.service.flights import link
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder

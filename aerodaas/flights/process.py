@@ -1,4 +1,4 @@
-"""The process of one flight: `python -m aerodaas.service.flights FOLDER`.
+"""The process of one flight: `python -m aerodaas.flights FOLDER`.
 
 It holds all that the flight needs: the document, the limited environment and the end of the lease.
 The service starts it and talks to it, but neither its end nor the database's ends the flight.
@@ -19,11 +19,8 @@ from pydantic import SecretStr
 
 from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import EdgeShare, RunOptions, current_options
-from aerodaas.console.meter import FlightMeter
-from aerodaas.console.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
@@ -31,7 +28,7 @@ from aerodaas.environment.run import Run
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, PictureForm, StatusOut, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.environment import environment_of
@@ -39,6 +36,8 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.live.meter import FlightMeter
+from aerodaas.service.live.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.terrain.ground import Ground
 
 __all__ = ["Flying", "fly"]

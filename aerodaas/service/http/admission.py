@@ -7,20 +7,27 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from http import HTTPStatus
+from typing import TYPE_CHECKING, Protocol
 
 from starlette.requests import HTTPConnection
 
-from aerodaas.console.access import bearer
 from aerodaas.errors import AeroDaaSError
-from aerodaas.protocol.schemas import Role, Scope
-from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
+from aerodaas.protocol.schemas import AnswerOut, Role, Scope
+from aerodaas.service.access.principal import Principal, require
+from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.bearer import bearer
 
-__all__ = ["Admission"]
+if TYPE_CHECKING:
+    from aerodaas.service.access.audit import Audit
+
+__all__ = ["Admission", "Tokens"]
 
 _SENDER = "aerodaas.principal"
 """Key of the sender in a request's ASGI scope."""
 _THREADS = 8
+_RATE, _BURST = 50.0, 200.0
+"""Requests a second of one account, on average and at once."""
 _GONE = frozenset(
     {
         HTTPStatus.UNAUTHORIZED,
@@ -33,14 +40,22 @@ _GONE = frozenset(
 """Refusals of who may not go on; any other one is the service's own trouble."""
 
 
+class Tokens(Protocol):
+    """Tokens that are good, and whose they are."""
+
+    def of(self, token: str, address: str) -> Principal:
+        """Who sends a `token` from an `address`; raises RefusedError for a wrong one."""
+        ...
+
+
 class Admission:
     """Tells who sends a request, and whether they may; refusals are audited."""
 
-    def __init__(self, access: Access, audit: Audit, rates: RateLimiter) -> None:
-        """Admit by `access`, and no more often than `rates` allow."""
-        self._access = access
+    def __init__(self, tokens: Tokens, audit: Audit | None = None) -> None:
+        """Admit by `tokens`; refusals and drones' answers go to `audit`, if there is one."""
         self._audit = audit
-        self._rates = rates
+        self._tokens = tokens
+        self._rates = RateLimiter(_RATE, _BURST)
         self._threads = ThreadPoolExecutor(_THREADS, "admission")
 
     async def admit(self, connection: HTTPConnection) -> Principal:
@@ -53,7 +68,7 @@ class Admission:
         address = _address(connection)
         principal: Principal | None = None
         try:
-            principal = self._access.of(bearer(connection.headers), address)
+            principal = self._tokens.of(bearer(connection.headers), address)
             self._rates.admit(principal.account)
         except RefusedError as error:
             # A wrong token is audited where it is counted.
@@ -76,7 +91,7 @@ class Admission:
         """
         token, address = bearer(connection.headers), _address(connection)
         try:
-            connection.scope[_SENDER] = self._access.of(token, address)
+            connection.scope[_SENDER] = self._tokens.of(token, address)
             look(self.require(connection, role, scope))
         except RefusedError as error:
             return error.status not in _GONE
@@ -103,9 +118,18 @@ class Admission:
             self._refuse(principal, connection, error)
             raise
 
+    def note_answer(
+        self, principal: Principal, action: str, target: str, answer: AnswerOut
+    ) -> None:
+        """Audit what a drone answered to a command."""
+        if self._audit is not None:
+            self._audit.note_answer(principal, action, target, answer)
+
     def _refuse(
         self, principal: Principal, connection: HTTPConnection, error: RefusedError
     ) -> None:
+        if self._audit is None:
+            return
         action = f"{connection.scope.get('method', 'WS')} {connection.scope['path']}"
         self._audit.write(
             principal,

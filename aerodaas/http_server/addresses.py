@@ -9,8 +9,8 @@ from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http import HTTPStatus
 from typing import Any, TypeAlias
 
-from aerodaas.analytics.remote.attempts import WrongTokens
-from aerodaas.analytics.remote.denial import deny
+from aerodaas.http_server.denial import deny
+from aerodaas.http_server.wrong_tokens import WrongTokens
 
 __all__ = [
     "Guard",
@@ -20,6 +20,7 @@ __all__ = [
     "host_name",
     "is_loopback",
     "is_served",
+    "listen",
 ]
 
 Scope: TypeAlias = MutableMapping[str, Any]
@@ -152,3 +153,9 @@ def host_name(host: bytes) -> str:
 async def _refuse(scope: Scope, send: Send, status: int, text: str, pause: int = 0) -> None:
     content = {"accepted": False, "text": text, "refused": {}}
     await deny(scope, send, status, content, pause=pause or None)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """Listen on a TCP port of IPv4 or IPv6, 0 for any free one; raises OSError, OverflowError."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family)

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.errors import MissionError
 from aerodaas.mission.survey import SurveySettings, plan_survey
 from aerodaas.mission.survey_photos import SurveyPhotos, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
+from aerodaas.protocol.schemas import StatusOut
 from aerodaas.schedulers.trajectory.coverage import footprint
 
 __all__ = ["SurveyPlanner"]

@@ -14,8 +14,8 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
 
-from aerodaas.analytics.remote.denial import deny, malformed
-from aerodaas.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError, MissionError, SilentError
+from aerodaas.http_server.denial import deny, malformed
 from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError, without_folders
 
@@ -37,6 +37,7 @@ REFUSALS: dict[int | str, dict[str, Any]] = {
         HTTPStatus.UNPROCESSABLE_ENTITY,
         HTTPStatus.TOO_MANY_REQUESTS,
         HTTPStatus.SERVICE_UNAVAILABLE,
+        HTTPStatus.GATEWAY_TIMEOUT,
         HTTPStatus.INSUFFICIENT_STORAGE,
     )
 }
@@ -62,6 +63,9 @@ async def refuse(scope: Scope, send: Send, error: Exception) -> None:
         status = int(HTTPStatus.SERVICE_UNAVAILABLE)
         text = "the service's database cannot be used: ask again later; its log says why"
         _log_failure(error)
+    elif isinstance(error, MissionError):
+        silent = isinstance(error, SilentError)
+        status = int(HTTPStatus.GATEWAY_TIMEOUT if silent else HTTPStatus.CONFLICT)
     elif isinstance(error, RequestValidationError | WebSocketRequestValidationError):
         status, text = malformed(error.errors())
     elif isinstance(error, HTTPException):

@@ -5,21 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Sequence
-from typing import Annotated, Protocol, TypeAlias
+from typing import Annotated, TypeAlias
 
 from fastapi import Query, WebSocket, WebSocketDisconnect
 
 from aerodaas.clock import host_time_ns
-from aerodaas.console.access import SUBPROTOCOL
-from aerodaas.console.hub import StreamHub, Watcher
-from aerodaas.console.jobs import end_jobs
 from aerodaas.protocol.schemas import PictureForm
+from aerodaas.service.backend import Missions
+from aerodaas.service.http.bearer import SUBPROTOCOL
+from aerodaas.service.live.hub import StreamHub, Watcher
+from aerodaas.service.live.jobs import end_jobs
 
 __all__ = [
     "Form",
     "LiveSession",
     "Rate",
-    "Shown",
     "StreamNames",
     "Wanted",
     "until_refused",
@@ -41,22 +41,6 @@ _RENEWAL_SECONDS = 5.0
 """Wall seconds between two looks at whether a connection still may be had."""
 _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
-
-
-class Shown(Protocol):
-    """Missions as a live view sees them; called in any thread."""
-
-    def version(self, mission: str) -> int:
-        """A number that grows with each change of a mission; -1 once it is over."""
-        ...
-
-    def text(self, mission: str) -> tuple[str, bool]:
-        """A mission as JSON, and whether it is over."""
-        ...
-
-    def hear(self, mission: str) -> None:
-        """Note that the user of a mission is there."""
-        ...
 
 
 def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[Wanted]:
@@ -81,10 +65,10 @@ async def until_refused(allowed: Callable[[], bool]) -> None:
 class LiveSession:
     """One watcher's connection."""
 
-    def __init__(self, socket: WebSocket, shown: Shown, hub: StreamHub, mission: str) -> None:
+    def __init__(self, socket: WebSocket, missions: Missions, hub: StreamHub, mission: str) -> None:
         """Show a mission to the one behind `socket`, which is not accepted yet."""
         self._socket = socket
-        self._shown = shown
+        self._missions = missions
         self._hub = hub
         self._mission = mission
         # An item's two messages stay together.
@@ -125,13 +109,13 @@ class LiveSession:
         sent, since, heard = -1, 0.0, 0.0
         loop = asyncio.get_running_loop()
         while True:
-            now, version = loop.time(), self._shown.version(self._mission)
+            now, version = loop.time(), self._missions.version(self._mission)
             if own and now - heard > _IDLE_SECONDS:
                 heard = now
-                await asyncio.to_thread(self._shown.hear, self._mission)
+                await asyncio.to_thread(self._missions.hear, self._mission)
             if version != sent or now - since > _IDLE_SECONDS:
                 sent, since = version, now
-                text, over = self._shown.text(self._mission)
+                text, over = self._missions.text(self._mission)
                 head = f'"kind": "mission", "now": {host_time_ns()}'
                 async with self._sending:
                     await self._socket.send_text(f'{{{head}, "mission": {text}}}')

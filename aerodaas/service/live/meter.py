@@ -6,11 +6,10 @@ from collections import OrderedDict, defaultdict
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.messages.mission import GROUNDED
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnalyticsOut
+from aerodaas.protocol.schemas import AnalyticsOut, StatusOut
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import ActorReport, FlightState

@@ -7,9 +7,6 @@ import logging
 import threading
 from collections import OrderedDict
 from pathlib import Path
-from typing import Annotated, TypeAlias
-
-from fastapi import Query, Response
 
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.protocol.playback import PlaybackOut
@@ -17,12 +14,7 @@ from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.reader import Recording
 
-__all__ = ["Moment", "Player", "Players", "Stream", "flight_answer", "picture_answer"]
-
-Moment: TypeAlias = Annotated[int, Query(ge=0, le=10**18)]
-"""Mission nanoseconds; of a picture's address."""
-Stream: TypeAlias = Annotated[str, Query(max_length=4096)]
-"""Name of a stream of pictures; of a picture's address."""
+__all__ = ["Player", "Players"]
 
 _log = logging.getLogger(__name__)
 _MOST_OPEN = 4
@@ -136,14 +128,3 @@ class Players:
                     self._open.popitem(last=False)[1].close()
             self._open.move_to_end(mission)
             return known
-
-
-def flight_answer(player: Player) -> Response:
-    """How far the recording has been read, and the flight once it was."""
-    return Response(player.text, media_type="application/json")
-
-
-def picture_answer(player: Player, stream: str, time: int, *, depth: bool) -> Response:
-    """A picture with what was found in it, and with its depth if wanted."""
-    content = player.picture(stream, time, depth=depth)
-    return Response(content, media_type="application/octet-stream")

@@ -1,4 +1,4 @@
-"""`python -m aerodaas.service.flights FOLDER`: fly the order in a folder, or rehearse it."""
+"""`python -m aerodaas.flights FOLDER`: fly the order in a folder, or rehearse it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def main() -> None:
     path = Path(sys.argv[1])
     if FlightOrder.read(FlightFolder(path).order).rehearsal:
         end_with_starter()
-        from aerodaas.service.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the plots
+        from aerodaas.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the plots
 
         rehearse(path)
         return
-    from aerodaas.service.flights.process import fly  # noqa: PLC0415 - the simulator's and Ray's
+    from aerodaas.flights.process import fly  # noqa: PLC0415 - the simulator's and Ray's
 
     fly(path)
 

@@ -14,10 +14,10 @@ import psutil
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.errors import AeroDaaSError
+from aerodaas.flights.process import Flying
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
-from aerodaas.service.flights.process import Flying
 from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
 

@@ -9,14 +9,16 @@ from concurrent.futures import ThreadPoolExecutor
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import Request, Response
+from fastapi import APIRouter, Request, Response, Security
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
+from fastapi.security import HTTPBearer
 from pydantic import TypeAdapter, ValidationError
 
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.refusals import REFUSALS
 
-__all__ = ["BoundedRoute"]
+__all__ = ["api_router"]
 
 _SMALL = 1 << 10
 """Bytes of a body that is parsed at once: a command waits for nobody's document."""
@@ -30,7 +32,19 @@ _MOST_ERRORS = 100
 _parsing = ThreadPoolExecutor(1, "parsing")
 
 
-class BoundedRoute(APIRoute):
+def api_router(prefix: str, tag: str) -> APIRouter:
+    """Make a router of HTTP routes below `prefix`, whose bodies are bounded."""
+    return APIRouter(
+        prefix=prefix,
+        tags=[tag],
+        route_class=_BoundedRoute,
+        # The gate has looked at the token by then; this tells the schema's readers of it.
+        dependencies=[Security(HTTPBearer(auto_error=False))],
+        responses=REFUSALS,
+    )
+
+
+class _BoundedRoute(APIRoute):
     """Route whose body, unless it is small, keeps no other request waiting while it is parsed."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

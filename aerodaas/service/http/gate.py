@@ -4,49 +4,62 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from dataclasses import dataclass
 from http import HTTPStatus
 
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from aerodaas.analytics.remote.guard import address_of
-from aerodaas.console.page import is_page
 from aerodaas.errors import AeroDaaSError
+from aerodaas.http_server.addresses import address_of
 from aerodaas.protocol.schemas import Role
-from aerodaas.service.access import Principal
+from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.page import is_page
+from aerodaas.service.http.refusals import refuse
 from aerodaas.service.models import LARGEST_MODEL
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import refuse
 
-__all__ = ["Gate"]
+__all__ = ["Bounds", "Gate"]
 
 _LARGEST_DOCUMENT, _LARGEST_COMMAND, _LARGEST_OTHER = 4 << 20, 1 << 20, 16 << 10
 """Bytes of a submission, of what is asked of a mission, and of any other body: a document of 10,000
 waypoints has 2 MB, a command of 1,000 a quarter."""
 _LARGE = 64 << 10
 """Bytes of a body of which an account sends few at once."""
-_MOST_AT_ONCE, _MOST_LARGE, _MOST_LASTING = 16, 2, 32
-"""Requests of one account that are answered at once, those of them with a large body, and its live
-views and other WebSockets: who asks for more keeps others' commands waiting."""
+_MOST_AT_ONCE, _MOST_LARGE = 16, 2
+"""Requests of one account that are answered at once, and those of them with a large body: who asks
+for more keeps others' commands waiting."""
 _MOST_LASTING_OF_ADDRESS = 160
 _MOST_OF_ALL, _MOST_LARGE_OF_ALL, _MOST_LASTING_OF_ALL = 160, 16, 320
-"""The same of all accounts but operators, for whom threads and connections are left."""
+"""The same of all accounts but those with a reserve: threads and connections are left for these."""
 _READING = frozenset({"GET", "HEAD"})
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds of who may ask how much at once."""
+
+    reserved: Role = Role.OPERATOR
+    """The lowest role whose requests are never turned away for their number."""
+    lasting: int = 32
+    """Most live views and other WebSockets of one account."""
 
 
 class Gate:
     """ASGI middleware that admits valid tokens only, bodies of a bounded size, and few at once.
 
-    The role comes first: who may only look sends no body. An operator is never turned away.
+    The role comes first: who may only look sends no body. Who has a reserve is never turned
+    away.
     """
 
-    def __init__(self, app: ASGIApp, admission: Admission) -> None:
+    def __init__(self, app: ASGIApp, admission: Admission, bounds: Bounds) -> None:
         """Protect `app`."""
         self._app = app
+        self._bounds = bounds
         self._admission = admission
         self._counts: Counter[tuple[str, str]] = Counter()
-        """What is answered now, by kind and account or address; "" for all but operators."""
+        """What is answered now, by kind and account or address; "" for all without a reserve."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it."""
@@ -62,7 +75,7 @@ class Gate:
             sender = await self._admission.admit(connection)
             if scope["type"] == "http" and scope["method"] not in _READING:
                 await asyncio.to_thread(self._admission.require, connection, Role.PILOT)
-            bounds = _bounds_of(sender, connection, large=large)
+            bounds = self._bounds_of(sender, connection, large=large)
             for (kind, whose), limit in bounds.items():
                 if self._counts[kind, whose] >= limit:
                     text = f"{limit} {kind} of {whose or 'all users'} are answered: wait for one"
@@ -80,24 +93,23 @@ class Gate:
         with self._admission.auditing(sender, connection):
             raise RefusedError(int(HTTPStatus.TOO_MANY_REQUESTS), text, retry_after=1.0)
 
-
-def _bounds_of(
-    sender: Principal, connection: HTTPConnection, *, large: bool
-) -> dict[tuple[str, str], int]:
-    """What a request counts as, by kind and whose it is, with the most of each; none for some."""
-    if sender.role.reaches(Role.OPERATOR):
-        return {}
-    if connection.scope["type"] == "websocket":
-        return {
-            ("live views", sender.account): _MOST_LASTING,
-            ("live views", address_of(connection.scope)): _MOST_LASTING_OF_ADDRESS,
-            ("live views", ""): _MOST_LASTING_OF_ALL,
-        }
-    bounds = {("requests", sender.account): _MOST_AT_ONCE, ("requests", ""): _MOST_OF_ALL}
-    if large:
-        bounds["large requests", sender.account] = _MOST_LARGE
-        bounds["large requests", ""] = _MOST_LARGE_OF_ALL
-    return bounds
+    def _bounds_of(
+        self, sender: Principal, connection: HTTPConnection, *, large: bool
+    ) -> dict[tuple[str, str], int]:
+        """What a request counts as, by kind and whose it is, with the most of each."""
+        if sender.role.reaches(self._bounds.reserved):
+            return {}
+        if connection.scope["type"] == "websocket":
+            return {
+                ("live views", sender.account): self._bounds.lasting,
+                ("live views", address_of(connection.scope)): _MOST_LASTING_OF_ADDRESS,
+                ("live views", ""): _MOST_LASTING_OF_ALL,
+            }
+        bounds = {("requests", sender.account): _MOST_AT_ONCE, ("requests", ""): _MOST_OF_ALL}
+        if large:
+            bounds["large requests", sender.account] = _MOST_LARGE
+            bounds["large requests", ""] = _MOST_LARGE_OF_ALL
+        return bounds
 
 
 def _bound_of(connection: HTTPConnection) -> tuple[int, bool]:

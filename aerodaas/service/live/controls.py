@@ -17,12 +17,12 @@ from typing import TypeAlias
 from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
-from aerodaas.analytics.remote.schemas import AnswerOut
-from aerodaas.console.access import SUBPROTOCOL
-from aerodaas.console.jobs import end_jobs
 from aerodaas.errors import AeroDaaSError
 from aerodaas.mission.commands import ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
+from aerodaas.protocol.schemas import AnswerOut
+from aerodaas.service.http.bearer import SUBPROTOCOL
+from aerodaas.service.live.jobs import end_jobs
 
 __all__ = ["ControlCommand", "ControlSession", "Freshness", "told_of_controls"]
 

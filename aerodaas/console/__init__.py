@@ -1,1 +1,0 @@
-"""The console: one web page from which flights are watched and commanded."""

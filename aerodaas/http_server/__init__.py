@@ -1,0 +1,1 @@
+"""What every HTTP server has: names it answers to, bounds, refusals, wrong tokens."""

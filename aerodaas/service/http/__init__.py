@@ -1,0 +1,1 @@
+"""The API over HTTP: admission, bounds, refusals, and the page."""

@@ -1,0 +1,1 @@
+"""Live views, controls by hand and playback of missions."""

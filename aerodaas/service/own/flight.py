@@ -1,0 +1,309 @@
+"""One's own flight behind the API: one mission, whose drones are the fleet."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+from aerodaas.config.redaction import catalogue
+from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
+from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.protocol.scenery import SceneryOut
+from aerodaas.protocol.schemas import (
+    AccountOut,
+    AnswerOut,
+    CommandIn,
+    FleetOut,
+    MissionOut,
+    MissionPhase,
+    NavigationIn,
+    PictureForm,
+    RobotOut,
+    Role,
+)
+from aerodaas.service.access.principal import Principal, require
+from aerodaas.service.backend import PilotCommand
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.live.controls import told_of_controls
+from aerodaas.service.live.meter import FlightMeter
+from aerodaas.service.live.packed_reader import PackedReader, drawn_streams, ground_of
+from aerodaas.service.own.access import OWN, account_of
+
+if TYPE_CHECKING:
+    from aerodaas.config.model import EnvironmentConfig
+    from aerodaas.dataflow.graph import Graph
+    from aerodaas.runtime.reports import FlightState
+    from aerodaas.terrain.ground import Ground
+
+__all__ = ["Flown", "OwnFlight"]
+
+_LOOK_SECONDS = 0.1
+"""Wall seconds between two looks at the drones while somebody watches."""
+_WATCHED_SECONDS = 2.0
+"""Wall seconds after which a flight that nobody asked for is not watched any more."""
+_ITEM_SECONDS = 0.5
+_PATIENCE = 5.0
+"""Wall seconds for a drone's answer; its loop runs at 20 Hz."""
+_MOST_ASKED = 32
+"""Most commands at once that drones have not answered; further ones wait."""
+_NAMED = 8
+"""Most waypoints that an alert names."""
+
+
+class Flown(Protocol):
+    """The flight, called from several threads."""
+
+    config: EnvironmentConfig
+    graph: Graph
+    state: FlightState | None
+    """What a look has found last."""
+
+    def look(self, newest: int = 200) -> FlightState:
+        """Its present state; raises AeroDaaSError."""
+        ...
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Execute a command on a robot's mission; raises AeroDaaSError."""
+        ...
+
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert."""
+        ...
+
+    @property
+    def over(self) -> bool:
+        """Whether every mission has ended."""
+        ...
+
+
+class OwnFlight:
+    """The flight as `Missions` and as `Fleet`; safe in any thread."""
+
+    def __init__(self, run: Flown, name: str) -> None:
+        """Show `run`, an application called `name`."""
+        self._run = run
+        self._name = name
+        self._meter = FlightMeter()
+        self._lock = threading.Lock()
+        self._looking = threading.Lock()
+        self._began = time.time()
+        self._version = 0
+        self._text: tuple[int, str] = (-1, "")
+        self._asked = 0.0
+        self._closed = threading.Event()
+        self._commands = ThreadPoolExecutor(_MOST_ASKED, "commands")
+        threading.Thread(target=self._look, name="console", daemon=True).start()
+
+    def close(self) -> None:
+        """Look no more; whoever watches is told that the flight is over."""
+        if self._run.state is not None:
+            self._take(self._run.state)
+        self._closed.set()
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight is over."""
+        return self._closed.is_set()
+
+    def account(self, principal: Principal) -> AccountOut:
+        """The account that asks."""
+        return account_of(principal)
+
+    def seen_by(self, principal: Principal) -> FleetOut:
+        """The drones, and what may be known of where they fly."""
+        del principal
+        return self._fleet
+
+    @cached_property
+    def _fleet(self) -> FleetOut:
+        config = self._run.config
+        robots = [
+            RobotOut(id=robot.id, sensors=[one.full_id for one in robot.sensors], mission=OWN)
+            for robot in config.robots
+        ]
+        environment = catalogue(config).model_dump(mode="json", by_alias=True)
+        return FleetOut(name=config.name, robots=robots, environment=environment)
+
+    def fleet_scenery(self) -> SceneryOut:
+        """Ground below the flight on the map."""
+        return self._scenery
+
+    @cached_property
+    def _scenery(self) -> SceneryOut:
+        return SceneryOut.of(self._run.config)
+
+    def preflight(self, robot: str) -> PreflightOut:
+        """A robot's list before take-off; raises RefusedError for an unknown robot."""
+        if robot not in {one.id for one in self._run.config.robots}:
+            raise RefusedError(404, f"there is no robot {robot}")
+        self._refresh()
+        return self._meter.preflight.get(robot, PreflightOut(robot=robot))
+
+    def missions(self, principal: Principal) -> list[MissionOut]:
+        """The one mission."""
+        return [self.mission(principal, OWN)]
+
+    def mission(self, principal: Principal, mission: str) -> MissionOut:
+        """The flight as a provider would show it."""
+        del principal
+        _require_own(mission)
+        self._refresh()
+        return self._shown()
+
+    def scenery(self, principal: Principal, mission: str) -> SceneryOut:
+        """Ground below the flight on the map."""
+        del principal
+        _require_own(mission)
+        return self._scenery
+
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
+        """Give a robot a command, of which an alert tells; raises AeroDaaSError."""
+        self.require_pilot(principal, mission)
+        given, told = _worded(command)
+        asked = f"the console asked {command.robot} to {told}" if told else ""
+        try:
+            asking = self._commands.submit(self._run.command, command.robot, given)
+            answer = asking.result(_PATIENCE)
+        except FutureTimeoutError:
+            text = f"the drone did not answer within {_PATIENCE:g} s"
+            self._tell(asked, text)
+            raise SilentError(text) from None
+        word = "accepted" if answer.accepted else "refused"
+        self._tell(asked, f"{word}{': ' if answer.text else ''}{answer.text}")
+        return AnswerOut.of(answer)
+
+    def require_pilot(self, principal: Principal, mission: str) -> None:
+        """Raise RefusedError unless the account may command the flight."""
+        _require_own(mission)
+        require(principal, Role.PILOT)
+
+    def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
+        """The flight's environment."""
+        self.require_pilot(principal, mission)
+        return self._run.config
+
+    def flies(self, principal: Principal, mission: str) -> bool:
+        """False: the application, which is here, is the flight's user."""
+        del principal, mission
+        return False
+
+    def hear(self, mission: str) -> None:
+        """Do nothing: see `flies`."""
+
+    def version(self, mission: str) -> int:
+        """A number that grows with each change; -1 once the flight is over."""
+        del mission
+        self._asked = time.monotonic()
+        return -1 if self.over else self._version
+
+    def text(self, mission: str) -> tuple[str, bool]:
+        """The flight as JSON, made once for all that watch it, and whether it is over."""
+        with self._lock:
+            version = self.version(mission)
+            if self._text[0] != version or version < 0:
+                self._text = version, self._shown().model_dump_json()
+            return self._text[1], version < 0
+
+    def items(
+        self, mission: str, stream: str, form: PictureForm
+    ) -> Iterator[tuple[dict[str, Any], bytes]]:
+        """Items of a stream; an empty one a while without any. Raises ConfigError if none is so."""
+        del mission
+        graph = self._run.graph
+        if stream not in drawn_streams(graph) or graph.reader is None:
+            raise ConfigError(f"no stream that can be drawn is called {stream!r}")
+        reader = PackedReader(graph.reader(stream), stream, form, self._ground)
+        while not self.over:
+            yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
+
+    @cached_property
+    def _ground(self) -> Ground | None:
+        """What is flown over; it is read when something is watched."""
+        return ground_of(self._run.config)
+
+    def _tell(self, asked: str, answer: str) -> None:
+        """Have an alert tell people of a command and its answer; not of one without words."""
+        if asked:
+            self._run.note("console_command", f"{asked}: {answer}")
+
+    def _shown(self) -> MissionOut:
+        states = {one.state for one in self._meter.status.values()}
+        ended = MissionPhase.FAILED if "aborted" in states else MissionPhase.LANDED
+        return MissionOut(
+            id=OWN,
+            name=self._name,
+            tenant=OWN,
+            account=OWN,
+            phase=ended if self.over else MissionPhase.FLYING,
+            robots=[robot.id for robot in self._run.config.robots],
+            submitted=self._began,
+            started=self._began,
+            status=self._meter.status,
+            told={} if self.over else self._meter.told,
+            alerts=self._meter.alerts,
+            analytics=self._meter.analytics,
+            streams={} if self.over else drawn_streams(self._run.graph),
+        )
+
+    def _refresh(self) -> None:
+        """Look at the drones, unless that is done anyway because somebody watches."""
+        watched = time.monotonic() - self._asked < _WATCHED_SECONDS
+        self._asked = time.monotonic()
+        if not watched:
+            self._look_once()
+
+    def _look(self) -> None:
+        while not self._closed.wait(_LOOK_SECONDS):
+            if time.monotonic() - self._asked < _WATCHED_SECONDS:
+                self._look_once()
+
+    def _look_once(self) -> None:
+        if self.over or self._run.over:
+            return
+        # The thread that waits for the run meets the same error and handles it.
+        with contextlib.suppress(AeroDaaSError):
+            self._take(self._run.look(0))
+
+    def _take(self, state: FlightState) -> None:
+        with self._looking:
+            self._meter.note(state)
+            self._version += 1
+
+
+def _require_own(mission: str) -> None:
+    if mission != OWN:
+        raise RefusedError(404, f"there is no mission {mission}: this one is called {OWN}")
+
+
+def _worded(command: PilotCommand) -> tuple[Command, str]:
+    """A command as the mission takes it, and what people are told that somebody asked for."""
+    match command:
+        case CommandIn():
+            return COMMANDS[command.command], command.command
+        case NavigationIn():
+            ids = [waypoint.id for waypoint in command.waypoints]
+            return command.command(), f"visit {_listed(ids)}"
+        case RearrangeIn():
+            told = [f"fly {_listed(command.order)} in this order"] if command.order else []
+            told += [f"leave out {_listed(command.remove)}"] if command.remove else []
+            return command.command(), " and ".join(told) or "do nothing"
+        case ActuateIn():
+            return command.command(), f"move {command.actuator} to {command.position}"
+        case ControlsIn():
+            given = command.command()
+            return given, told_of_controls(given)
+
+
+def _listed(ids: Sequence[str]) -> str:
+    """Some ids by name, and how many they are where that would be too long to read."""
+    named = ", ".join(ids[:_NAMED])
+    return named if len(ids) <= _NAMED else f"{named}, … ({len(ids)})"
