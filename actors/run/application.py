@@ -1,21 +1,20 @@
-"""Definitions of the application's own files, as sent to every process of its run.
+"""The application's own code, as it reaches every process of its run.
 
-Modules travel with Ray's job, by its `runtime_env`. The session carries as pickles the classes of
-files that other processes cannot import: those that run as `__main__`, and modules that the job
-lacks, because they were imported or changed after it was joined. An actor gets its session first,
-so that later messages find their classes defined.
+Modules travel with Ray's job, by its `runtime_env`. What runs as `__main__`, and modules that the
+job lacks because they were imported or changed after it was joined, travel by value: their classes
+with the objects and messages that need them, and here for whoever imports them by name.
 """
 
 from __future__ import annotations
 
 import contextlib
 import inspect
+import pickle
 import sys
 import types
-import uuid
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from ray import cloudpickle
 
 from aerodaas.actors.cluster import ray_cluster
 from aerodaas.actors.run.own_modules import imported_names, is_installed, own_modules
-from aerodaas.actors.streams import definitions as _definitions
 from aerodaas.config.model import EnvironmentConfig, RuntimeEnvConfig
 from aerodaas.config.plugins import main_name
 from aerodaas.dataflow.graph import Graph
@@ -36,45 +34,45 @@ _LARGEST = 1 << 20
 
 @dataclass(frozen=True)
 class Application:
-    """Modules and classes of an application; unpickling it makes them available."""
+    """Modules of an application that travel by value; unpickling it makes them available."""
 
-    definitions: Mapping[str, bytes] = field(default_factory=dict)
-    """Pickled classes by `id/qualified name`."""
-    plugins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """Names of definitions by attribute, by module name of the application's own file."""
+    modules: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
+    """Pickled classes and functions by name, by name of their module."""
     files: tuple[Path, ...] = ()
     """Files and folders of the modules that Ray's job brings along; they stay here."""
 
     def and_later(self, later: Application) -> Application:
-        """Union of this and the `later` definitions, which have precedence."""
-        plugins = {**self.plugins}
-        for name, attributes in later.plugins.items():
-            plugins[name] = {**plugins.get(name, {}), **attributes}
+        """Union of this and the `later` application, whose definitions have precedence."""
+        both = {
+            name: {**self.modules.get(name, {}), **more} for name, more in later.modules.items()
+        }
         return Application(
-            {**self.definitions, **later.definitions},
-            plugins,
-            tuple(dict.fromkeys((*self.files, *later.files))),
+            {**self.modules, **both}, tuple(dict.fromkeys((*self.files, *later.files)))
         )
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        """Pickle it so that unpickling makes its modules and classes available."""
-        return _arrived, (dict(self.definitions), dict(self.plugins))
+        """Pickle it so that unpickling makes its modules available."""
+        return _arrived, (dict(self.modules),)
 
 
-def _arrived(definitions: dict[str, bytes], plugins: dict[str, dict[str, str]]) -> Application:
-    _definitions.define(definitions)
-    for name, attributes in plugins.items():
+def _arrived(modules: dict[str, dict[str, bytes]]) -> Application:
+    for name, definitions in modules.items():
         if name not in sys.modules:
             module = types.ModuleType(name, "The application's own file, by what it defines.")
-            vars(module)["__getattr__"] = partial(_defined, name, attributes)
+            vars(module)["__getattr__"] = partial(_defined, name, definitions)
             sys.modules[name] = module
-    return Application(definitions, plugins)
+    return Application(modules)
 
 
-def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa: ANN401 - a class
-    if name not in attributes:
+def _defined(module: str, definitions: dict[str, bytes], name: str) -> Any:  # noqa: ANN401 - a class
+    if name not in definitions:
         raise AttributeError(f"{module} defines no class {name!r} that could be sent")
-    return _definitions.named(attributes[name])
+    return _built(definitions[name])
+
+
+@lru_cache(maxsize=1024)
+def _built(definition: bytes) -> Any:  # noqa: ANN401 - a class
+    return pickle.loads(definition)  # noqa: S301 - the application's own
 
 
 def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Application:
@@ -98,20 +96,14 @@ def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Applic
     # Ray runs a container with nothing of its own in it.
     by_value = any(env.image_uri for env in _environments(graph, config))
     late = {name for name in own if by_value or not ray_cluster.brings(name, own[name])}
-    definitions: dict[str, bytes] = {}
-    attributes: dict[str, dict[str, str]] = {}
-    for number, namespace in enumerate([*files, *_by_value(late)]):
+    modules: dict[str, dict[str, bytes]] = {}
+    for namespace in [*files, *_by_value(late)]:
         name = main_name(namespace)
-        wanted = {attribute for module, _, attribute in named if module == name}
-        prefix = f"{uuid.uuid4().hex[:12]}-{number}"
-        defined = _define(prefix, [*_classes(namespace), *_functions(namespace, wanted)])
-        definitions |= defined
         if name is not None and not is_installed(name):
-            attributes.setdefault(name, {key.partition("/")[2]: key for key in defined})
-    local = [one for one in _mentioned(used) if "<locals>" in one.__qualname__]
-    definitions |= _define(f"{uuid.uuid4().hex[:12]}-local", local)
+            wanted = {attribute for module, _, attribute in named if module == name}
+            modules.setdefault(name, _definitions(namespace, wanted))
     brought = tuple(path for name, path in own.items() if name not in late)
-    return Application(definitions, attributes, brought)
+    return Application(modules, brought)
 
 
 def _by_value(names: Collection[str]) -> Iterator[dict[str, Any]]:
@@ -136,20 +128,18 @@ def _environments(graph: Graph, config: EnvironmentConfig) -> Iterator[RuntimeEn
     yield from (node.runtime_env for node in graph.nodes.values() if node.runtime_env is not None)
 
 
-def _define(prefix: str, found: Iterable[Any]) -> dict[str, bytes]:
-    """Pickle classes one by one, leaving out those that cannot be pickled."""
-    definitions: dict[str, bytes] = {}
-    for one in found:
-        # A class that cannot be pickled is reported where it is used.
-        with contextlib.suppress(Exception):
-            data = _definitions.pickled_class(one)
-            # A class keeps the name that running actors already use in messages.
-            name = _definitions.name_of(one) or f"{prefix}/{one.__qualname__}"
-            if len(data) <= _LARGEST and name not in definitions:
-                definitions[name] = data
-                if isinstance(one, type):
-                    _definitions.register(name, one)
-    return definitions
+def _definitions(namespace: dict[str, Any], wanted: set[str]) -> dict[str, bytes]:
+    """Pickle a module's own classes, and what is `wanted` of it, but for what cannot be."""
+    found: dict[str, bytes] = {}
+    for name, value in list(namespace.items()):
+        own = isinstance(value, type) and value.__module__ == namespace.get("__name__")
+        if own or name in wanted:
+            # What cannot be pickled is reported where it is used.
+            with contextlib.suppress(Exception):
+                data = cloudpickle.dumps(value, protocol=5)  # pyright: ignore[reportPrivateImportUsage]
+                if len(data) <= _LARGEST:
+                    found[name] = data
+    return found
 
 
 def _used(graph: Graph) -> list[object]:
@@ -187,26 +177,6 @@ def _functions_of(one: object) -> Iterator[types.FunctionType]:
                 function = getattr(value, "__func__", value)  # of static and class methods
                 if isinstance(function, types.FunctionType):
                     yield function
-
-
-def _classes(namespace: dict[str, Any]) -> Iterator[type]:
-    for value in list(namespace.values()):
-        if isinstance(value, type) and value.__module__ == namespace.get("__name__"):
-            yield from _with_nested(value)
-
-
-def _with_nested(outer: type) -> Iterator[type]:
-    yield outer
-    for value in list(vars(outer).values()):
-        nested = isinstance(value, type) and value.__module__ == outer.__module__
-        if nested and value.__qualname__ == f"{outer.__qualname__}.{value.__name__}":
-            yield from _with_nested(value)
-
-
-def _functions(namespace: dict[str, Any], wanted: set[str]) -> Iterator[Any]:
-    for name in wanted & namespace.keys():
-        if isinstance(namespace[name], types.FunctionType):
-            yield namespace[name]
 
 
 def _mentioned(used: Iterable[object]) -> list[type]:

@@ -1,24 +1,28 @@
-"""Codec of messages: plain values by `marshal`, large arrays out of band, so that none is copied.
+"""Codec of messages: pickle protocol 5 with the arrays out of band, so that none is copied.
 
-Layout: u32 length of the head, u32 place of the first buffer, then the head, and each buffer,
-aligned to 64 bytes. Little-endian. The head is of plain values only: the envelope, the name of the
-item's class, the place and length of each buffer from the first on, the item's pickle, empty where
-it is a plain value, and that value. So the envelope can be read even if the item cannot. Both ends
-run one version of Python, as `marshal` needs and Ray requires of a cluster.
+Layout: u32 length of the envelope, u32 length of the item, u32 place of the first buffer; then the
+envelope, the item, and each buffer, aligned to 64 bytes. Little-endian. Envelope and item are a
+pickle each, so that the envelope can be read even if the item cannot. The envelope is a tuple of
+plain values: the message's fields, the name of the item's class, and the place and length of each
+buffer from the first on.
+
+A class that other processes cannot import, such as one of the application's own file, travels by
+value with each message that needs it. A process builds it once, so `isinstance` holds everywhere.
 """
 
 from __future__ import annotations
 
-import marshal
+import io
 import pickle
 import struct
+from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from ray import cloudpickle
 
-from aerodaas.actors.streams import definitions as _definitions
-from aerodaas.actors.streams.plain import NotPlainError, Plain, flatten, rebuild
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.envelope import Message, TraceSpan
 from aerodaas.messages.frames import Header
@@ -26,13 +30,14 @@ from aerodaas.runtime.sending import culprit
 
 __all__ = ["Encoded", "UnreadableError", "UnsendableError", "decode", "encode"]
 
+_PROTOCOL = 5
 _ALIGNMENT = 64
-_LENGTHS = struct.Struct("<II")
-_WITHOUT_REFERENCES = 2
-"""Version of marshal's format that does not look for what occurs twice: little does, and to look
-takes longer."""
-_defined: set[str] = set()
-"""Streams with items of classes that pickle cannot refer to by name."""
+_LENGTHS = struct.Struct("<III")
+_LONGEST_IN_BAND = 256
+"""Bytes of an array up to which it is part of the pickle: apart, it would cost several times as
+much."""
+_NUMBERS = "biufc"
+"""Kinds of NumPy's numbers; arrays of anything else are pickled by NumPy."""
 
 
 class UnsendableError(AeroDaaSError):
@@ -48,19 +53,6 @@ class UnreadableError(AeroDaaSError):
         self.message = message
 
 
-def _bytes_of(array: Any) -> memoryview:  # noqa: ANN401 - a contiguous array, a buffer for NumPy
-    return pickle.PickleBuffer(array).raw()
-
-
-def _address(array: NDArray[Any]) -> int:
-    address: int = array.__array_interface__["data"][0]
-    return address
-
-
-def _aligned(offset: int) -> int:
-    return -(-offset // _ALIGNMENT) * _ALIGNMENT
-
-
 class Encoded:
     """A message ready to be written into a buffer of `size` bytes."""
 
@@ -69,43 +61,36 @@ class Encoded:
 
         Raises UnsendableError for an item that cannot be sent.
         """
-        self._arrays: list[NDArray[Any]] = []
-        pickled = b""
-        try:
-            plain = flatten(message.item, self._arrays)
-            self._buffers = [_bytes_of(array) for array in self._arrays]
-        except (NotPlainError, RecursionError):
-            self._arrays, plain = [], None
-            pickled, self._buffers = _pickled(message)
+        item, self._buffers = _pickled(message.item)
         self._places: list[int] = []
         """Where each buffer begins, from the first on."""
-        end = 0
+        self._length = 0
+        """Bytes of all buffers, with the gaps between them."""
         for buffer in self._buffers:
-            self._places.append(_aligned(end))
-            end = self._places[-1] + buffer.nbytes
-        places = [
-            (place, one.nbytes) for place, one in zip(self._places, self._buffers, strict=True)
-        ]
-        self._head = _head(message, tuple(places), pickled, plain)
+            self._places.append(_aligned(self._length))
+            self._length = self._places[-1] + buffer.nbytes
+        envelope = _envelope(message, self._places, self._buffers)
+        self._lengths = len(envelope), len(item)
+        self._head = envelope + item
         self._start = _LENGTHS.size + len(self._head)
-        if places:
+        if self._buffers:
             self._start = _aligned(self._start)
-        self._length = end
-        self.size = self._start + end
+        self.size = self._start + self._length
 
     def size_around(self, array: NDArray[np.uint8], room: int) -> int | None:
         """Return the size that it has in a buffer that holds `array` from byte `room` on.
 
         None if its first buffer does not begin with `array`, or the rest has not enough room.
         """
-        if not self._arrays or _LENGTHS.size + len(self._head) > room:
+        if not self._length or _LENGTHS.size + len(self._head) > room:
             return None
-        return room + self._length if _address(self._arrays[0]) == _address(array) else None
+        first = np.frombuffer(self._buffers[0], np.uint8)
+        return room + self._length if _address(first) == _address(array) else None
 
     def write_into(self, target: memoryview, room: int = 0) -> None:
         """Write all into `target`; not its first buffer, if that is there, from byte `room` on."""
         start = room or self._start
-        target[: _LENGTHS.size] = _LENGTHS.pack(len(self._head), start)
+        target[: _LENGTHS.size] = _LENGTHS.pack(*self._lengths, start)
         target[_LENGTHS.size : _LENGTHS.size + len(self._head)] = self._head
         for place, buffer in zip(self._places, self._buffers, strict=True):
             if place or not room:
@@ -113,7 +98,7 @@ class Encoded:
 
     def to_bytes(self, suffix: bytes = b"") -> bytes:
         """The encoded message as one bytes object, with `suffix` after it."""
-        parts: list[bytes | memoryview] = [_LENGTHS.pack(len(self._head), self._start), self._head]
+        parts: list[bytes | memoryview] = [_LENGTHS.pack(*self._lengths, self._start), self._head]
         end = _LENGTHS.size + len(self._head)
         for place, buffer in zip(self._places, self._buffers, strict=True):
             parts += bytes(self._start + place - end), buffer
@@ -132,51 +117,104 @@ def decode(source: memoryview) -> Message[Any]:
     Raises UnreadableError if its item cannot be rebuilt.
     """
     source = source.toreadonly()
-    length, start = _LENGTHS.unpack_from(source)
-    stream, seq, stamp, header, captured, spans, kind, places, pickled, plain = marshal.loads(  # noqa: S302 - our own bytes
-        source[_LENGTHS.size : _LENGTHS.size + length]
+    envelope_length, item_length, start = _LENGTHS.unpack_from(source)
+    item = _LENGTHS.size + envelope_length
+    stream, seq, stamp, header, captured, spans, kind, places = pickle.loads(  # noqa: S301 - our own bytes
+        source[_LENGTHS.size : item]
     )
+    told = tuple([TraceSpan._make(span) for span in spans])
+    envelope = stream, seq, stamp, Header._make(header), captured, told
     buffers = [source[start + place : start + place + size] for place, size in places]
-    envelope = stream, seq, stamp, Header._make(header), captured, _spans(spans)
     try:
-        if pickled:
-            return Message(*envelope, pickle.loads(pickled, buffers=buffers))  # noqa: S301 - our own
-        return Message(*envelope, rebuild(plain, buffers))
+        return Message(*envelope, pickle.loads(source[item : item + item_length], buffers=buffers))  # noqa: S301 - our own
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise UnreadableError(Message(*envelope, None), kind, reason) from error
 
 
-def _spans(spans: tuple[tuple[str, int, int], ...]) -> tuple[TraceSpan, ...]:
-    return tuple([TraceSpan._make(span) for span in spans])
-
-
-def _head(
-    message: Message[Any], places: tuple[tuple[int, int], ...], pickled: bytes, plain: Plain
-) -> bytes:
-    envelope: tuple[Any, ...] = (
-        message.stream,
-        message.seq,
-        message.stamp,
-        tuple(message.header),
-        message.captured,
-        tuple([tuple(span) for span in message.spans]),
-        type(message.item).__name__,
+def _envelope(message: Message[Any], places: list[int], buffers: list[memoryview]) -> bytes:
+    return pickle.dumps(
+        (
+            message.stream,
+            message.seq,
+            message.stamp,
+            tuple(message.header),
+            message.captured,
+            [tuple(span) for span in message.spans],
+            type(message.item).__name__,
+            [(place, buffer.nbytes) for place, buffer in zip(places, buffers, strict=True)],
+        ),
+        _PROTOCOL,
     )
-    return marshal.dumps((*envelope, places, pickled, plain), _WITHOUT_REFERENCES)
 
 
-def _pickled(message: Message[Any]) -> tuple[bytes, list[memoryview]]:
-    buffers: list[pickle.PickleBuffer] = []
-    if message.stream not in _defined:
-        try:
-            data = pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append)
-            return data, [buffer.raw() for buffer in buffers]
-        except Exception:  # noqa: BLE001 - the attempt below reports the reason
-            buffers = []
+def _aligned(offset: int) -> int:
+    return -(-offset // _ALIGNMENT) * _ALIGNMENT
+
+
+def _address(array: NDArray[np.uint8]) -> int:
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+def _pickled(item: object) -> tuple[bytes, list[memoryview]]:
+    """Pickle of an item, and its large arrays. Raises UnsendableError."""
+    with suppress(Exception):
+        return _pickled_by(_Pickler, item)
     try:
-        data = _definitions.pickled(message.item, buffers.append)
+        return _pickled_by(_ValuePickler, item)
     except Exception as error:
-        raise UnsendableError(culprit(message.item, error)) from error
-    _defined.add(message.stream)
-    return data, [buffer.raw() for buffer in buffers]
+        raise UnsendableError(culprit(item, error)) from error
+
+
+def _pickled_by(pickler: Any, item: object) -> tuple[bytes, list[memoryview]]:  # noqa: ANN401 - a class
+    file, buffers = io.BytesIO(), list[pickle.PickleBuffer]()
+    pickler(file, _PROTOCOL, buffer_callback=buffers.append).dump(item)
+    return file.getvalue(), [buffer.raw() for buffer in buffers]
+
+
+class _Pickler(pickle.Pickler):
+    """Pickler of items whose classes every process can import."""
+
+    def reducer_override(self, obj: object) -> Any:  # noqa: ANN401 - pickle's
+        return _reduced(obj) if type(obj) is np.ndarray else NotImplemented
+
+
+class _ValuePickler(cloudpickle.Pickler):
+    """Pickler of items with classes or functions that others cannot import."""
+
+    def reducer_override(self, obj: Any) -> Any:  # noqa: ANN401 - pickle's
+        if isinstance(obj, type):
+            return _class, (_definition(obj),)
+        known: Any = super()
+        return _reduced(obj) if type(obj) is np.ndarray else known.reducer_override(obj)
+
+
+def _reduced(array: NDArray[Any]) -> Any:  # noqa: ANN401 - pickle's
+    """How an array is made: NumPy's own way says the same at several times the cost."""
+    kind, shape = array.dtype, array.shape
+    if kind.kind not in _NUMBERS:
+        return NotImplemented
+    if array.nbytes <= _LONGEST_IN_BAND:
+        return np.ndarray, (shape, kind.str, array.tobytes())
+    whole: Any = np.ascontiguousarray(array)
+    return _array, (shape, kind.str, pickle.PickleBuffer(whole))
+
+
+def _array(shape: tuple[int, ...], kind: str, content: memoryview) -> NDArray[Any]:
+    # Not np.ndarray, which would keep the owner of all the memory instead of this view of it.
+    array: NDArray[Any] = np.frombuffer(content, kind).reshape(shape)
+    return array
+
+
+@lru_cache(maxsize=256)
+def _definition(definition: type) -> bytes:
+    """A class as cloudpickle sends it: by name if others can import it, else by value."""
+    data: bytes = cloudpickle.dumps(definition, protocol=_PROTOCOL)  # pyright: ignore[reportPrivateImportUsage]
+    return data
+
+
+@lru_cache(maxsize=256)
+def _class(definition: bytes) -> Any:  # noqa: ANN401 - a class
+    # Once: cloudpickle returns the same class again, but sets all its attributes anew.
+    return pickle.loads(definition)  # noqa: S301 - our own

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from functools import lru_cache, partial
+from functools import lru_cache
 from operator import attrgetter
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 __all__ = [
     "SECRET",
-    "Record",
     "fast_pickle",
-    "record_of",
     "secrets_of",
     "shared_pickle",
     "valued",
@@ -33,23 +31,6 @@ _HASHED = 16
 
 _JSON = {"ser_json_bytes": "base64", "val_json_bytes": "base64", "ser_json_inf_nan": "null"}
 """How pydantic writes a record's fields as JSON, and reads them."""
-
-
-class Record(NamedTuple):
-    """How a record is taken apart and made anew."""
-
-    values: Callable[[Any], tuple[Any, ...]]
-    """Its fields' values."""
-    make: Callable[[list[Any]], Any]
-    """Makes one of these, without the checks that they have passed; a shared one it may find."""
-
-
-_records: dict[type[Any], Record] = {}
-
-
-def record_of(cls: type[Any]) -> Record | None:
-    """Return what is known of a class of `fast_pickle` or `shared_pickle`; None of any other."""
-    return _records.get(cls)
 
 
 @lru_cache(maxsize=1024)
@@ -98,8 +79,6 @@ def fast_pickle(cls: C) -> C:
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
     cls.__pydantic_config__ = _JSON
-    names = tuple(field.name for field in dataclasses.fields(cls))
-    _records[cls] = Record(values, partial(_set, cls, names))
     return valued(cls)
 
 
@@ -117,16 +96,7 @@ def shared_pickle(cls: C) -> C:
         return (_found, (cls, *values(self))) if type(self) is cls else otherwise(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
-    _records[cls] = _records[cls]._replace(make=partial(_make_shared, cls))
     return cls
-
-
-def _set(cls: type[Any], names: tuple[str, ...], parts: list[Any]) -> object:
-    return _rebuilt(cls, dict(zip(names, parts, strict=True)))
-
-
-def _make_shared(cls: Any, parts: list[Any]) -> object:  # noqa: ANN401 - a class
-    return _found(cls, *parts)
 
 
 @lru_cache(maxsize=_MOST_SHARED, typed=True)

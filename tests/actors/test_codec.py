@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import struct
-from typing import Any
+import copyreg
+import dataclasses
+import enum
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,9 +17,127 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
+from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.actors.streams.codec import Encoded, decode
+from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message, TraceSpan
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.readings import Alert
+
+
+class Colour(enum.Enum):
+    """Members whose values are told."""
+
+    RED = (1, "red")
+    BLUE = (2, "blue")
+
+
+class Pair(NamedTuple):
+    """A named tuple."""
+
+    first: Any
+    second: Any
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What an application's analysis might find, with an array and a number of NumPy's."""
+
+    place: Any
+    values: dict[str, Any] = field(default_factory=dict)
+
+
+class Grown(Finding):
+    """A class derived from another, with an attribute that only some objects have."""
+
+
+class Slotted:
+    """A class without a `__dict__`."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: int) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Slotted) and other.value == self.value
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Told:
+    """A class that says how it is pickled."""
+
+    def __init__(self, value: int) -> None:
+        self.value, self.untold = value, object()
+
+    def __reduce__(self) -> tuple[type[Told], tuple[int]]:
+        return Told, (self.value,)
+
+
+class Mixed(Slotted):
+    """A class with both, a slot and a `__dict__`."""
+
+
+class Registered:
+    """A class for which pickle's registry knows what to do."""
+
+    def __init__(self, value: int) -> None:
+        self.value = value
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Registered) and other.value == self.value
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+copyreg.pickle(Registered, lambda one: (Registered, (one.value + 1,)))
+
+
+class Numbers(list[int]):
+    """A list with an attribute."""
+
+    name = ""
+
+
+_FLOATS = st.floats(allow_nan=False)
+_ARRAYS = arrays.arrays(
+    st.sampled_from([np.dtype(kind) for kind in ("?", "u1", "f4", "<f8", ">f8", "i8", "c16")]),
+    arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=9),
+    elements={"allow_nan": False},
+)
+_VECTORS = arrays.arrays(np.float64, 3, elements=_FLOATS)
+_POINTS = arrays.arrays(
+    np.float32, st.tuples(st.integers(0, 40), st.just(3)), elements={"allow_nan": False}
+)
+_HEADERS = st.builds(Header, st.integers(), st.integers(), st.text())
+_SCALARS = st.one_of(
+    _FLOATS.map(np.float64), st.integers(-5, 5).map(np.int32), st.booleans().map(np.bool_)
+)
+_ATOMS = st.one_of(
+    st.none(), st.booleans(), st.integers(), _FLOATS, st.text(), st.binary(), _SCALARS, _ARRAYS
+)
+_RECORDS = st.one_of(
+    _HEADERS,
+    st.builds(Odometry, _VECTORS, _VECTORS, _FLOATS),
+    st.builds(Detection, st.tuples(*[_FLOATS] * 4), st.text(), st.just(0.5), keypoints=_POINTS),
+    st.builds(Detections, _HEADERS, st.just(()), st.just(6), st.just(4), nearest=_ARRAYS),
+    st.sampled_from([*Colour, *MissionState, *NavigationType]),
+)
+_ITEMS = st.recursive(
+    _ATOMS | _RECORDS,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4),
+        st.lists(inner, max_size=4).map(tuple),
+        st.dictionaries(st.text(max_size=5), inner, max_size=4),
+        st.builds(Pair, inner, inner),
+        st.builds(Finding, inner, st.dictionaries(st.text(max_size=3), inner, max_size=2)),
+    ),
+    max_leaves=12,
+)
 
 
 def _message(item: object) -> Message[object]:
@@ -41,12 +164,11 @@ def test_arrays_of_any_shape_come_back_equal(items: list[NDArray[Any]]) -> None:
 
 
 @pytest.mark.parametrize("vector", [np.array([1.0, -2.5, np.nan]), np.arange(6.0)[::2]])
-def test_a_short_vector_has_no_buffer_and_is_read_only(vector: NDArray[np.float64]) -> None:
-    """Not one of its own, with its alignment, for 24 bytes; nobody changes it for the others."""
-    data = Encoded(_message(vector)).to_bytes()
-    head, start = struct.unpack_from("<II", data)
-    assert len(data) == start == 8 + head
-    restored = decode(memoryview(data)).item
+def test_a_short_vector_costs_little_and_is_read_only(vector: NDArray[np.float64]) -> None:
+    """Of 24 bytes it needs no buffer with its alignment; nobody changes it for the others."""
+    encoded = Encoded(_message(vector))
+    assert encoded.size < Encoded(_message(None)).size + 100
+    restored = decode(memoryview(encoded.to_bytes())).item
     assert isinstance(restored, np.ndarray)
     np.testing.assert_array_equal(restored, vector)
     with pytest.raises(ValueError, match="read-only"):
@@ -87,3 +209,116 @@ def test_a_message_is_written_around_an_array_that_is_there(
         assert decode(whole[:size].data).item == frame
     assert encoded.size_around(image.copy().reshape(-1), room) is None
     assert decode(memoryview(encoded.to_bytes())).item == frame
+
+
+def _there_and_back(item: object) -> Any:  # noqa: ANN401 - any item
+    return decode(memoryview(Encoded(_message(item)).to_bytes())).item
+
+
+def _same(one: Any, other: Any) -> bool:  # noqa: ANN401 - any items
+    """Whether both are alike, to the types of their numbers and the parts of their parts."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other) and one.shape == other.shape
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    if dataclasses.is_dataclass(one):
+        names = [each.name for each in dataclasses.fields(one)]
+        return all(_same(getattr(one, name), getattr(other, name)) for name in names)
+    return bool(one == other)
+
+
+@given(_ITEMS)
+def test_what_comes_back_is_what_went(item: object) -> None:
+    """Numbers, arrays, records, and whatever is made of them."""
+    assert _same(_there_and_back(item), item)
+
+
+def _grown() -> Grown:
+    grown = Grown(1)
+    object.__setattr__(grown, "extra", (2, Colour.BLUE))
+    return grown
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        Slotted(3),
+        Mixed(3),
+        Numbers([1, 2]),
+        OrderedDict(b=1, a=2),
+        Fraction(1, 3),
+        {1, 2},
+        list(range(1000)),
+        np.array(["text"]),
+        np.datetime64("2026-01-01"),
+        lambda: None,
+        ValueError("x"),
+    ],
+)
+def test_an_object_of_any_class_arrives(item: Any) -> None:  # noqa: ANN401 - any item
+    """Slots, sets, functions, arrays of no numbers: whatever pickle or cloudpickle can hold."""
+    found = _there_and_back([Finding(item)])[0].place
+    assert type(found) is type(item)
+    if not isinstance(item, ValueError) and not callable(item):
+        assert np.array_equal(found, item) if isinstance(item, np.ndarray) else found == item
+
+
+def test_a_class_that_says_how_it_is_pickled_is_asked() -> None:
+    """What it leaves out stays out."""
+    assert _there_and_back(Told(4)).value == 4
+
+
+def test_a_class_in_pickles_registry_is_made_as_that_says() -> None:
+    """Here with a number more."""
+    assert _there_and_back(Registered(4)) == Registered(5)
+
+
+def test_attributes_beyond_those_of_the_class_arrive() -> None:
+    """All that an object holds is told."""
+    found = _there_and_back(_grown())
+    assert type(found) is Grown
+    assert vars(found) == vars(_grown())
+
+
+def test_an_item_that_contains_itself_arrives() -> None:
+    """Pickle knows what it has met."""
+    item: list[Any] = [1]
+    item.append(item)
+    found = _there_and_back(item)
+    assert found[0] == 1
+    assert found[1] is found
+
+
+def test_navigation_arrives_as_it_was() -> None:
+    """The item of the hop that ends in a setpoint."""
+    sent = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [Waypoint("a", 1, 2, 3)], priority=2)
+    found = _there_and_back(sent)
+    assert type(found) is AeroNavigation
+    assert list(found) == list(sent)
+    assert (found.navigation_type, found.scheduling_type, found.priority, found.stream) == (
+        NavigationType.ANALYTICS_DRIVEN,
+        sent.scheduling_type,
+        2,
+        None,
+    )
+
+
+def test_what_comes_again_and_again_is_found_again() -> None:
+    """A status names the same waypoints, a frame the same camera: each is in memory once."""
+    camera = CameraModel.from_fov(64, 48, 1.2, mount=(0.1, 0.0, 0.0))
+    detections = Detections(Header(0, 0, "c"), (), 64, 48, camera)
+    one, other = _there_and_back(detections), _there_and_back(detections)
+    assert one.camera == camera
+    assert one.camera is other.camera
+    waypoint = Waypoint("a", 1, 2, 3)
+    assert _there_and_back([waypoint])[0] is _there_and_back((waypoint,))[0]
+
+
+def test_an_alert_holds_whatever_figures_it_was_given() -> None:
+    """Its values are of any type."""
+    alert = Alert(Header(0, 0, "c"), "kind", "text", {"a": np.float32(0.5), "b": [1, None]})
+    assert _same(_there_and_back(alert), alert)

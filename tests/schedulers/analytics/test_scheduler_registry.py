@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from ray import cloudpickle
 
 from aerodaas.actors.run.application import capture
-from aerodaas.actors.streams.definitions import pickled_class
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import Graph
@@ -69,9 +69,9 @@ def test_a_file_travels_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
     finally:
         current_options.reset(token)
     name = type(found).__module__
-    assert "Mine" in capture(Graph(), config, found).plugins[name]
+    assert "Mine" in capture(Graph(), config, found).modules[name]
     del sys.modules[name]  # as in an actor: nobody finds the class there
-    again = pickle.loads(pickled_class(found))  # noqa: S301 - our own
+    again = pickle.loads(cloudpickle.dumps(found))  # noqa: S301 - our own
     assert type(again).__name__ == "Mine"
 
 
