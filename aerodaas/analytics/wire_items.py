@@ -1,43 +1,97 @@
 """Items over the wire, between a provider and its users: JSON, and a picture's bytes beside it.
 
-What arrives is another's data: it is of known classes, each field is checked, and a picture has
-the bounds of recorded ones before it is decoded. Nothing is a pickle.
+A text, a truth value, a finite number or None is itself. Anything else is `{"is": CLASS, "of":
+CONTENT}`; the content of a message is as `aerodaas.messages.schema` has it. What arrives is
+another's data: it is of known classes, each field is checked, and a picture has the bounds of
+recorded ones before it is decoded. Nothing is a pickle.
 """
 
 from __future__ import annotations
 
+import math
 import struct
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.item_json import decoded, encoded
 from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_size
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import AeroDaaSError
 from aerodaas.geometry.frames import CameraModel
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.odometry import Odometry
+from aerodaas.messages.json_types import Int64
+from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.opaque_item import OpaqueItem
+from aerodaas.messages.readings import Alert, Readings
+from aerodaas.messages.records import fast_pickle
 from aerodaas.messages.schema import MessageError, json_of, message_of
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.waypoints import (
+    NavigationItem,
+    NavigationType,
+    SchedulingType,
+    VelocityCommand,
+    Waypoint,
+)
 
-__all__ = ["pack", "unpack"]
+__all__ = ["WIRE_CLASSES", "UnknownClassError", "item_json", "pack", "unpack"]
 
-_FRAME = "Frame"
-_FRAME_KEYS = {"is", "header", "camera", "odometry", "size", "format", "bytes"}
+WIRE_CLASSES: dict[str, type] = {
+    kind.__name__: kind
+    for kind in (
+        *(Alert, Battery, Detection, Detections, GpsFix, MissionStatus, Odometry, OpaqueItem),
+        *(Readings, VehicleState, VelocityCommand, Waypoint),
+    )
+}
+"""Classes of messages that may be sent as they are, by name."""
+_SCALARS = frozenset({bool, int, float, str, type(None)})
+_NOT_FINITE = ("nan", "inf", "-inf")
 _QUALITY = 90
-_FORMATS = ("jpeg", "png")
+_PNG = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 _DEPTH_FORMAT = (16, 0)
 """PNG's bit depth and colour type of a depth image: one channel of 16 bits."""
+_MOST_LEVELS = 24
+_MOST_PARTS = 100_000
+"""Most levels, and most parts on all of them, of one item's JSON."""
+
+
+class UnknownClassError(MessageError):
+    """An item is of no class that goes over the wire, or holds one."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class _Navigation:
+    """Content of navigation."""
+
+    items: tuple[NavigationItem, ...]
+    type: NavigationType
+    scheduling: SchedulingType
+    priority: int | None
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class _FrameHead:
+    """Content of a frame, whose picture and depth are the blob."""
+
+    header: Header
+    camera: CameraModel | None
+    odometry: Odometry | None
+    picture: Int64
+    """Bytes of the picture; the rest of the blob is the depth."""
 
 
 def pack(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
     """Write an item for the wire.
 
     Args:
-        item: Of a class of `aerodaas.messages`, navigation that is no stream, a plain value, a
-            list, tuple or dictionary of these; or None.
+        item: A frame, or what `item_json` takes.
         lossless: Write a frame as PNG, not as JPEG of quality 90.
 
     Returns:
@@ -45,87 +99,115 @@ def pack(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
         bits; empty for anything else.
 
     Raises:
-        MessageError: For an item of another class, and for a picture that cannot be written.
+        MessageError: As `item_json` does.
     """
-    if not isinstance(item, Frame):
-        return encoded(item, _refused), b""
-    words = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY]
-    if lossless:
-        words = [cv2.IMWRITE_PNG_COMPRESSION, 1]
-    picture = _written(".png" if lossless else ".jpg", item.image, words)
-    depth = b""
-    if item.depth is not None:
-        depth = _written(".png", item.depth, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    content = {
-        "is": _FRAME,
-        "header": json_of(item.header),
-        "camera": None if item.camera is None else json_of(item.camera),
-        "odometry": None if item.odometry is None else json_of(item.odometry),
-        "size": [item.width, item.height],
-        "format": "png" if lossless else "jpeg",
-        "bytes": [len(picture), len(depth)],
-    }
-    return content, picture + depth
+    if isinstance(item, Frame):
+        return _packed_frame(item, lossless=lossless)
+    return item_json(item), b""
+
+
+def item_json(item: object) -> Any:  # noqa: ANN401 - JSON
+    """Write an item that is no frame as JSON.
+
+    Args:
+        item: A message of `WIRE_CLASSES`, navigation that is no stream, a text, a truth value, a
+            number or None.
+
+    Returns:
+        A value of JSON's own types.
+
+    Raises:
+        UnknownClassError: For an item of another class.
+        MessageError: For a field that cannot be written.
+    """
+    if isinstance(item, np.generic):
+        item = item.item()
+    name = type(item).__name__
+    if type(item) is float and not math.isfinite(item):
+        # JSON has no such numbers, and strict readers refuse what Python writes for them.
+        return {"is": name, "of": repr(item)}
+    if type(item) in _SCALARS:
+        return item
+    if WIRE_CLASSES.get(name) is type(item):
+        return {"is": name, "of": json_of(item)}
+    if isinstance(item, AeroNavigation) and item.stream is None:
+        items = tuple(item)
+        if {type(one) for one in items} <= {Waypoint, VelocityCommand}:
+            content = _Navigation(items, item.navigation_type, item.scheduling_type, item.priority)
+            return {"is": "AeroNavigation", "of": json_of(content)}
+    raise UnknownClassError(f"{name} is of no class that goes over the wire, or holds one")
 
 
 def unpack(content: Any, blob: bytes = b"") -> Any:  # noqa: ANN401 - JSON to any item
     """Rebuild an item from the wire; raises MessageError if it is malformed or too large."""
-    if not (isinstance(content, dict) and content.get("is") == _FRAME):
-        if blob:
-            raise MessageError(f"an item with {len(blob)} bytes beside it is no frame")
-        return decoded(content)
+    _require_bounds(content)
+    whole = content if isinstance(content, dict) else {"is": type(content).__name__}
+    kind = str(whole.get("is"))
+    if blob and kind != "Frame":
+        raise MessageError(f"an item with {len(blob)} bytes beside it is no frame")
+    if type(content) in _SCALARS:
+        return content
     try:
-        return _frame(content, blob)
+        return _unpacked(kind, whole.get("of"), blob)
     except MessageError:
         raise
-    except (AeroDaaSError, cv2.error, KeyError, TypeError, ValueError) as error:
-        raise MessageError(f"malformed frame: {type(error).__name__}: {error}"[:300]) from None
+    except (AeroDaaSError, cv2.error, TypeError, ValueError) as error:
+        raise MessageError(f"malformed item: {type(error).__name__}: {error}"[:300]) from None
 
 
-def _refused(item: object) -> OpaqueItem:
-    raise MessageError(
-        f"{type(item).__name__} is of no class that goes over the wire, or holds one"
-    )
+def _unpacked(kind: str, content: Any, blob: bytes) -> Any:  # noqa: ANN401 - JSON to any item
+    if kind in WIRE_CLASSES:
+        return message_of(WIRE_CLASSES[kind], content)
+    if kind == "Frame":
+        return _frame(message_of(_FrameHead, content), blob)
+    if kind == "AeroNavigation":
+        found = message_of(_Navigation, content)
+        return AeroNavigation(found.type, found.items, found.scheduling, priority=found.priority)
+    if kind == "float" and content in _NOT_FINITE:
+        return float(content)
+    raise MessageError(f"there is no class {kind[:40]!r} that goes over the wire")
 
 
-def _written(suffix: str, image: NDArray[Any], words: list[int]) -> bytes:
-    try:
-        written, data = cv2.imencode(suffix, image, words)
-    except cv2.error as error:
-        raise MessageError(f"the picture cannot be written: {error}"[:300]) from None
-    if not written:
-        raise MessageError("the picture cannot be written")
-    return bytes(data)
+def _require_bounds(content: object) -> None:
+    """Raise MessageError for what takes long to read."""
+    level, parts = [content], 1
+    for _ in range(_MOST_LEVELS):
+        inner = [part for part in level if isinstance(part, dict | list)]
+        parts += sum(map(len, inner))
+        if parts > _MOST_PARTS:
+            break
+        if not inner:
+            return
+        level = [part for one in inner for part in (one.values() if isinstance(one, dict) else one)]
+    raise MessageError(f"more than {_MOST_LEVELS} levels or {_MOST_PARTS} parts in one item")
 
 
-def _frame(content: dict[str, Any], blob: bytes) -> Frame:
-    if content.keys() != _FRAME_KEYS:
-        raise MessageError("a frame with other parts than a frame's")
-    header = message_of(Header, content["header"])
-    camera = None if content["camera"] is None else message_of(CameraModel, content["camera"])
-    odometry = None if content["odometry"] is None else message_of(Odometry, content["odometry"])
-    (width, height), (first, second) = content["size"], content["bytes"]
-    numbers = (width, height, first, second)
-    if not all(type(one) is int and one >= 0 for one in numbers) or first + second != len(blob):
-        raise MessageError("a frame whose bytes are not those that it tells of")
-    picture, rest = blob[:first], blob[first:]
-    image = _decoded(picture, str(content["format"]), (width, height), cv2.IMREAD_COLOR)
-    depth = _depth(rest, (width, height)) if rest else None
-    return Frame(header, np.asarray(image, np.uint8), camera, odometry, depth)
+def _packed_frame(frame: Frame, *, lossless: bool) -> tuple[Any, bytes]:
+    form, words = (".png", _PNG) if lossless else (".jpg", [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    picture = cv2.imencode(form, frame.image, words)[1].tobytes()
+    depth = b"" if frame.depth is None else cv2.imencode(".png", frame.depth, _PNG)[1].tobytes()
+    head = _FrameHead(frame.header, frame.camera, frame.odometry, len(picture))
+    return {"is": "Frame", "of": json_of(head)}, picture + depth
 
 
-def _depth(data: bytes, size: tuple[int, int]) -> NDArray[np.uint16]:
-    bits = struct.unpack_from("BB", data, 24) if len(data) > 25 else None  # noqa: PLR2004 - IHDR
-    if bits != _DEPTH_FORMAT:
-        raise MessageError("a frame's depth is no PNG of one channel of 16 bits")
-    return np.asarray(_decoded(data, "png", size, cv2.IMREAD_UNCHANGED), np.uint16)
+def _frame(head: _FrameHead, blob: bytes) -> Frame:
+    picture, rest = blob[: head.picture], blob[head.picture :]
+    image = np.asarray(_decoded(picture, ("jpeg", "png"), cv2.IMREAD_COLOR), np.uint8)
+    if not rest:
+        return Frame(head.header, image, head.camera, head.odometry)
+    bits = struct.unpack_from("BB", rest, 24) if len(rest) > 25 else None  # noqa: PLR2004 - IHDR
+    if bits != _DEPTH_FORMAT or picture_size(rest) != picture_size(picture):
+        raise MessageError("a frame's depth is no PNG of its size with one channel of 16 bits")
+    depth = np.asarray(_decoded(rest, ("png",), cv2.IMREAD_UNCHANGED), np.uint16)
+    return Frame(head.header, image, head.camera, head.odometry, depth)
 
 
-def _decoded(data: bytes, kind: str, size: tuple[int, int], how: int) -> NDArray[Any]:
-    if kind not in _FORMATS or picture_format(data) != kind:
-        raise MessageError(f"a picture that is no {' or '.join(_FORMATS)}")
-    if picture_size(data) != size or not picture_fits(*size):
-        raise MessageError("a picture that is too large, or not of the size that it tells of")
+def _decoded(data: bytes, forms: tuple[str, ...], how: int) -> NDArray[Any]:
+    if picture_format(data) not in forms:
+        raise MessageError(f"a picture that is no {' or '.join(forms)}")
+    size = picture_size(data)
+    if size is None or not picture_fits(*size):
+        raise MessageError("a picture that is too large, or has no size")
     # Without the orientation that a JPEG may name, which would turn the picture.
     image = cv2.imdecode(np.frombuffer(data, np.uint8), how | cv2.IMREAD_IGNORE_ORIENTATION)
     if image is None or image.shape[1::-1] != size:

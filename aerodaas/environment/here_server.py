@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aerodaas.analytics.here.relay import oversize
-from aerodaas.analytics.item_json import encoded
-from aerodaas.analytics.wire_items import unpack
+from aerodaas.analytics.wire_items import UnknownClassError, item_json, unpack
 from aerodaas.errors import failure_line
 from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.schema import MessageError
@@ -112,7 +111,7 @@ class HereServer:
         try:
             result = self._analyses[key].process(self.revealed(item), context)
             fired = self._fired(key, result)
-            answer = {"item": encoded(result, self._hidden), "fired": fired}
+            answer = {"item": self._json_of(result), "fired": fired}
         except Exception as error:  # noqa: BLE001 - an application's analysis may raise anything
             answer = {"failed": failure_line(error)}
         return {**answer, "alerts": context.alerts}
@@ -130,6 +129,12 @@ class HereServer:
             for number, when in enumerate(self._conditions[key])
             if result is not None and (when is None or when(result))
         ]
+
+    def _json_of(self, result: object) -> Any:  # noqa: ANN401 - JSON
+        try:
+            return item_json(result)
+        except UnknownClassError:
+            return item_json(self._hidden(result))
 
     def _hidden(self, item: object) -> OpaqueItem:
         """Keep an item of the application's own class; what leaves is a number for it."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from aerodaas.messages.records import fast_pickle
+
 __all__ = ["OpaqueItem"]
 
 
+@fast_pickle
 @dataclass(frozen=True, slots=True)
 class OpaqueItem:
     """A result of a class that only the user's side knows."""

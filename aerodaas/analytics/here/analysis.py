@@ -15,8 +15,7 @@ from typing import Any, ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.here.channel import Channel, ChannelError
-from aerodaas.analytics.item_json import decoded
-from aerodaas.analytics.wire_items import pack
+from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.errors import ModelError
 from aerodaas.messages.frames import Header
 from aerodaas.messages.opaque_item import OpaqueItem
@@ -138,7 +137,7 @@ class HereAnalysis(Analytics[Any]):
         failed = answer.get("failed")
         if failed:
             raise ModelError(f"the user's side: {str(failed)[:_TEXT]}")
-        result = decoded(answer.get("item"))
+        result = unpack(answer.get("item"))
         if not self._is_declared(result):
             raise MessageError(
                 f"the user's side: {self.key} declares {self.item.__name__} and sent "
@@ -210,8 +209,8 @@ def _class_name(result: object) -> str:
     if not isinstance(result, OpaqueItem):
         return type(result).__name__
     return (
-        f"{result.kind} of the application's own, or one that holds an object of a class of its "
-        "own: send those of AeroDaaS, or declare object"
+        f"{result.kind[:_TEXT]} of the application's own, or one that holds an object of a class "
+        "of its own: send those of AeroDaaS, or declare object"
     )
 
 

@@ -19,10 +19,11 @@ from aerodaas.analytics.here.analysis import (
     HereSite,
 )
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
-from aerodaas.analytics.wire_items import pack
+from aerodaas.analytics.wire_items import item_json, pack
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, ModelError
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Alert, Readings
 from aerodaas.messages.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
@@ -149,8 +150,8 @@ def test_a_frame_goes_as_a_picture(patient: HereRelay, *, lossless: bool) -> Non
     work.open()
     work.process(Frame(Header(1, 2, "cam"), np.zeros((8, 8, 3), np.uint8)), Flight())
     content, blob = user.asked[0]
-    assert content["item"]["format"] == ("png" if lossless else "jpeg")
-    assert len(blob) == sum(content["item"]["bytes"])
+    assert blob.startswith(b"\x89PNG" if lossless else b"\xff\xd8")
+    assert len(blob) == content["item"]["of"]["picture"]
 
 
 def test_a_missing_user_is_told_once_and_may_come_back(relay: HereRelay) -> None:
@@ -245,7 +246,7 @@ def test_an_answer_of_another_connection_is_no_answer(patient: HereRelay) -> Non
         ({"item": {"is": "Waypoint", "of": {"id": 5}}}, b"", "Waypoint.id: Input should"),
         ({"item": {"is": "os.system"}}, b"", "no class 'os.system'"),
         ({"item": "a text"}, b"", "declares AeroNavigation and sent str"),
-        ({"item": {"is": "OpaqueItem", "kind": "AeroNavigation", "value": 1, "data": ""}}, b"",
+        ({"item": item_json(OpaqueItem("AeroNavigation", 1))}, b"",
          "and sent AeroNavigation of the application's own, or one that holds an object of"),
         ({"item": {"is": "Readings", "of": {"stamp": 1, "values": {}}}}, b"",
          "declares AeroNavigation and sent Readings"),
