@@ -17,6 +17,7 @@ import pickle
 import struct
 from contextlib import suppress
 from functools import lru_cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -177,6 +178,9 @@ class _Pickler(pickle.Pickler):
     """Pickler of items whose classes every process can import."""
 
     def reducer_override(self, obj: object) -> Any:  # noqa: ANN401 - pickle's
+        if isinstance(obj, type | FunctionType) and obj.__module__ == "__main__":
+            # By name, other processes would look for it in a `__main__` of their own.
+            raise pickle.PicklingError
         return _reduced(obj) if type(obj) is np.ndarray else NotImplemented
 
 
