@@ -69,20 +69,18 @@ class HereAnalysis(Analytics[Any]):
 
     _asks = "process"
 
-    def __init__(
-        self, key: str, site: HereSite, produces: type = object, *, sees_vehicle: bool = False
-    ) -> None:
+    def __init__(self, key: str, site: HereSite, produces: type = object) -> None:
         """Ask for the analysis `key` of the document.
 
         Args:
             key: Its id there.
             site: The flight's relay.
             produces: Class of its results.
-            sees_vehicle: Whether it is told the vehicle's state: that of its inputs' robot.
         """
         self.key = key
         self.item = produces
-        self.sees_vehicle = sees_vehicle
+        self.sees_vehicle = False
+        """Whether it is told the vehicle's state: that of its inputs' robot."""
         self._site = site
         self._channel: Channel | None = None
         self._told = False
