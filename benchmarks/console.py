@@ -184,11 +184,10 @@ def _changes(path: Path) -> list[float]:
     found, before = [], None
     with Recording.open(path) as recording:
         for record in recording.records(schemas=("aerodaas.Setpoint",)):
-            asked = record.value["asked"] or {}
-            place = asked.get("position", asked.get("velocity"))
-            if place != before:
+            asked = record.value.asked
+            if asked != before:
                 found.append(record.stamp / 1e6)
-            before = place
+            before = asked
     return found
 
 

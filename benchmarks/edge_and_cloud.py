@@ -113,8 +113,8 @@ def _row(scheduler: str, network: str, seed: int, path: Path) -> Row:
     with Recording.open(path) as recording:
         decisions = [r.value for r in recording.records(schemas=["aerodaas.Decision"])]
         ages = [(r.stamp - r.captured) / 1e6 for r in recording.records(topics=[_COMMANDS])]
-    ends = [one for one in decisions if one["action"] not in {"edge", "cloud", "retry"}]
-    done = [one["reason"].partition(":")[0] for one in ends if one["action"] == "done"]
+    ends = [one for one in decisions if one.action not in {"edge", "cloud", "retry"}]
+    done = [one.reason.partition(":")[0] for one in ends if one.action == "done"]
     away = evidence.to_thing("vip")
     steady = evidence.during("following", settled=_SETTLED)
     fall = evidence.gesture("vip", "fallen").start

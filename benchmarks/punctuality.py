@@ -97,7 +97,7 @@ def measure(seconds: float, busy: int, folder: Path, settings: dict[str, str]) -
     cluster.disconnect()
     with Recording.open(folder / "flight" / "flight.mcap") as recording:
         records = recording.records(schemas=("aerodaas.Setpoint",))
-        stamps = [record.value["stamp"] / 1e6 for record in records]
+        stamps = [record.value.stamp / 1e6 for record in records]
     return list(np.diff(stamps))
 
 

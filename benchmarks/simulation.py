@@ -84,8 +84,7 @@ def processor(recording: Path) -> dict[str, float]:
     readings: dict[str, list[tuple[int, float]]] = defaultdict(list)
     with Recording.open(recording) as opened:
         for record in opened.records(schemas=("aerodaas.Vitals",)):
-            value = record.value
-            readings[value["actor"]].append((value["stamp"], value["cpu_seconds"]))
+            readings[record.labels.actor].append((record.stamp, record.value.cpu_seconds))
     used: dict[str, float] = defaultdict(float)
     for actor, found in readings.items():
         kind = _PROCESSES.get(actor.partition("/")[0])

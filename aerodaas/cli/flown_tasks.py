@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.errors import RecordingError
+from aerodaas.messages.mission import Decision
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_environment import allowed_content, merged, recorded_content
 from aerodaas.schedulers.analytics.base import (
@@ -52,18 +52,18 @@ class FlownTask:
         answered = self.outcome in _ANSWERED and self.began is not None
         return self.ended - (self.began or 0) if answered else None
 
-    def note(self, record: dict[str, Any]) -> None:
+    def note(self, decision: Decision) -> None:
         """Update by a recorded decision or outcome."""
-        action = record["action"]
+        action, reason = decision.action, decision.reason
         if action in {"edge", "cloud"}:
-            self.began, self.place, self.why = record["stamp"], TaskPlace(action), record["reason"]
+            self.began, self.place, self.why = decision.stamp, TaskPlace(action), reason
         elif action in _ENDS:
-            self.outcome, self.ended = _ENDS[action], record["stamp"]
+            self.outcome, self.ended = _ENDS[action], decision.stamp
             if action == "drop":
-                self.place, self.why = TaskPlace.NOWHERE, record["reason"]
+                self.place, self.why = TaskPlace.NOWHERE, reason
             else:
                 # A busy recorder may have lost the decision.
-                named = record["reason"].partition(":")[0]
+                named = reason.partition(":")[0]
                 self.place = _PLACES.get(named, TaskPlace.NOWHERE)
 
 
@@ -86,7 +86,7 @@ class Flown:
         """
         with Recording.open(path) as recording:
             decisions = [r.value for r in recording.records(schemas=["aerodaas.Decision"])]
-            tasks = _tasks(one for one in decisions if "waited_ms" in one["values"])
+            tasks = _tasks(one for one in decisions if "waited_ms" in one.values)
             if not tasks:
                 raise RecordingError(
                     f"{path} holds no decisions of an analytics scheduler; fly with one, such as "
@@ -102,21 +102,21 @@ class Flown:
         )
 
 
-def _tasks(decisions: Iterable[dict[str, Any]]) -> list[FlownTask]:
+def _tasks(decisions: Iterable[Decision]) -> list[FlownTask]:
     found: dict[str, FlownTask] = {}
-    for record in decisions:
-        name, figures = record["task"], record["values"]
+    for decision in decisions:
+        name, figures = decision.task, decision.values
         task = found.get(name)
         if task is None:
             model, _, frame = name.partition("#")
             task = found[name] = FlownTask(
                 model,
                 frame.rpartition(":")[0],
-                record["stamp"] - round(figures["waited_ms"] * MILLISECOND),
+                decision.stamp - round(figures["waited_ms"] * MILLISECOND),
                 int(figures.get("number", 0)),
                 round(figures.get("reserve_ms", 0.0) * MILLISECOND),
             )
-        task.note(record)
+        task.note(decision)
     return sorted(found.values(), key=lambda task: (task.arrival, task.number))
 
 

@@ -6,6 +6,7 @@ of lists, and a vector `{"x": …, "y": …, "z": …}`; bytes are Base64.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, Literal, TypeVar
 
@@ -16,7 +17,7 @@ from pydantic_core import PydanticSerializationError, from_json, to_json
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.records import secrets_of
 
-__all__ = ["MessageError", "json_of", "json_text", "message_of"]
+__all__ = ["MessageError", "json_of", "json_schema_of", "json_text", "message_of"]
 
 T = TypeVar("T")
 _LONGEST_REASON = 300
@@ -52,12 +53,27 @@ def json_of(message: object) -> Any:  # noqa: ANN401 - JSON
     return from_json(json_text(message))
 
 
-def json_text(message: object, *, without_none: bool = False, **more: str | int) -> bytes:
+def json_schema_of(kind: type) -> dict[str, Any]:
+    """The JSON schema of a message's class, without its secret fields."""
+    schema = _adapter(kind).json_schema()
+    for name in secrets_of(kind):
+        del schema["properties"][name]
+    return schema
+
+
+def json_text(
+    message: object,
+    *,
+    without_none: bool = False,
+    without: Mapping[str, Any] = {},
+    **more: str | float | None,
+) -> bytes:
     """The JSON text of a message, without its secret fields.
 
     Args:
         message: An instance of a dataclass of `aerodaas.messages`.
         without_none: Whether fields that are None are left out.
+        without: Further fields that are left out, in the form of pydantic's `exclude`.
         **more: Values that stand before the message's own fields, by name.
 
     Returns:
@@ -70,7 +86,7 @@ def json_text(message: object, *, without_none: bool = False, **more: str | int)
         # Fields are not checked here: whoever reads the message checks them.
         text = _adapter(type(message)).dump_json(
             message,
-            exclude=set(secrets_of(type(message))),
+            exclude={**dict.fromkeys(secrets_of(type(message)), True), **without},
             exclude_none=without_none,
             warnings="none",
             fallback=_number,

@@ -1,9 +1,8 @@
-"""Encoding of messages for a recording: topics, JSON schemas and strict JSON."""
+"""Topics of a recording, and the JSON of objects that have no class of ours."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import re
 import sys
@@ -21,7 +20,7 @@ from foxglove import Schema
 from aerodaas.identifiers import INTERNAL, is_internal
 from aerodaas.messages.records import secrets_of
 
-__all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
+__all__ = ["Entry", "plain", "stream_of", "topic"]
 
 _DEEPEST = 12
 _LONGEST_ARRAY = 4096
@@ -66,29 +65,6 @@ def stream_of(name: str) -> str:
     return f"{owner}{slash}{last.removeprefix(_OWN)}"
 
 
-def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
-    """Schema of a JSON channel; a property given as a string has that JSON type."""
-    body = {
-        "type": "object",
-        "properties": {
-            key: {"type": kind} if isinstance(kind, str) else kind
-            for key, kind in properties.items()
-        },
-    }
-    return Schema(
-        name=f"aerodaas.{name}", encoding="jsonschema", data=json.dumps(body).encode("utf-8")
-    )
-
-
-def json_bytes(value: dict[str, Any]) -> bytes:
-    """Encode a dictionary as strict JSON; values of other types are converted by `plain`."""
-    try:
-        return _STRICT.encode(value).encode()
-    except (ValueError, TypeError, RecursionError):
-        # NaN, infinity, keys that are no strings, cycles, lone surrogates: rare, hence a slow path.
-        return json.dumps(plain(value), separators=(",", ":")).encode()
-
-
 def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON value
     """Reduce any object to JSON's types; never raises, even if a method of the object does.
 
@@ -106,10 +82,6 @@ def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON valu
         with suppress(Exception):
             return _plain_container(value, depth + 1)
     return f"<{type(value).__name__}>"
-
-
-_STRICT = json.JSONEncoder(default=plain, allow_nan=False, separators=(",", ":"))
-"""Made once: `json.dumps` makes one for each call."""
 
 
 def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JSON value

@@ -28,8 +28,8 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
+from aerodaas.recording.messages import FrameInfo
 from aerodaas.recording.reader import Record, Recording
-from aerodaas.recording.states import odometry_of
 
 __all__ = [
     "DETECTIONS_SCHEMA",
@@ -38,7 +38,6 @@ __all__ = [
     "decoded_ahead",
     "detections",
     "detections_by_frame",
-    "detections_of",
     "frames",
     "picture_topics",
     "shots",
@@ -235,14 +234,12 @@ def shots(
             header = Header(record.sequence, record.captured, _frame_id(record.value))
             yield Shot(header, None, record, video)
         else:
-            value = head.value
-            header = Header(value["id"], value["stamp"], value["source"])
-            size = value["width"], value["height"]
-            odometry = odometry_of(value.get("odometry"))
+            about: FrameInfo = head.value
+            size = about.width, about.height
             depth = depths.get(_depth_of(record.topic))
             if depth is not None and depth.captured != record.captured:
                 depth = None
-            yield Shot(header, odometry, record, video, size, measured=depth)
+            yield Shot(about.header, about.odometry, record, video, size, measured=depth)
 
 
 def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
@@ -305,14 +302,7 @@ def detections(
     for record in recording.records(
         schemas=(DETECTIONS_SCHEMA,), topics=topics, since=since, until=until
     ):
-        yield record.topic, detections_of(record.value)
-
-
-def detections_of(value: dict[str, Any]) -> Detections:
-    """Decode detections from their JSON, an `aerodaas.Detections`."""
-    header = Header(value["id"], value["stamp"], value["source"])
-    items = tuple(_detection(item) for item in value["items"])
-    return Detections(header, items, value["width"], value["height"])
+        yield record.topic, record.value
 
 
 def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:
@@ -346,16 +336,3 @@ def _frame_id(value: Any) -> str:  # noqa: ANN401 - by the schema
     head = getattr(value, "header", value)
     found = value.get("frame_id", "") if isinstance(value, dict) else getattr(head, "frame_id", "")
     return str(found)
-
-
-def _detection(value: dict[str, Any]) -> Detection:
-    left, top, right, bottom = value["box"]
-    points = value.get("keypoints")
-    return Detection(
-        (left, top, right, bottom),
-        value["label"],
-        value["score"],
-        value.get("track_id"),
-        None if points is None else np.array(points, dtype=np.float32),
-        value.get("depth"),
-    )

@@ -27,6 +27,7 @@ from aerodaas.recording.decoding.index import (
 )
 from aerodaas.recording.decoding.limits import MAX_ATTACHMENT, MAX_HELD
 from aerodaas.recording.decoding.messages import BrokenMessageError, MessageDecoder
+from aerodaas.recording.messages import NO_LABELS, Labels
 
 __all__ = ["Record", "Recording", "Topic"]
 
@@ -70,8 +71,11 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object for protobuf and the ROS 2 types that are known, else bytes;
-    None where it was not to be decoded."""
+    """A message of the class that `messages.CHANNELS` has for the schema; a dictionary for other
+    JSON, an object for protobuf and the ROS 2 types that are known, else bytes; None where it was
+    not to be decoded."""
+    labels: Labels = NO_LABELS
+    """What a message of this project says beside its own fields."""
 
 
 class Recording:
@@ -82,7 +86,6 @@ class Recording:
         self.path = path
         self._file = file
         self._index = index
-        self._decoder = MessageDecoder()
         self._loaded: OrderedDict[int, list[Message]] = OrderedDict()
         """Messages of the blocks read last, by offset: who seeks reads the same ones again."""
         self.skipped: Counter[str] = Counter()
@@ -92,6 +95,7 @@ class Recording:
             record.name: record.metadata for record in index.metadata
         }
         """Metadata records by name; `aerodaas` holds the provenance."""
+        self._decoder = MessageDecoder(self.provenance.get("format", ""))
         try:
             self.epoch_ns = int(self.provenance["epoch_ns"])
         except (KeyError, ValueError):
@@ -242,6 +246,7 @@ class Recording:
         since: int | None = None,
         until: int | None = None,
         as_written: bool = False,
+        as_json: bool = False,
     ) -> Iterator[Record]:
         """Iterate over messages in the order of log times.
 
@@ -256,6 +261,7 @@ class Recording:
             since: Earliest mission time of recording, nanoseconds; None for the first message's.
             until: Latest one; None for the last message's.
             as_written: In the order of the file instead, as a clock that was set back asks for.
+            as_json: Messages of this project as the JSON values that were recorded.
 
         Yields:
             Messages, checked by `messages.MessageDecoder`; a damaged chunk or a broken message is
@@ -273,10 +279,12 @@ class Recording:
         for message in self._messages(wanted, first, last, as_written=as_written):
             channel = self._index.channels[message.channel_id]
             schema = self._index.schemas.get(channel.schema_id)
-            value = None
+            value, labels = None, NO_LABELS
             try:
                 if channel.topic not in bare:
-                    value = self._decoder.decode(channel, schema, message.data)
+                    labels, value = self._decoder.decode(
+                        channel, schema, message.data, as_json=as_json
+                    )
             except BrokenMessageError:
                 self.skipped[channel.topic] += 1
                 continue
@@ -288,6 +296,7 @@ class Recording:
                 - self.epoch_ns,
                 message.sequence,
                 value,
+                labels,
             )
 
     def close(self) -> None:

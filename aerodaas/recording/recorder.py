@@ -31,9 +31,10 @@ from aerodaas.recording.chunk_indexes import keep_chunk_indexes_on_disk
 from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import fence_entries
-from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.recording.encoding import Entry
 from aerodaas.recording.h264 import require_encoder
 from aerodaas.recording.live import LiveServer
+from aerodaas.recording.messages import FORMAT, Drops, Latency, json_entry
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
@@ -47,19 +48,6 @@ _BATCH = 64
 """Most messages that gather before they are written; a frame ends a batch, too."""
 _AHEAD = 4
 """Most batches that wait to be written; then `write` waits, too."""
-_MILLISECOND = 1_000_000
-
-DROPS = json_schema("Drops", stream="string", dropped="integer", total="integer")
-LATENCY = json_schema(
-    "Latency",
-    stream="string",
-    seq="integer",
-    id="integer",
-    source="string",
-    empty="boolean",
-    total_ms="number",
-    hops={"type": "array", "items": {"type": "object"}},
-)
 
 
 class FlightRecorder:
@@ -216,8 +204,7 @@ class FlightRecorder:
     def _write_drops(self, stream: str, count: int) -> None:
         with self._lock:
             self._drops[stream] += count
-            value = {"stream": stream, "dropped": count, "total": self._drops[stream]}
-            entry = Entry("/drops", DROPS, json_bytes(value), self._last)
+            entry = json_entry(Drops(stream, count, self._drops[stream]), "", self._last)
             if self._failure or self._summary is not None:
                 return
             try:
@@ -240,13 +227,14 @@ class FlightRecorder:
         # A single span is recorded only for a message without an item (an analysis without
         # a result), which is recorded nowhere else.
         if len(message.spans) > (message.item is not None):
-            entries.append(_latency(message))
+            entries.append(json_entry(Latency.of(message)))
         return entries
 
     def _begin(self, provenance: Provenance, fences: Mapping[str, GeofenceConfig]) -> None:
         self._writer.start(library=f"aerodaas {provenance.versions.get('aerodaas', '')}".strip())
         epoch = provenance.started_ns
-        self._writer.add_metadata("aerodaas", provenance.as_metadata())
+        about = {"format": str(FORMAT), **provenance.as_metadata()}
+        self._writer.add_metadata("aerodaas", about)
         for name, media_type, text in (
             ("environment.json", "application/json", provenance.config),
             ("mission.json", "application/json", provenance.document),
@@ -377,24 +365,3 @@ class _WritingThread:
                 written.set_exception(error)
             else:
                 written.set_result(None)
-
-
-def _latency(message: Message[Any]) -> Entry:
-    spans = []
-    before = message.captured
-    for span in message.spans:
-        wait, work = span.received - before, span.published - span.received
-        spans.append(
-            {"node": span.node, "wait_ms": wait / _MILLISECOND, "work_ms": work / _MILLISECOND}
-        )
-        before = span.published
-    value = {
-        "stream": message.stream,
-        "seq": message.seq,
-        "id": message.header.id,
-        "source": message.header.source,
-        "empty": message.item is None,
-        "total_ms": message.latency_ns / _MILLISECOND,
-        "hops": spans,
-    }
-    return Entry("/latency", LATENCY, json_bytes(value))

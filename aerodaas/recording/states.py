@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
-from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.schema import message_of
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.reader import Recording
 
-__all__ = ["odometry_of", "state_of", "vehicle_states"]
+__all__ = ["vehicle_states"]
 
 
 def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, VehicleState]]:
@@ -24,15 +21,5 @@ def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, Vehi
         Mission time of publishing, nanoseconds, and the state.
     """
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
-        if record.value["robot"] == robot:
-            yield record.stamp, state_of(record.value)
-
-
-def state_of(value: dict[str, Any]) -> VehicleState:
-    """A state from its recorded JSON; raises MessageError for one of another form."""
-    return message_of(VehicleState, value, unknown_fields="ignore")
-
-
-def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
-    """Odometry from its recorded JSON, None for None; raises MessageError for another form."""
-    return None if value is None else message_of(Odometry, value, unknown_fields="ignore")
+        if record.labels.robot == robot:
+            yield record.stamp, record.value

@@ -27,6 +27,7 @@ from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.environment.run import Run
 from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import Decision
 from aerodaas.recording.reader import Recording
 from aerodaas.runtime.dispatch.dispatcher import Managed
 from aerodaas.runtime.session import Session
@@ -93,7 +94,7 @@ def _process(name: str) -> psutil.Process:
     raise AssertionError(f"no {name}")
 
 
-def _decisions(run: Run) -> list[dict[str, Any]]:
+def _decisions(run: Run) -> list[Decision]:
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
         return [record.value for record in recording.records(schemas=["aerodaas.Decision"])]
@@ -104,20 +105,20 @@ def _alerts(run: Run) -> dict[str, list[str]]:
     found: dict[str, list[str]] = defaultdict(list)
     with Recording.open(run.recording) as recording:
         for record in recording.records(schemas=["aerodaas.Alert"]):
-            found[record.value["kind"]].append(record.value["text"])
+            found[record.value.kind].append(record.value.text)
     return found
 
 
 def _require_one_end_each(run: Run) -> Counter[str]:
     """No task ended twice; of those that arrived at most the very last are open."""
     decisions = _decisions(run)
-    ends = [one for one in decisions if one["action"] not in {"edge", "cloud", "retry"}]
-    each = Counter(one["task"] for one in ends)
+    ends = [one for one in decisions if one.action not in {"edge", "cloud", "retry"}]
+    each = Counter(one.task for one in ends)
     assert max(each.values()) == 1
     values = run.reports()["dispatcher"].values
     assert sum(values["outcomes"].values()) == len(ends)
     assert 0 <= values["tasks"] - len(ends) <= 8
-    return Counter(one["action"] for one in ends)
+    return Counter(one.action for one in ends)
 
 
 def test_an_actor_that_is_not_set_up_reports() -> None:
@@ -181,10 +182,10 @@ def test_tasks_name_their_frames(flyer: Flyer, speed: float | None) -> None:
     with Recording.open(run.recording) as recording:
         results = list(recording.records(schemas=["aerodaas.Value"]))
         assert len(results) > 20
-        assert all(one.value["value"]["values"]["stamp"] == one.captured for one in results)
+        assert all(one.value.value["values"]["stamp"] == one.captured for one in results)
     if speed is None:
-        ends = [one for one in _decisions(run) if one["action"] != "edge"]
-        assert {(one["action"], one["values"]["waited_ms"]) for one in ends} == {("done", 0.0)}
+        ends = [one for one in _decisions(run) if one.action != "edge"]
+        assert {(one.action, one.values["waited_ms"]) for one in ends} == {("done", 0.0)}
     else:
         assert run.reports()["dispatcher"].values["frames_carried"] == 0
 
@@ -206,9 +207,9 @@ def test_an_executor_that_dies_is_restarted_and_its_task_tried_again(flyer: Flye
     assert values["edge_down"] == []
     assert values["frames_carried"] >= 1
     assert ends["failed"] == 0
-    again = next(one for one in _decisions(run) if one["action"] == "retry")
-    assert again["reason"] == "its executor on the edge died"
-    became = [one["action"] for one in _decisions(run) if one["task"] == again["task"]]
+    again = next(one for one in _decisions(run) if one.action == "retry")
+    assert again.reason == "its executor on the edge died"
+    became = [one.action for one in _decisions(run) if one.task == again.task]
     assert became == ["edge", "retry", "edge", "done"]
     alerts = _alerts(run)
     assert alerts["executor_lost"] == ["drone/model died on the edge: restarting"]
@@ -231,7 +232,7 @@ def test_a_task_whose_deadline_is_too_near_is_not_tried_again(flyer: Flyer) -> N
     ends = _require_one_end_each(run)
     assert run.reports()["dispatcher"].values["retried"] == 0
     assert ends["failed"] == 1
-    reasons = {one["reason"] for one in _decisions(run) if one["action"] == "failed"}
+    reasons = {one.reason for one in _decisions(run) if one.action == "failed"}
     assert reasons == {"edge: its executor on the edge died"}
 
 
@@ -264,7 +265,7 @@ def test_a_dispatcher_that_dies_comes_back_without_being_asked(
     alerts = _alerts(run)
     assert alerts["actor_lost"] == ["the actor dispatcher died"]
     assert len(alerts["actor_back"]) == 1
-    ends = [one["task"] for one in _decisions(run) if one["action"] not in {"edge", "cloud"}]
+    ends = [one.task for one in _decisions(run) if one.action not in {"edge", "cloud"}]
     assert max(Counter(ends).values()) == 1
     numbers = {int(task.rpartition("#")[2]) for task in ends}
     lost = set(range(min(numbers), max(numbers))) - numbers
@@ -292,16 +293,17 @@ def test_work_moves_to_the_edge_while_the_cloud_is_gone(flyer: Flyer) -> None:
     _require_one_end_each(run)
     alerts = _alerts(run)
     assert len(alerts["cloud_lost"]) == len(alerts["cloud_back"]) == 1
-    order = [one for one in _decisions(run) if one["action"] == "cloud"]
+    order = [one for one in _decisions(run) if one.action == "cloud"]
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
         found = {
-            r.value["kind"]: r.value["stamp"] for r in recording.records(schemas=["aerodaas.Alert"])
+            r.value.kind: r.value.header.stamp
+            for r in recording.records(schemas=["aerodaas.Alert"])
         }
     gone, back = found["cloud_lost"], found["cloud_back"]
-    assert not [one for one in order if gone < one["stamp"] < back]
-    in_cloud = {one["task"] for one in order if one["stamp"] > back}
-    assert in_cloud & {one["task"] for one in _decisions(run) if one["action"] == "done"}
+    assert not [one for one in order if gone < one.stamp < back]
+    in_cloud = {one.task for one in order if one.stamp > back}
+    assert in_cloud & {one.task for one in _decisions(run) if one.action == "done"}
 
 
 @pytest.mark.slow

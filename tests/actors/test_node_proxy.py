@@ -52,8 +52,8 @@ def _seen(run: Run) -> tuple[set[float], set[str]]:
     with Recording.open(run.recording) as recording:
         values = [one.value for one in recording.records(topics=["/drone/where/value"])]
         alerts = [one.value for one in recording.records(schemas=["aerodaas.Alert"])]
-    pids = {value["value"]["values"]["pid"] for value in values}
-    return pids, {alert["text"] for alert in alerts if alert["kind"] == "seen"}
+    pids = {value.value["values"]["pid"] for value in values}
+    return pids, {alert.text for alert in alerts if alert.kind == "seen"}
 
 
 def test_a_flight_is_the_same_wherever_its_nodes_are(tmp_path: Path) -> None:

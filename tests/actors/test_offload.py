@@ -145,7 +145,7 @@ def until(env: Environment, holds: Callable[[dict[str, Any]], bool]) -> dict[str
     return found
 
 
-def recorded(run: Run, schema: str) -> list[dict[str, Any]]:
+def recorded(run: Run, schema: str) -> list[Any]:
     """What was recorded under a schema."""
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
@@ -163,18 +163,18 @@ def test_a_frame_is_sent_once_for_two_analyses_and_the_way_is_recorded(flyer: Fl
     frames = site["frames"]
     assert found["tasks"] // 2 - 8 <= frames <= found["tasks"] // 2 + 1
     assert site["latency_ms"] > 0
-    done = [d for d in recorded(env.launch(), "aerodaas.Decision") if d["action"] == "done"]
-    assert {one["reason"] for one in done} == {"cloud: jpeg to cloud"}
+    done = [d for d in recorded(env.launch(), "aerodaas.Decision") if d.action == "done"]
+    assert {one.reason for one in done} == {"cloud: jpeg to cloud"}
     for one in done:
-        figures = one["values"]
+        figures = one.values
         assert figures["frame_kb"] == pytest.approx(320 * 180 * 3 / 1e3)
         assert min(figures["work_ms"], figures["link_ms"], figures["expected_way_ms"]) >= 0
     # Of each frame's two executions only the first sent something.
-    senders = Counter(one["task"].split("#")[1] for one in done if one["values"]["sent_kb"] > 0)
+    senders = Counter(one.task.split("#")[1] for one in done if one.values["sent_kb"] > 0)
     assert max(senders.values()) == 1
-    sent = [d for d in recorded(env.launch(), "aerodaas.Decision") if d["action"] == "cloud"]
-    assert sent[0]["values"]["cloud_ms"] == 300.0
-    assert sent[-1]["values"]["cloud_ms"] < 300.0
+    sent = [d for d in recorded(env.launch(), "aerodaas.Decision") if d.action == "cloud"]
+    assert sent[0].values["cloud_ms"] == 300.0
+    assert sent[-1].values["cloud_ms"] < 300.0
 
 
 @pytest.mark.slow
@@ -192,12 +192,12 @@ def test_a_function_url_is_a_cloud_that_may_fail(flyer: Flyer) -> None:
             until(env, lambda v: v.get("outcomes", {})["done"] >= done + 4)
             env.get_robot_by_id("drone").end_mission()
     run = env.launch()
-    told = [a["text"] for a in recorded(run, "aerodaas.Alert") if a["kind"] == "cloud_failed"]
+    told = [a.text for a in recorded(run, "aerodaas.Alert") if a.kind == "cloud_failed"]
     assert len(told) == 1
     assert "status 500: as told" in told[0]
     decisions = recorded(run, "aerodaas.Decision")
-    failed = [one for one in decisions if one["action"] == "failed"]
-    assert all("status 500" in one["reason"] for one in failed)
+    failed = [one for one in decisions if one.action == "failed"]
+    assert all("status 500" in one.reason for one in failed)
 
 
 def test_an_endpoint_for_what_it_cannot_do_is_refused_while_building(flyer: Flyer) -> None:

@@ -137,11 +137,11 @@ class Told:
             flight = RecordedFlight.read(recording)
             for record in recording.records(schemas={"aerodaas.Decision"}):
                 value = record.value
-                if value["action"] == "cloud":
-                    sent.setdefault(value["task"], value["stamp"] / 1e9)
-                if value["action"] in ENDS:
-                    end = (value["stamp"] / 1e9, value["action"], value["reason"])
-                    ends[value["task"]].append(end)
+                if value.action == "cloud":
+                    sent.setdefault(value.task, value.stamp / 1e9)
+                if value.action in ENDS:
+                    end = (value.stamp / 1e9, value.action, value.reason)
+                    ends[value.task].append(end)
         return cls(flight, dict(ends), sent)
 
     def alerts(self, kind: str) -> list[str]:

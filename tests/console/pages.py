@@ -51,8 +51,8 @@ def passed(path: Path, place: tuple[float, float]) -> bool:
     """Whether the drone was at a place, by the simulator's own truth."""
     with Recording.open(path) as recording:
         truths = [
-            (truth["position"]["x"], truth["position"]["y"])
-            for record in recording.records()
-            if isinstance(record.value, dict) and (truth := record.value.get("truth"))
+            record.value.truth.position[:2]
+            for record in recording.records(schemas=["aerodaas.VehicleState"])
+            if record.value.truth is not None
         ]
     return bool(np.linalg.norm(np.array(truths) - place, axis=1).min() < _NEAR)

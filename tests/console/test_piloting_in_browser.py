@@ -69,9 +69,9 @@ def speeds(path: Path) -> list[tuple[float, float]]:
     """Seconds of mission time and speed, by the simulator's own truth."""
     with Recording.open(path) as recording:
         return [
-            (record.value["stamp"] / 1e9, math.hypot(*truth["velocity"].values()))
-            for record in recording.records()
-            if isinstance(record.value, dict) and (truth := record.value.get("truth"))
+            (record.value.stamp / 1e9, math.hypot(*record.value.truth.velocity))
+            for record in recording.records(schemas=["aerodaas.VehicleState"])
+            if record.value.truth is not None
         ]
 
 

@@ -35,7 +35,7 @@ def moved(recording: Recording) -> list[dict[str, str]]:
     """What was moved, each change once."""
     found: list[dict[str, str]] = []
     for one in recording.records(schemas=("aerodaas.VehicleState",)):
-        state = one.value.get("actuators", {})
+        state = one.value.actuators
         if state and (not found or found[-1] != state):
             found.append(state)
     return found
@@ -57,5 +57,5 @@ def test_a_delivery_is_in_its_recording(flyer: Flyer) -> None:
     with Recording.open(again.recording) as recording:
         missions = [one.value for one in recording.records(schemas=("aerodaas.MissionStatus",))]
         alerts = [one.value for one in recording.records(schemas=("aerodaas.Alert",))]
-    assert missions[-1]["visited"] == ["drop", "away"]
-    assert [one for one in alerts if one["kind"] == "actuator"] == []
+    assert missions[-1].visited == ("drop", "away")
+    assert [one for one in alerts if one.kind == "actuator"] == []

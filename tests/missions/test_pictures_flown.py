@@ -55,15 +55,15 @@ def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None
         states = [one.value for one in recording.records(schemas=("aerodaas.VehicleState",))]
         plans = [one.value for one in recording.records(schemas=("aerodaas.Plan",))]
         alerts = [one.value for one in recording.records(schemas=("aerodaas.Alert",))]
-    assert [one["video"] for one in plans[0]["waypoints"]] == [True, None]
-    assert not [one for one in alerts if one["kind"] == "video"]
-    assert [photo["label"] for photo in photos] == ["nadir", "aside"]
-    assert [photo["zoom"] for photo in photos] == [0.0, 50.0]
-    assert [state["zoom"] for state in (states[0], states[-1])] == [0.0, 50.0]
+    assert [one.video for one in plans[0].waypoints] == [True, None]
+    assert not [one for one in alerts if one.kind == "video"]
+    assert [photo.label for photo in photos] == ["nadir", "aside"]
+    assert [photo.zoom for photo in photos] == [0.0, 50.0]
+    assert [state.zoom for state in (states[0], states[-1])] == [0.0, 50.0]
     # Calibration of each frame: twice the focal length at half of a zoom of three.
     focal = 32 / math.tan(math.radians(82.6) / 2)
     assert {round(one.K[0] / focal, 3) for one in lenses} == {1.0, 2.0}
-    assert min(state["gimbal"]["pitch"] for state in states) == pytest.approx(DOWN, abs=0.05)
+    assert min(state.gimbal.pitch for state in states) == pytest.approx(DOWN, abs=0.05)
 
 
 @pytest.mark.slow
@@ -74,5 +74,5 @@ def test_a_bolted_camera_loses_pictures_that_need_a_gimbal(flyer: Flyer) -> None
     assert not run.recording.with_name("flight-photos").exists()
     with Recording.open(run.recording) as recording:
         missions = [one.value for one in recording.records(schemas=("aerodaas.MissionStatus",))]
-    assert missions[-1]["photos"] == [0, 2]
-    assert missions[-1]["visited"] == ["nadir", "aside"]
+    assert missions[-1].photos == (0, 2)
+    assert missions[-1].visited == ("nadir", "aside")

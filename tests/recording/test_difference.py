@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
 from aerodaas.config.model import RecordingConfig
-from aerodaas.messages.detections import Detections
+from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import Decision
 from aerodaas.recording.recorder import FlightRecorder
@@ -94,13 +94,15 @@ boxes = st.lists(
 )
 
 
+def objects(items: list[tuple[Any, ...]]) -> list[Detection]:
+    """Detections of a label, a corner, a size and a score each."""
+    return [Detection((x, y, x + w, y + h), label, score) for label, x, y, w, h, score in items]
+
+
 @given(boxes, st.randoms())
 def test_order_of_boxes_does_not_matter(items: list[tuple[Any, ...]], random: Any) -> None:  # noqa: ANN401
     """The same objects in another order have not moved."""
-    found = [
-        {"label": label, "score": score, "box": [x, y, x + w, y + h]}
-        for label, x, y, w, h, score in items
-    ]
+    found = objects(items)
     shuffled = list(found)
     random.shuffle(shuffled)
     shift = box_shift([(found, shuffled)])
@@ -115,13 +117,7 @@ def test_every_object_is_accounted_for(
     one: list[tuple[Any, ...]], other: list[tuple[Any, ...]]
 ) -> None:
     """Each is paired, lost or new."""
-    first, second = (
-        [
-            {"label": label, "score": score, "box": [x, y, x + w, y + h]}
-            for label, x, y, w, h, score in items
-        ]
-        for items in (one, other)
-    )
+    first, second = objects(one), objects(other)
     shift = box_shift([(first, second)])
     assert shift.paired + shift.lost == len(first)
     assert shift.paired + shift.new == len(second)

@@ -46,10 +46,10 @@ def test_csv_holds_every_message(recorded: Path, tmp_path: Path) -> None:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["odometry.position.x"]) for row in rows] == [
-        state["odometry"]["position"]["x"] for state in states
+        state.odometry.position[0] for state in states
     ]
     assert rows[3]["mode"] == "guided"
-    assert float(rows[-1]["recorded_s"]) == pytest.approx(states[-1]["stamp"] / 1e9)
+    assert float(rows[-1]["recorded_s"]) == pytest.approx(states[-1].stamp / 1e9)
 
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])

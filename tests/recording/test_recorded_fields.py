@@ -1,10 +1,9 @@
-"""Whatever a class may hold is recorded, or is named here as left out on purpose."""
+"""Each field of each message is recorded and read, or is named in the table as left out."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,112 +12,124 @@ import pytest
 from filled import filled, names
 from synthetic_flight import PROVENANCE
 
-from aerodaas.config.model import RecordingConfig
+from aerodaas.config.model import GeofenceConfig, RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.geometry.frames import CameraModel
-from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
-from aerodaas.messages.odometry import Battery, Odometry
+from aerodaas.messages.odometry import Battery
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
 from aerodaas.messages.vitals import Vitals
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.recording.converters import Session, convert
-from aerodaas.recording.pictures import detections, detections_of, shots
+from aerodaas.recording.messages import (
+    CHANNELS,
+    FrameInfo,
+    Labels,
+    MissionPlan,
+    NavigationRecord,
+    json_entry,
+    labels_and_message,
+)
+from aerodaas.recording.pictures import detections, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
 
 HEADER = Header(4, 5, "drone/cam")
-NOWHERE = ""
-"""Recorded under no name, on purpose."""
-ELSEWHERE: dict[type, dict[str, str]] = {
-    # The password that it may hold.
-    VehicleState: {"video": NOWHERE},
-    # The plan has the waypoints; progress is the quotient.
-    MissionStatus: {"waypoint_counts": "progress"},
-    # Made from the picture, which is recorded: clothes by their colours, and the depth beside it.
-    Detection: {"appearance": NOWHERE},
-    Detections: {"header": "stamp", "camera": NOWHERE, "odometry": NOWHERE, "nearest": NOWHERE},
-    # In messages of their own: picture, depth, calibration and mount.
-    Frame: {"header": "stamp", "image": NOWHERE, "camera": NOWHERE, "depth": NOWHERE},
-    Alert: {"header": "stamp"},
-    # As exact as it is drawn; by the pictures' own exact place.
-    Photo: {"truth": NOWHERE},
-    Vitals: {"taken": "stamp", "memory": "memory_mb"},
+FOUND = filled(Detections)
+ONE = dataclasses.replace(FOUND[0], appearance=None)
+LEFT_OUT: dict[type, dict[str, Any]] = {
+    VehicleState: {"video": ""},
+    MissionStatus: {"pending": ()},
+    Detections: {"items": (ONE,), "camera": None, "odometry": None, "nearest": None},
 }
-"""Fields by the name under which they are recorded, where that is another."""
+"""What takes the place of the fields that are recorded elsewhere, or nowhere."""
+LABELS = dataclasses.asdict(filled(Labels))
+MESSAGES = [
+    *(
+        filled(one.kind)
+        for one in CHANNELS.values()
+        if one.kind not in {GeofenceConfig, SetpointRecord}
+    ),
+    *(SetpointRecord(1, filled(kind), None) for kind in (PositionSetpoint, VelocitySetpoint)),
+    GeofenceConfig(polygon=[(0, 0), (1, 0), (1, 1)], ceiling=20.0),
+]
 
 
-def recorded(item: object) -> list[dict[str, Any]]:
-    """The JSON messages of an item."""
-    message = Message("drone/s", 1, 6, HEADER, 0, (), item)
-    entries = convert(item, message, Session(RecordingConfig(), 0))
-    return [json.loads(it.data) for it in entries if it.schema.encoding == "jsonschema"]
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_each_field_is_recorded_and_read(message: Any) -> None:  # noqa: ANN401
+    """A field that is added to a message needs no other line."""
+    entry = json_entry(message, "drone/it", 6, **LABELS)
+    labels, back = labels_and_message(entry.schema.name, json.loads(entry.data))
+    left_out = LEFT_OUT.get(type(message))
+    assert back == (dataclasses.replace(message, **left_out) if left_out else message)
+    wanted = CHANNELS[entry.schema.name].labels
+    assert labels == dataclasses.replace(Labels(), **{name: LABELS[name] for name in wanted})
 
 
-def lost(kind: type, found: Mapping[str, Any]) -> set[str]:
-    """Fields of a class that a recorded object has not."""
-    known = ELSEWHERE.get(kind, {})
-    return {name for name in names(kind) if known.get(name, name) not in {NOWHERE, *found}}
+@pytest.mark.parametrize("message", MESSAGES, ids=lambda message: type(message).__name__)
+def test_the_schema_names_what_is_written(message: object) -> None:
+    """Foxglove offers the fields that the schema names."""
+    entry = json_entry(message, "drone/it", 6, robot="drone")
+    described = json.loads(entry.schema.data)["properties"]
+    assert set(described) == set(json.loads(entry.data))
 
 
 @pytest.mark.parametrize(
-    "kind",
+    ("item", "kinds"),
     [
-        VehicleState,
-        MissionStatus,
-        Decision,
-        Alert,
-        Battery,
-        Photo,
-        SetpointRecord,
-        Vitals,
-        Frame,
-        Detections,
+        (filled(VehicleState), {VehicleState}),
+        (filled(MissionStatus), {MissionStatus, MissionPlan}),
+        (filled(Decision), {Decision}),
+        (filled(Alert), {Alert}),
+        (filled(Battery), {Battery}),
+        (filled(Photo), {Photo}),
+        (filled(SetpointRecord), {SetpointRecord}),
+        (filled(Vitals), {Vitals}),
+        (filled(Frame), {FrameInfo}),
+        (FOUND, {Detections}),
+        (AeroNavigation(data=[filled(Waypoint)]), {NavigationRecord}),
     ],
+    ids=lambda value: type(value).__name__,
 )
-def test_each_field_is_recorded(kind: type) -> None:
-    """By its name."""
-    found = recorded(filled(kind))[0]
-    assert lost(kind, found) == set()
-    assert None not in found.values()
+def test_an_item_becomes_messages_of_the_table(item: object, kinds: set[type]) -> None:
+    """With the labels that reading needs."""
+    message = Message("drone/s", 1, 6, HEADER, 0, (), item)
+    entries = convert(item, message, Session(RecordingConfig(), 0))
+    written = [it for it in entries if it.schema.encoding == "jsonschema"]
+    assert {CHANNELS[it.schema.name].kind for it in written} == kinds
+    for it in written:
+        labels, _ = labels_and_message(it.schema.name, json.loads(it.data))
+        assert labels.robot in {"drone", ""}
 
 
-def test_what_is_inside_is_recorded() -> None:
-    """Detections, setpoints, odometry, waypoints and commands, with each of their fields."""
-    (found,) = recorded(filled(Detections))
-    assert lost(Detection, found["items"][0]) == set()
-    for kind in (PositionSetpoint, VelocitySetpoint):
-        one = recorded(SetpointRecord(1, filled(kind), filled(kind)))[0]
-        assert lost(kind, one["asked"]) == lost(kind, one["sent"]) == set()
-    state = recorded(filled(VehicleState))[0]
-    assert lost(Odometry, state["odometry"]) == lost(Odometry, state["truth"]) == set()
+def test_navigation_is_recorded_whole() -> None:
+    """With the priority that was given for all of it."""
     given = [filled(Waypoint), filled(VelocityCommand)]
     navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, given, priority=2)
-    (found,) = recorded(navigation)
-    assert lost(Waypoint, found["waypoints"][0]) == set()
-    assert lost(VelocityCommand, found["commands"][0]) == set()
-    assert found["priority"] == 2
+    entry = json_entry(NavigationRecord.of(navigation, HEADER), "drone/it")
+    _, back = labels_and_message(entry.schema.name, json.loads(entry.data))
+    assert [*back.waypoints, *back.commands] == list(navigation)
+    assert (back.header, back.type, back.priority) == (HEADER, navigation.navigation_type, 2)
 
 
 def test_detections_and_cameras_are_read_as_they_were_recorded(tmp_path: Path) -> None:
     """By who shows and exports them: each field that is recorded at all."""
-    path, found, frame = tmp_path / "flight.mcap", filled(Detections), filled(Frame)
+    path, frame = tmp_path / "flight.mcap", filled(Frame)
     with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
-        for seq, (stream, item) in enumerate((("drone/cam", frame), ("drone/finder", found))):
+        for seq, (stream, item) in enumerate((("drone/cam", frame), ("drone/finder", FOUND))):
             recorder.write(Message(stream, seq, 6, HEADER, 0, (), item))
     with Recording.open(path) as recording:
         ((_, back),) = detections(recording, ["/drone/finder/detections"])
         values = {record.topic: record.value for record in recording.records()}
         (shot,) = shots(recording, ["/drone/cam/image"])
         depth = shot.depth()
-    known = dataclasses.replace(found[0], appearance=None)
-    assert (back.header, back.width, back.height) == (found.header, found.width, found.height)
-    assert list(back) == [known]
+    assert back == dataclasses.replace(FOUND, **LEFT_OUT[Detections])
     assert (shot.header, shot.odometry) == (frame.header, frame.odometry)
     np.testing.assert_array_equal(depth, frame.depth)
     camera = camera_of(values["/drone/cam/calibration"], values["/drone/cam/mount"])
@@ -129,9 +140,8 @@ def test_detections_and_cameras_are_read_as_they_were_recorded(tmp_path: Path) -
 
 def test_a_body_of_which_no_joint_is_told_is_read_back() -> None:
     """JSON keeps no shape of what is empty."""
-    found = filled(Detections)
-    bare = dataclasses.replace(found[0], keypoints=np.zeros((0, 3), np.float32))
-    (value,) = recorded(dataclasses.replace(found, items=(bare,)))
-    (back,) = detections_of(value)
+    bare = dataclasses.replace(ONE, keypoints=np.zeros((0, 3), np.float32))
+    entry = json_entry(dataclasses.replace(FOUND, items=(bare,)), "drone/it")
+    _, (back,) = labels_and_message(entry.schema.name, json.loads(entry.data))
     assert back.keypoints is not None
     assert back.keypoints.size == 0

@@ -19,7 +19,6 @@ from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import GimbalAttitude
-from aerodaas.messages.schema import MessageError
 from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
@@ -27,7 +26,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
-from aerodaas.recording.states import odometry_of, vehicle_states
+from aerodaas.recording.states import vehicle_states
 
 ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
 TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)
@@ -143,28 +142,6 @@ def test_what_a_rangefinder_measured_stays(tmp_path: Path) -> None:
     for below in (3.25, None):
         state = VehicleState(1, TRUTH, Battery(0.5), VehicleMode.GUIDED, armed=True, below=below)
         assert played(tmp_path / f"{below}.mcap", ("a", state))["a"] == [state]
-
-
-def test_no_odometry_is_none() -> None:
-    """Pictures of others have none."""
-    assert odometry_of(None) is None
-
-
-@pytest.mark.parametrize("missing", ["position", "velocity", "yaw"])
-def test_part_of_an_odometry_is_none_to_rely_on(missing: str) -> None:
-    """What a damaged message lacks is not made up."""
-    value = dict.fromkeys(("yaw", "roll", "pitch", "yaw_rate", "position_sigma"), 1.0) | {
-        "position": {"x": 1, "y": 2, "z": 3},
-        "velocity": {"x": 4.0, "y": 5.0, "z": 6.0},
-    }
-    whole = odometry_of(value)
-    assert whole is not None
-    assert whole.position.tolist() == [1.0, 2.0, 3.0]
-    assert whole.position.dtype == whole.velocity.dtype == np.float64
-    assert whole.velocity.tolist() == [4.0, 5.0, 6.0]
-    del value[missing]
-    with pytest.raises(MessageError, match=missing):
-        odometry_of(value)
 
 
 def test_a_report_counts_a_waypoint_once(tmp_path: Path) -> None:

@@ -176,7 +176,7 @@ def test_images_can_be_left_out(tmp_path: Path) -> None:
     frame = Frame(HEADER, np.zeros((18, 32, 3), np.uint8))
     found = recorded(tmp_path / "no.mcap", frame, images="none")
     assert "/tello/it/image" not in found
-    assert found["/tello/it/frame"][0].value["id"] == HEADER.id
+    assert found["/tello/it/frame"][0].value.header == HEADER
 
 
 def test_detections_come_back_exactly(tmp_path: Path) -> None:
@@ -245,9 +245,7 @@ def test_vehicle_state(tmp_path: Path) -> None:
     location = found["/tello/it/location"][0].value
     assert list(location.position_covariance)[::4] == [2.25, 2.25, 9.0]
     value = found["/tello/it/state"][0].value
-    assert value["battery"] == {"fraction": 0.5, "voltage": 7.4, "current": 3.0}
-    assert value["odometry"]["yaw"] == ODOMETRY.yaw
-    assert (value["mode"], value["armed"], value["faults"]) == ("guided", True, ["compass"])
+    assert value == state
 
 
 def test_single_readings(tmp_path: Path) -> None:
@@ -255,7 +253,7 @@ def test_single_readings(tmp_path: Path) -> None:
     found = recorded(tmp_path / "readings.mcap", ODOMETRY, GpsFix(1.0, 2.0, 3.0), Battery(0.25))
     assert found["/tello/it/transform"][0].value.child_frame_id == "tello/base_link"
     assert found["/tello/it/location"][0].value.longitude == 2.0
-    assert found["/tello/it/battery"][0].value["fraction"] == 0.25
+    assert found["/tello/it/battery"][0].value == Battery(0.25)
 
 
 def test_plan_is_written_when_it_changes(tmp_path: Path) -> None:
@@ -274,7 +272,7 @@ def test_plan_is_written_when_it_changes(tmp_path: Path) -> None:
         status(b),
         status(None),
     )
-    plans = [[w["id"] for w in it.value["waypoints"]] for it in found["/tello/it/plan"]]
+    plans = [[w.id for w in it.value.waypoints] for it in found["/tello/it/plan"]]
     assert plans == [["a", "b"], ["c", "b"]]
     scene = found["/tello/it/scene"]
     assert [entity.id for it in scene for entity in it.value.entities] == ["tello/plan"] * 2
@@ -306,28 +304,30 @@ def test_changes_of_state_and_faults_are_logged_once(tmp_path: Path) -> None:
 
 def test_setpoints_decisions_navigation_alerts(tmp_path: Path) -> None:
     """What was decided is there with its reasons."""
+    setpoint = SetpointRecord(
+        5,
+        PositionSetpoint(np.array([1.0, 2.0, 3.0]), speed=2.0),
+        VelocitySetpoint(np.array([0.5, 0.0, 0.0]), 0.1),
+        ("max_speed",),
+        HEADER,
+    )
+    decision = Decision(6, "detector#4", "cloud", "edge is late", {"slack": 0.25})
+    place, command = Waypoint("a", 1.0, 2.0, 3.0), VelocityCommand(forward=0.5)
+    alert = Alert(HEADER, "battery_low", "at 20 %", {"fraction": float("nan"), "who": object()})
     found = recorded(
         tmp_path / "decided.mcap",
-        SetpointRecord(
-            5,
-            PositionSetpoint(np.array([1.0, 2.0, 3.0]), speed=2.0),
-            VelocitySetpoint(np.array([0.5, 0.0, 0.0]), 0.1),
-            ("max_speed",),
-            HEADER,
-        ),
-        Decision(6, "detector#4", "cloud", "edge is late", {"slack": 0.25}),
-        AeroNavigation(data=[Waypoint("a", 1.0, 2.0, 3.0), VelocityCommand(forward=0.5)]),
-        Alert(HEADER, "battery_low", "at 20 %", {"fraction": float("nan")}),
+        setpoint,
+        decision,
+        AeroNavigation(data=[place, command]),
+        alert,
     )
-    setpoint = found["/tello/it/setpoint"][0].value
-    assert setpoint["asked"]["position"] == {"x": 1.0, "y": 2.0, "z": 3.0}
-    assert setpoint["sent"]["velocity"]["x"] == 0.5
-    assert (setpoint["clipped_by"], setpoint["cause"]["id"]) == (["max_speed"], HEADER.id)
-    assert found["/tello/it/decision"][0].value["values"] == {"slack": 0.25}
+    assert found["/tello/it/setpoint"][0].value == setpoint
+    assert found["/tello/it/setpoint"][0].labels.robot == "tello"
+    assert found["/tello/it/decision"][0].value == decision
     navigation = found["/tello/it/navigation"][0].value
-    assert navigation["waypoints"][0]["id"] == "a"
-    assert navigation["commands"][0]["forward"] == 0.5
-    assert found["/alerts"][0].value["values"] == {"fraction": None}
+    assert navigation.header == HEADER
+    assert (navigation.waypoints, navigation.commands) == ((place,), (command,))
+    assert found["/alerts"][0].value.values == {"fraction": None, "who": "<object>"}
     assert found["/log"][-1].value.message == "battery_low: at 20 %"
 
 
@@ -342,8 +342,8 @@ def test_anything_else_becomes_json(tmp_path: Path) -> None:
     """A plug-in's own type needs no converter."""
     found = recorded(tmp_path / "any.mcap", {"a": np.float32(0.5), "b": object()}, 17)
     first, second = (record.value for record in found["/tello/it/value"])
-    assert (first["type"], first["value"]) == ("dict", {"a": 0.5, "b": "<object>"})
-    assert second["value"] == 17
+    assert (first.type, first.value) == ("dict", {"a": 0.5, "b": "<object>"})
+    assert second.value == 17
 
 
 def test_item_that_cannot_be_written_costs_only_itself(tmp_path: Path) -> None:
@@ -354,7 +354,7 @@ def test_item_that_cannot_be_written_costs_only_itself(tmp_path: Path) -> None:
     texts = [record.value.message for record in found["/log"]]
     assert texts[0].startswith("cannot record a Detections")
     assert texts[1] == "still here"
-    assert found["/drops"][0].value["total"] == 1
+    assert found["/drops"][0].value.total == 1
 
 
 def test_latency_of_each_hop(tmp_path: Path) -> None:
@@ -369,8 +369,8 @@ def test_latency_of_each_hop(tmp_path: Path) -> None:
     with Recording.open(path) as recording:
         (found,) = recording.records()
     assert found.topic == "/latency"
-    assert found.value["total_ms"] == 25.0
-    assert [(span["wait_ms"], span["work_ms"]) for span in found.value["hops"]] == [
+    assert found.value.total_ms == 25.0
+    assert [(hop.wait_ms, hop.work_ms) for hop in found.value.hops] == [
         (1, 3),
         (1, 20),
     ]
@@ -386,7 +386,7 @@ def test_drops_are_told_and_kept(tmp_path: Path) -> None:
     assert summary.drops == {"tello/camera": 3}
     assert "3 dropped" in str(summary)
     with Recording.open(path) as recording:
-        assert [record.value["total"] for record in recording.records()] == [2, 3]
+        assert [record.value.total for record in recording.records()] == [2, 3]
         assert recording.metadata["aerodaas.drops"] == {"tello/camera": "3"}
 
 

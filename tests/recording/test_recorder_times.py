@@ -16,6 +16,7 @@ from aerodaas.messages.frames import Header
 from aerodaas.messages.odometry import Battery
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.live import LiveServer
+from aerodaas.recording.messages import Drops, Hop, Latency
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Record, Recording
@@ -97,9 +98,9 @@ def test_drops_are_told_at_the_latest_time_known(tmp_path: Path) -> None:
         (9 * SECOND, 9 * SECOND, 2),
     ]
     assert [it.value for it in found] == [
-        {"stream": "cam", "dropped": 2, "total": 2},
-        {"stream": "gps", "dropped": 5, "total": 5},
-        {"stream": "cam", "dropped": 1, "total": 3},
+        Drops("cam", dropped=2, total=2),
+        Drops("gps", dropped=5, total=5),
+        Drops("cam", dropped=1, total=3),
     ]
     with Recording.open(path) as recording:
         assert recording.metadata["aerodaas.drops"] == {"cam": "3", "gps": "5"}
@@ -143,18 +144,8 @@ def test_the_way_of_a_message_in_full(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     written(path, message(3, "note", seq=6, spans=(HOP, SECOND_HOP)))
     (found,) = read(path, "/latency")
-    assert found.value == {
-        "stream": "nav/it",
-        "seq": 6,
-        "id": 17,
-        "source": "nav/cam",
-        "empty": False,
-        "total_ms": 7.5,
-        "hops": [
-            {"node": "cam", "wait_ms": 1.0, "work_ms": 3.0},
-            {"node": "find", "wait_ms": 1.0, "work_ms": 2.5},
-        ],
-    }
+    hops = Hop("cam", wait_ms=1.0, work_ms=3.0), Hop("find", wait_ms=1.0, work_ms=2.5)
+    assert found.value == Latency("nav/it", 6, 17, "nav/cam", False, 7.5, hops)  # noqa: FBT003
     assert (found.schema, found.stamp, found.captured) == (
         "aerodaas.Latency",
         3 * SECOND,

@@ -48,7 +48,8 @@ def brightness(path: Path) -> dict[int, float]:
     """What the analysis said of each picture, by its timestamp."""
     with Recording.open(path) as recording:
         (topic,) = (name for name in recording.topics if "brightness" in name.lower())
-        return {one.value["stamp"]: one.value["value"] for one in recording.records(topics=[topic])}
+        records = recording.records(topics=[topic])
+        return {one.value.header.stamp: one.value.value for one in records}
 
 
 def test_an_analysis_says_the_same_of_a_flight_and_of_its_bag(flyer: Flyer) -> None:

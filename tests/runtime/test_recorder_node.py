@@ -46,7 +46,7 @@ def texts(path: Path) -> list[str]:
     with Recording.open(path) as recording:
         assert recording.complete
         found = recording.records(schemas=["aerodaas.Alert"])
-        return [record.value["text"] for record in found]
+        return [record.value.text for record in found]
 
 
 def test_messages_are_written_to_the_file(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_flight(
     with pytest.raises(RecordingError, match="No space left on device"):
         node.close()
     with Recording.open(node.path) as recording:
-        found = [record.value["text"] for record in recording.records(schemas=["aerodaas.Alert"])]
+        found = [record.value.text for record in recording.records(schemas=["aerodaas.Alert"])]
     assert found[0] == "kept"
     assert "lost" not in found
 

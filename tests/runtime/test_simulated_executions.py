@@ -101,27 +101,27 @@ def _fly(flyer: Flyer, content: dict[str, Any], scheduler: str, seed: int = 5) -
     return run
 
 
-def _decisions(run: Run) -> list[dict[str, Any]]:
+def _decisions(run: Run) -> list[Decision]:
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
         return [record.value for record in recording.records(schemas=["aerodaas.Decision"])]
 
 
-def _ends(decision: dict[str, Any]) -> bool:
-    return decision["action"] not in {"edge", "cloud", "retry"}
+def _ends(decision: Decision) -> bool:
+    return decision.action not in {"edge", "cloud", "retry"}
 
 
-def _tasks(decisions: list[dict[str, Any]], environment: EnvironmentConfig) -> list[Task]:
+def _tasks(decisions: list[Decision], environment: EnvironmentConfig) -> list[Task]:
     """Tasks of a flight as its dispatcher made them."""
     found: dict[str, Task] = {}
     for one in decisions:
-        model, _, frame = one["task"].partition("#")
+        model, _, frame = one.task.partition("#")
         source, _, segment = frame.rpartition(":")
         profile = told_profile(model, environment.schedulers)
-        arrival = one["stamp"] - round(one["values"]["waited_ms"] * MILLISECOND)
-        number = int(one["values"]["number"])
+        arrival = one.stamp - round(one.values["waited_ms"] * MILLISECOND)
+        number = int(one.values["number"])
         task = Task(number, profile, arrival, arrival + profile.deadline, source, int(segment))
-        found.setdefault(one["task"], task)
+        found.setdefault(one.task, task)
     return sorted(found.values(), key=lambda task: task.id)
 
 
@@ -153,17 +153,17 @@ def test_a_flight_agrees_with_the_laboratory(
         executions.network,
     )
     trace = simulate(path, load_scheduler(scheduler), Resources(2))
-    end = decisions[-1]["stamp"] - NANOSECONDS
+    end = decisions[-1].stamp - NANOSECONDS
     wanted = [one for one in trace.results if one.finished < end]
-    ended = {int(one["values"]["number"]): one for one in decisions if _ends(one)}
+    ended = {int(one.values["number"]): one for one in decisions if _ends(one)}
     for result in wanted:
         found = ended[result.task.id]
-        assert found["stamp"] == result.finished
+        assert found.stamp == result.finished
         if result.outcome is TaskOutcome.DROPPED:
-            assert found["action"] in {"drop", "dropped"}
+            assert found.action in {"drop", "dropped"}
         else:
-            assert found["action"] == result.outcome.value
-            assert found["reason"].partition(":")[0] == result.place.value
+            assert found.action == result.outcome.value
+            assert found.reason.partition(":")[0] == result.place.value
     assert len(wanted) > 100
     assert {one.place for one in wanted} == set(TaskPlace)
     # A lost task's empty answer is no result, however late it is.

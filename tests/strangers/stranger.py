@@ -47,7 +47,7 @@ class Flown:
         """Class and content of what was recorded of a stream."""
         with Recording.open(self.recording) as opened:
             records = opened.records(topics={f"/{stream}/value"})
-            return [(one.value["type"], one.value["value"]) for one in records]
+            return [(one.value.type, one.value.value) for one in records]
 
     def lines(self, stream: str) -> set[str]:
         """Texts that were recorded of a stream."""
@@ -58,7 +58,7 @@ class Flown:
     def alerts(self) -> list[str]:
         """What people were told."""
         with Recording.open(self.recording) as opened:
-            return [one.value["text"] for one in opened.records(topics={"/alerts"})]
+            return [one.value.text for one in opened.records(topics={"/alerts"})]
 
     def landed_as_planned(self) -> bool:
         """Whether all waypoints were visited."""

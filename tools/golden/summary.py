@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.mission import MissionStatus
 from aerodaas.recording.reader import Recording
 
 __all__ = ["differences", "milestones", "summary"]
@@ -40,35 +41,34 @@ def summary(path: Path) -> dict[str, Any]:
     """
     tracks: dict[str, list[list[float]]] = defaultdict(list)
     states: dict[str, list[list[Any]]] = defaultdict(list)
-    last: dict[str, dict[str, Any]] = {}
+    last: dict[str, MissionStatus] = {}
     decisions: dict[str, list[Any]] = defaultdict(list)
     alerts: list[Any] = []
     counts: Counter[str] = Counter()
     with Recording.open(path) as recording:
         for record in recording.records():
-            value = record.value
+            value, robot = record.value, record.labels.robot
             if record.schema not in _MEASURED and record.topic not in _LOGS:
                 counts[record.topic] += 1
             if record.schema == "aerodaas.VehicleState":
-                pose = value["odometry"]
-                place = [pose["position"][axis] for axis in "xyz"]
-                tracks[value["robot"]].append([value["stamp"], *place, pose["yaw"]])
+                pose = value.odometry
+                tracks[robot].append([value.stamp, *pose.position.tolist(), pose.yaw])
             elif record.schema == "aerodaas.MissionStatus":
-                told = [value["state"], value["reason"]]
-                entries = states[value["robot"]]
+                told = [value.state.value, value.reason]
+                entries = states[robot]
                 if not entries or entries[-1][1:] != told:
-                    entries.append([_seconds(value["stamp"]), *told])
-                last[value["robot"]] = value
+                    entries.append([_seconds(value.stamp), *told])
+                last[robot] = value
             elif record.schema == "aerodaas.Decision":
-                row = [value["stamp"], value["task"], value["action"], value["reason"]]
+                row = [value.stamp, value.task, value.action, value.reason]
                 decisions[record.topic].append(row)
             elif record.schema == "foxglove.Log" and not value.message.startswith(_STALLS):
                 alerts.append([_seconds(record.captured), value.level, value.name, value.message])
     return {
         "trajectories": {robot: _trajectory(rows) for robot, rows in sorted(tracks.items())},
         "states": dict(sorted(states.items())),
-        "visited": {robot: value["visited"] for robot, value in sorted(last.items())},
-        "given_up": {robot: value["given_up"] for robot, value in sorted(last.items())},
+        "visited": {robot: list(status.visited) for robot, status in sorted(last.items())},
+        "given_up": {robot: list(status.given_up) for robot, status in sorted(last.items())},
         "log": sorted(alerts),
         "decisions": {topic: _decided(rows) for topic, rows in sorted(decisions.items())},
         "counts": dict(sorted(counts.items())),

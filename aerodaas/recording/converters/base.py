@@ -14,13 +14,12 @@ from aerodaas.config.model import RecordingConfig
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.opaque_item import OpaqueItem
-from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
+from aerodaas.recording.encoding import Entry, plain
 from aerodaas.recording.h264 import H264Encoder
+from aerodaas.recording.messages import ItemRecord, json_entry
 from aerodaas.recording.rotation import Rotation
 
-__all__ = ["Session", "convert", "quaternion", "vector", "xyz"]
-
-VALUE = json_schema("Value", stamp="integer", source="string", type="string", value={})
+__all__ = ["Session", "convert", "quaternion", "robot_of", "vector"]
 
 
 @dataclass(slots=True)
@@ -54,18 +53,15 @@ class Session:
 def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
     """Yield the entries of `item`; generic JSON for an unregistered type."""
     del session
-    value = {
-        "stamp": message.header.stamp,
-        "source": message.header.source,
-        "type": item.kind if isinstance(item, OpaqueItem) else type(item).__name__,
-        "value": plain(item.value if isinstance(item, OpaqueItem) else item),
-    }
-    yield Entry(topic(message.stream, "value"), VALUE, json_bytes(value))
+    opaque = isinstance(item, OpaqueItem)
+    kind = item.kind if opaque else type(item).__name__
+    value = plain(item.value if opaque else item)
+    yield json_entry(ItemRecord(message.header, kind, value), message.stream)
 
 
-def xyz(vector: Vector) -> dict[str, float]:
-    """Convert a vector for JSON."""
-    return {"x": float(vector[0]), "y": float(vector[1]), "z": float(vector[2])}
+def robot_of(message: Message[Any]) -> str:
+    """Id of the robot that a message comes from."""
+    return (message.header.source or message.stream).partition("/")[0]
 
 
 def vector(values: Vector | Sequence[float]) -> Vector3:

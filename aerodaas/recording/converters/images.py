@@ -27,12 +27,12 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.schema import json_of
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame
 from aerodaas.recording.encoded_frame import EncodedFrame
-from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.h264 import H264Encoder
+from aerodaas.recording.messages import FrameInfo, json_entry
 from aerodaas.recording.report.overlay import VISIBLE
 from aerodaas.recording.report.palette import label_colour, rgb
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
@@ -45,18 +45,6 @@ DEPTH = RawImage.get_schema()
 CALIBRATION = CameraCalibration.get_schema()
 TRANSFORM = FrameTransform.get_schema()
 ANNOTATIONS = ImageAnnotations.get_schema()
-FRAME = json_schema(
-    "Frame", id="integer", stamp="integer", source="string", width="integer", height="integer"
-)
-DETECTIONS = json_schema(
-    "Detections",
-    id="integer",
-    stamp="integer",
-    source="string",
-    width="integer",
-    height="integer",
-    items={"type": "array", "items": {"type": "object"}},
-)
 
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
@@ -95,31 +83,15 @@ def detections(item: Detections, message: Message[Any], session: Session) -> Ite
         texts=[_label(found) for found in item.items],
     )
     yield Entry(topic(stream, "boxes"), ANNOTATIONS, annotations.encode(), header.stamp)
-    value = {
-        "id": header.id,
-        "stamp": header.stamp,
-        "source": header.source,
-        "width": item.width,
-        "height": item.height,
-        "items": [_detection_json(found) for found in item.items],
-    }
-    yield Entry(topic(stream, "detections"), DETECTIONS, json_bytes(value), header.stamp)
+    yield json_entry(item, stream, header.stamp)
 
 
 def _head(item: Frame | EncodedFrame, stream: str, session: Session) -> Iterator[Entry]:
     header = item.header
     if item.camera is not None and session.changed("camera", stream, item.camera):
         yield from _camera(item.camera, header.source, stream, header.stamp, session)
-    value: dict[str, Any] = {
-        "id": header.id,
-        "stamp": header.stamp,
-        "source": header.source,
-        "width": item.width,
-        "height": item.height,
-    }
-    if item.odometry is not None:
-        value["odometry"] = json_of(item.odometry)
-    yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
+    about = FrameInfo(header, item.width, item.height, item.odometry)
+    yield json_entry(about, stream, header.stamp)
 
 
 def _image(data: bytes, kind: str, header: Header, stream: str, session: Session) -> Entry:
@@ -225,18 +197,3 @@ def _label(found: Detection) -> TextAnnotation:
         text_color=_colour(found.label),
         background_color=_BLACK,
     )
-
-
-def _detection_json(found: Detection) -> dict[str, Any]:
-    value: dict[str, Any] = {
-        "label": found.label,
-        "score": float(found.score),
-        "box": [float(edge) for edge in found.box],
-    }
-    if found.track_id is not None:
-        value["track_id"] = found.track_id
-    if found.keypoints is not None:
-        value["keypoints"] = found.keypoints.tolist()
-    if found.depth is not None:
-        value["depth"] = found.depth
-    return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from foxglove.messages import Log, LogLevel
@@ -11,20 +12,12 @@ from foxglove.messages import Log, LogLevel
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.readings import Alert
 from aerodaas.recording.converters.base import Session, convert
-from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.recording.encoding import Entry, plain
+from aerodaas.recording.messages import json_entry
 
 __all__ = ["log_entry"]
 
 LOG = Log.get_schema()
-ALERT = json_schema(
-    "Alert",
-    stamp="integer",
-    source="string",
-    stream="string",
-    kind="string",
-    text="string",
-    values="object",
-)
 
 
 def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: str) -> Entry:
@@ -38,15 +31,9 @@ def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entr
     """Write an alert to the log and, with its figures, as JSON."""
     stamp = item.header.stamp
     yield log_entry(session, stamp, LogLevel.Warning, message.stream, f"{item.kind}: {item.text}")
-    value = {
-        "stamp": stamp,
-        "source": item.header.source,
-        "stream": message.stream,
-        "kind": item.kind,
-        "text": item.text,
-        "values": item.values,
-    }
-    yield Entry("/alerts", ALERT, json_bytes(value), stamp)
+    # An application's own figures may be of any class.
+    known = replace(item, values=plain(item.values))
+    yield json_entry(known, "", stamp, stream=message.stream)
 
 
 @convert.register

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,8 @@ from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.identifiers import internal
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, quaternion, vector
-from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.encoding import Entry, topic
+from aerodaas.recording.messages import MissionPlan, json_entry
 from aerodaas.recording.reference_frames import MAP_FRAME
 from aerodaas.recording.report.palette import OKABE_ITO, rgb
 from aerodaas.recording.rotation import from_rpy
@@ -37,19 +38,15 @@ __all__ = ["fence_entries", "plan_entries"]
 SCENE = SceneUpdate.get_schema()
 POSES = PosesInFrame.get_schema()
 MAP = GeoJson.get_schema()
-PLAN = json_schema("Plan", stamp="integer", robot="string", waypoints="array")
-FENCE = json_schema("Geofence", robot="string", polygon="array", floor="number", ceiling="number")
 
 _BALL = 0.25
 """Diameter in metres of a waypoint in the scene."""
 
 
-def plan_entries(
-    waypoints: Sequence[Waypoint], robot: str, stream: str, stamp: int, session: Session
-) -> Iterator[Entry]:
-    """Write the local waypoints of a plan as JSON, scene, poses and, with a home, GeoJSON."""
-    value = {"stamp": stamp, "robot": robot, "waypoints": waypoints}
-    yield Entry(topic(stream, "plan"), PLAN, json_bytes(value), stamp)
+def plan_entries(plan: MissionPlan, robot: str, stream: str, session: Session) -> Iterator[Entry]:
+    """Write a plan as JSON, scene, poses and, with a home, GeoJSON."""
+    stamp, waypoints = plan.stamp, plan.waypoints
+    yield json_entry(plan, stream, stamp, robot=robot)
     time = session.time(stamp)
     colour = _colour("blue")
     entity = SceneEntity(
@@ -99,13 +96,7 @@ def plan_entries(
 def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterator[Entry]:
     """Write a robot's geofence as JSON, scene and, with a home, GeoJSON."""
     fence_stream = internal(robot, "fence")
-    value = {
-        "robot": robot,
-        "polygon": fence.polygon,
-        "floor": fence.floor,
-        "ceiling": fence.ceiling,
-    }
-    yield Entry(topic(fence_stream, "fence"), FENCE, json_bytes(value), 0)
+    yield json_entry(fence, fence_stream, 0, robot=robot)
     if not fence.polygon:
         return
     colour = _colour("vermilion")

@@ -15,6 +15,7 @@ __all__ = [
     "MAX_JSON",
     "MAX_KEYS",
     "MAX_METADATA",
+    "MAX_NUMBER",
     "MAX_PROTOBUF_FIELDS",
     "MAX_RATIO",
     "MAX_ROS",
@@ -40,6 +41,9 @@ times as much as objects."""
 MAX_PROTOBUF_FIELDS = 1 << 20
 """Bytes of a protobuf message, less its own bytes such as a picture's, that is written as a table;
 a message of two bytes within it takes a hundred times as many."""
+MAX_NUMBER = 1 << 63
+"""Largest number of a message of ours, whatever its unit. Plots fail near the ends of floating
+point."""
 MAX_DEPTH = 32
 """Levels of nesting of a JSON message; ours have six, and Python's stack ends near 1000."""
 MAX_METADATA = 1 << 20

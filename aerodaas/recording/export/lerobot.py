@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import RecordingError
+from aerodaas.messages.vehicle import Setpoint, VehicleState, VelocitySetpoint
 from aerodaas.recording.export.lerobot_tables import write_tables
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.export.video import VideoFile
 from aerodaas.recording.pictures import frames, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.recording.states import state_of
 
 __all__ = ["ACTION", "STATE", "write_lerobot"]
 
@@ -232,8 +232,8 @@ def _robots(recording: Recording) -> dict[str, dict[str, list[int]]]:
 def _episode(recording: Recording, robot: str, cameras: dict[str, list[int]]) -> _Episode | None:
     states: dict[int, list[float]] = {}
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
-        if record.value["robot"] == robot:
-            state = state_of(record.value)
+        if record.labels.robot == robot:
+            state: VehicleState = record.value
             pose = state.odometry
             turned = from_rpy(pose.roll, pose.pitch, pose.yaw)
             values = [*pose.position, *pose.velocity, *turned]
@@ -259,10 +259,10 @@ def _episode(recording: Recording, robot: str, cameras: dict[str, list[int]]) ->
 
 def _actions(recording: Recording, robot: str, stamps: _Stamps, states: _Floats) -> _Floats:
     """What was sent and in force at each row, N x 4."""
-    sent: dict[int, dict[str, Any] | None] = {}
+    sent: dict[int, Setpoint | None] = {}
     for record in recording.records(schemas=("aerodaas.Setpoint",)):
-        if record.value["robot"] == robot:
-            sent[record.value["stamp"]] = record.value["sent"]
+        if record.labels.robot == robot:
+            sent[record.value.stamp] = record.value.sent
     actions = np.zeros((len(stamps), len(ACTION)), np.float32)
     times = np.array(sorted(sent), np.int64)
     if not len(times):
@@ -274,24 +274,16 @@ def _actions(recording: Recording, robot: str, stamps: _Stamps, states: _Floats)
     return actions
 
 
-def _action(setpoint: dict[str, Any] | None, position: _Floats, velocity: _Floats) -> list[float]:
+def _action(setpoint: Setpoint | None, position: _Floats, velocity: _Floats) -> list[float]:
     if setpoint is None:
         return [0.0] * len(ACTION)
-    if setpoint["kind"] == "velocity":
-        return [*_axes(setpoint["velocity"]), _number(setpoint["yaw_rate"])]
-    way = np.array(_axes(setpoint["position"])) - position
+    if isinstance(setpoint, VelocitySetpoint):
+        return [*setpoint.velocity, setpoint.yaw_rate]
+    way = setpoint.position - position
     distance = float(np.linalg.norm(way))
-    asked = setpoint["speed"]
-    speed = float(np.linalg.norm(velocity)) if asked is None else float(asked)
+    asked = setpoint.speed
+    speed = float(np.linalg.norm(velocity)) if asked is None else asked
     return [*(way / max(distance, 1e-9) * min(speed, distance)).tolist(), 0.0]
-
-
-def _axes(vector: dict[str, float | None]) -> list[float]:
-    return [_number(vector[axis]) for axis in "xyz"]
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
 
 
 def _filmed(

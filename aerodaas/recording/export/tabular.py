@@ -46,7 +46,7 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
     """
     name = _known(recording, topic)
     rows = []
-    for record in recording.records(topics=[name]):
+    for record in recording.records(topics=[name], as_json=True):
         row: Row = {
             "recorded_s": seconds(record.stamp),
             "captured_s": seconds(record.captured),

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
-
-import numpy as np
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import RecordingError
-from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.geometry.frames import GeodeticOrigin, is_finite
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_environment import recorded_home
@@ -105,18 +105,18 @@ def _tracks(recording: Recording) -> dict[str, _Track]:
     tracks: dict[str, _Track] = {}
     newest: dict[str, int] = {}
     for record in recording.records(schemas=["aerodaas.VehicleState", "aerodaas.Plan"]):
-        value = record.value
-        track = tracks.setdefault(value["robot"], _Track([], {}))
+        robot = record.labels.robot
+        track = tracks.setdefault(robot, _Track([], {}))
         if record.schema == "aerodaas.Plan":
             if home is not None:
-                for at in value["waypoints"]:
-                    track.waypoints[at["id"]] = _Place(*_globe(home, at), "", at["id"])
+                for at in record.value.waypoints:
+                    track.waypoints[at.id] = _Place(*home.to_geodetic(at.position), "", at.id)
             continue
-        place = _position(value, home)
-        early = record.captured < newest.get(value["robot"], -_INTERVAL) + _INTERVAL
+        place = _position(record.value, home)
+        early = record.captured < newest.get(robot, -_INTERVAL) + _INTERVAL
         if place is None or early:
             continue
-        newest[value["robot"]] = record.captured
+        newest[robot] = record.captured
         moment = datetime.fromtimestamp(
             (recording.epoch_ns + record.captured) / NANOSECONDS, timezone.utc
         )
@@ -131,20 +131,15 @@ def _tracks(recording: Recording) -> dict[str, _Track]:
 
 
 def _position(
-    state: dict[str, Any], home: GeodeticOrigin | None
+    state: VehicleState, home: GeodeticOrigin | None
 ) -> tuple[float, float, float] | None:
-    at = state["odometry"]["position"]
     if home is not None:
-        # Null stands for a number that was not finite.
-        return None if None in at.values() else _globe(home, at)
-    gps = state.get("gps")
-    if not gps or None in (gps["latitude"], gps["longitude"], gps["altitude"]):
+        at = state.odometry.position
+        return home.to_geodetic(at) if is_finite(at) else None
+    gps = state.gps
+    if gps is None or not all(map(math.isfinite, (gps.latitude, gps.longitude, gps.altitude))):
         return None
-    return gps["latitude"], gps["longitude"], gps["altitude"]
-
-
-def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, float]:
-    return home.to_geodetic(np.array([at["x"], at["y"], at["z"]]))
+    return gps.latitude, gps.longitude, gps.altitude
 
 
 def _home(recording: Recording) -> GeodeticOrigin | None:

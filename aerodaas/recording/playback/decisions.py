@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
 
 from aerodaas.clock import seconds
+from aerodaas.messages.mission import Decision
 from aerodaas.protocol.schemas import AnalyticsOut
 
 __all__ = ["DecisionSums"]
@@ -35,19 +35,19 @@ class DecisionSums:
             return self._rows
         return [*self._rows, *self._row(self._last)]
 
-    def take(self, value: dict[str, Any]) -> None:
+    def take(self, decision: Decision) -> None:
         """Take one decision or outcome."""
-        now, action = seconds(value["stamp"]), value["action"]
+        now, action = seconds(decision.stamp), decision.action
         if action == "drop":
             # A task that its scheduler gives up ends by that.
             self._outcomes["dropped"] += 1
         elif action in _OUTCOMES:
             self._outcomes[action] += 1
             # An outcome's reason begins with where the task ran.
-            self._places[value["reason"].partition(":")[0]] += 1
+            self._places[decision.reason.partition(":")[0]] += 1
         else:
             return
-        figures = value["values"]
+        figures = decision.values
         self._totals |= {name: figures[name] for name in self._totals if name in figures}
         if self._last is None or now >= self._last:
             self._last = now

@@ -16,6 +16,7 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.schema import MessageError
 from aerodaas.recording.h264 import is_key_frame
+from aerodaas.recording.messages import NavigationRecord
 from aerodaas.recording.pictures import Shot, detections, shots
 from aerodaas.recording.playback.page_items import (
     packed_depth,
@@ -23,12 +24,12 @@ from aerodaas.recording.playback.page_items import (
     packed_places,
     packed_target,
 )
-from aerodaas.recording.playback.target import target_of
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_camera import camera_of
 
-__all__ = ["Captures", "Film", "Packed"]
+__all__ = ["NAVIGATION_SCHEMA", "Captures", "Film", "Packed"]
 
+NAVIGATION_SCHEMA = "aerodaas.Navigation"
 Packed = tuple[dict[str, Any], bytes]
 """An item as a live view sends it: a message, and a picture's bytes."""
 _AHEAD = 64
@@ -204,8 +205,10 @@ class Film:
         for stream, (topic, captures) in self._navigation.items():
             for time in sorted({captures.recorded[place] for place in captures.at(header.stamp)}):
                 for record in self._recording.records(topics=[topic], since=time, until=time):
-                    target = target_of(record.value, header)
-                    if target is not None:
+                    found: NavigationRecord = record.value
+                    target = found.commands[0].target if found.commands else None
+                    of_frame = found.header[1:] == header[1:]
+                    if target is not None and of_frame:
                         message = _message(stream, header.stamp, header.stamp)
                         yield {**message, "item": packed_target(header, target), "blob": False}, b""
 

@@ -9,14 +9,17 @@ from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.mission import Decision
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import AlertOut, RecordedOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import StreamKind
 from aerodaas.recording.decoding.limits import MAX_KEYS
+from aerodaas.recording.messages import MissionPlan
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, picture_topics
 from aerodaas.recording.playback.decisions import DecisionSums
-from aerodaas.recording.playback.film import Captures, Film
-from aerodaas.recording.playback.target import NAVIGATION_SCHEMA
+from aerodaas.recording.playback.film import NAVIGATION_SCHEMA, Captures, Film
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_camera import CALIBRATION_SCHEMA, MOUNT_SCHEMA
@@ -95,20 +98,21 @@ class _Reading:
         return {name: (topic, self._captures[topic]) for name, topic in streams.items()}
 
     def _take(self, record: Record) -> None:
-        value: dict[str, Any] = record.value
-        match record.schema.removeprefix("aerodaas."):
-            case "Alert":
-                if self._room.take(1):
-                    time = seconds(value["stamp"])
-                    alert = AlertOut(time=time, kind=value["kind"], text=value["text"])
-                    self._alerts.append(alert)
-            case "Decision":
-                self._sums.take(value)
-            case kind:
-                robot = self._robot(value["robot"])
-                if robot is not None:
-                    takers = {"VehicleState": robot.state, "Plan": robot.plan}
-                    takers.get(kind, robot.mission)(value)
+        message = record.value
+        if isinstance(message, Alert):
+            if self._room.take(1):
+                time = seconds(message.header.stamp)
+                alert = AlertOut(time=time, kind=message.kind, text=message.text)
+                self._alerts.append(alert)
+        elif isinstance(message, Decision):
+            self._sums.take(message)
+        elif (robot := self._robot(record.labels.robot)) is not None:
+            if isinstance(message, VehicleState):
+                robot.state(message)
+            elif isinstance(message, MissionPlan):
+                robot.plan(message)
+            else:
+                robot.mission(message, record.labels.ahead)
 
     def _robot(self, name: str) -> TrackBuilder | None:
         known = self._robots.get(name)

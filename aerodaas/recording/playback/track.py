@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from aerodaas.clock import seconds
+from aerodaas.geometry.frames import Vector, is_finite
+from aerodaas.messages.mission import BatteryOutlook, MissionStatus
+from aerodaas.messages.odometry import GpsFix
+from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.protocol.playback import GpsOut, HeardOut, PlaceOut, TrackOut
 from aerodaas.protocol.schemas import OutlookOut, StatusOut, TrafficOut
+from aerodaas.recording.messages import MissionPlan
 
 __all__ = ["ROW_SECONDS", "Room", "TrackBuilder"]
 
@@ -77,24 +84,24 @@ class TrackBuilder:
         """The flight so far."""
         return self._track
 
-    def state(self, value: dict[str, Any]) -> None:
+    def state(self, state: VehicleState) -> None:
         """Take a vehicle's state."""
-        now, track = seconds(value["stamp"]), self._track
-        self._change(now, {"mode": value["mode"]})
+        now, track = seconds(state.stamp), self._track
+        self._change(now, {"mode": state.mode.value})
         if track.time and now < track.time[-1] + self._interval:
             return
-        self._hear(now, value.get("traffic"))
-        odometry = value["odometry"]
+        self._hear(now, state.traffic)
+        odometry = state.odometry
         track.time.append(now)
-        track.position.append(_vector(odometry["position"]))
-        track.velocity.append(_vector(odometry["velocity"]))
-        track.yaw.append(odometry["yaw"])
-        track.roll.append(odometry.get("roll"))
-        track.pitch.append(odometry.get("pitch"))
-        track.battery.append(value["battery"]["fraction"])
+        track.position.append(_axes(odometry.position))
+        track.velocity.append(_axes(odometry.velocity))
+        track.yaw.append(_known(odometry.yaw))
+        track.roll.append(_known(odometry.roll))
+        track.pitch.append(_known(odometry.pitch))
+        track.battery.append(_known(state.battery.fraction))
         track.distance.append(self._flown)
         track.outlook.append(self._outlook)
-        track.gps.append(_gps(value.get("gps")))
+        track.gps.append(_gps(state.gps))
         if len(track.time) > _MOST_ROWS:
             self._interval *= 2
             for rows in (track.time, track.position, track.velocity, track.yaw, track.roll,
@@ -102,51 +109,46 @@ class TrackBuilder:
                          track.gps):  # fmt: skip
                 del rows[1::2]
 
-    def _hear(self, now: float, told: object) -> None:
+    def _hear(self, now: float, told: Sequence[Traffic]) -> None:
         """Take the other aircraft of a state, once a second and when the last one is gone."""
         heard = self._track.traffic
-        aircraft = _traffic(told)
+        aircraft = [TrafficOut.of(one) for one in told[:_MOST_AIRCRAFT] if _is_placed(one)]
         due = not heard or now >= heard[-1].since + _HEARD_SECONDS or not aircraft
         changed = bool(aircraft or (heard and heard[-1].aircraft))
         if changed and due and self._room.take(1 + len(aircraft)):
             heard.append(HeardOut(since=now, aircraft=aircraft))
 
-    def mission(self, value: dict[str, Any]) -> None:
-        """Take a mission's status."""
-        self._flown = float(value["distance"])
-        self._outlook = _outlook(value.get("outlook"))
-        target, pending = value.get("target"), value.get("pending")
-        name = target.get("id") if isinstance(target, dict) else None
-        self._pending = pending if isinstance(pending, int) and pending > 0 else 0
-        faults = value.get("faults")
-        progress = value.get("visits")
-        visited = progress if isinstance(progress, int) else len(value["visited"])
+    def mission(self, status: MissionStatus, ahead: int) -> None:
+        """Take a mission's status, and how many waypoints follow its target."""
+        self._flown = status.distance
+        self._outlook = _outlook(status.outlook)
+        self._pending = max(0, ahead)
         self._change(
-            seconds(value["stamp"]),
+            seconds(status.stamp),
             {
-                "state": value["state"],
-                "reason": value["reason"],
-                "pilot": value.get("pilot", ""),
-                "target": name if isinstance(name, str) else None,
-                "visited": value["visited"][-_MOST_BEHIND:],
-                "given_up": value["given_up"][-_MOST_BEHIND:],
-                "waypoints_visited": visited,
+                "state": status.state.value,
+                "reason": status.reason,
+                "pilot": status.pilot,
+                "target": None if status.target is None else status.target.id,
+                "visited": list(status.visited[-_MOST_BEHIND:]),
+                "given_up": list(status.given_up[-_MOST_BEHIND:]),
+                "waypoints_visited": status.visits,
                 **self._ahead(),
-                "faults": [str(one) for one in faults] if isinstance(faults, list) else [],
+                "faults": list(status.faults),
             },
         )
 
-    def plan(self, value: dict[str, Any]) -> None:
+    def plan(self, plan: MissionPlan) -> None:
         """Take a new plan: the waypoints ahead."""
-        now = seconds(value["stamp"])
-        self._plan = [one["id"] for one in value["waypoints"]]
-        for one in value["waypoints"]:
-            place = (float(one["x"]), float(one["y"]), float(one["z"]))
-            if self._known.get(one["id"]) == place:
+        now = seconds(plan.stamp)
+        self._plan = [one.id for one in plan.waypoints]
+        for one in plan.waypoints:
+            place = (one.x, one.y, one.z)
+            if self._known.get(one.id) == place:
                 continue
             if self._room.take(1):
-                self._known[one["id"]] = place
-                self._track.places.append(PlaceOut(since=now, id=one["id"], place=place))
+                self._known[one.id] = place
+                self._track.places.append(PlaceOut(since=now, id=one.id, place=place))
         self._change(now, self._ahead())
 
     def _ahead(self) -> dict[str, Any]:
@@ -169,35 +171,31 @@ class TrackBuilder:
             self._track.statuses.append(new)
 
 
-def _outlook(value: dict[str, Any] | None) -> OutlookOut | None:
+def _outlook(outlook: BatteryOutlook | None) -> OutlookOut | None:
     """A recorded outlook, if all of it is known."""
-    return None if value is None or None in value.values() else OutlookOut(**value)
-
-
-def _traffic(told: object) -> list[TrafficOut]:
-    """The recorded aircraft whose place is known; none of what is malformed."""
-    found = map(_aircraft, told[:_MOST_AIRCRAFT] if isinstance(told, list) else [])
-    return [one for one in found if one is not None]
-
-
-def _aircraft(told: Any) -> TrafficOut | None:  # noqa: ANN401 - of a stranger's recording
-    try:
-        place, velocity = (_vector(told[name]) for name in ("position", "velocity"))
-        return TrafficOut(**{**told, "position": place, "velocity": velocity})
-    except (KeyError, TypeError, ValueError):
+    if outlook is None:
         return None
+    figures = {"plan": outlook.plan, "returns_at": outlook.returns_at, "hover": outlook.hover}
+    return OutlookOut(**figures) if all(map(math.isfinite, figures.values())) else None
 
 
-def _gps(value: dict[str, Any] | None) -> GpsOut | None:
+def _is_placed(aircraft: Traffic) -> bool:
+    """Whether its place along the ground and its velocity are known."""
+    return is_finite(aircraft.position[:2]) and is_finite(aircraft.velocity)
+
+
+def _gps(fix: GpsFix | None) -> GpsOut | None:
     """A recorded fix; zeros stand for what the receiver does not tell."""
-    if value is None:
+    if fix is None:
         return None
-    satellites = value.get("satellites")
-    return GpsOut(
-        satellites=int(satellites) if satellites else None,
-        position_sigma=value.get("horizontal_sigma") or None,
-    )
+    sigma = _known(fix.horizontal_sigma)
+    return GpsOut(satellites=fix.satellites or None, position_sigma=sigma or None)
 
 
-def _vector(value: dict[str, Any]) -> tuple[float | None, float | None, float | None]:
-    return value["x"], value["y"], value["z"]
+def _axes(vector: Vector) -> tuple[float | None, float | None, float | None]:
+    x, y, z = map(float, vector)
+    return _known(x), _known(y), _known(z)
+
+
+def _known(number: float) -> float | None:
+    return number if math.isfinite(number) else None

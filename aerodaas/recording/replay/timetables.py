@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
+from aerodaas.messages.frames import Header
 from aerodaas.recording.encoding import stream_of
 from aerodaas.recording.reader import Record, Recording
 
@@ -19,7 +20,7 @@ class _Reading:
         self.stamps: dict[str, set[int]] = defaultdict(set)
 
     def frame(self, record: Record) -> None:
-        self.stamps[record.value["source"]].add(record.value["stamp"])
+        self._add(record.value.header)
 
     def reading(self, record: Record) -> None:
         """Add a sensor's reading; its stream is the topic without the kind of data."""
@@ -30,14 +31,17 @@ class _Reading:
 
     def result(self, record: Record) -> None:
         """Add an analysis's result if the analysis has no inputs and measures itself."""
-        source = record.value["source"]
-        if source == stream_of(record.topic.strip("/").rpartition("/")[0]):
-            self.stamps[source].add(record.value["stamp"])
+        header: Header = record.value.header
+        if header.source == stream_of(record.topic.strip("/").rpartition("/")[0]):
+            self._add(header)
 
     def latency(self, record: Record) -> None:
         """Add a message that passed through one actor only and is thus a measurement."""
-        if len(record.value["hops"]) == 1:
-            self.stamps[record.value["stream"]].add(record.captured)
+        if len(record.value.hops) == 1:
+            self.stamps[record.value.stream].add(record.captured)
+
+    def _add(self, header: Header) -> None:
+        self.stamps[header.source].add(header.stamp)
 
 
 def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:

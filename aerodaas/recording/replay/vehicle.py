@@ -10,6 +10,7 @@ from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import ConfigError, VehicleError
+from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
@@ -19,7 +20,7 @@ __all__ = ["ReplayedVehicle"]
 
 _ON_ITS_OWN = {VehicleMode.GROUNDED, VehicleMode.TAKING_OFF, VehicleMode.FAILSAFE}
 """Modes in which the recorded vehicle took no setpoints."""
-_WAITING = {"idle", "preflight"}
+_WAITING = {MissionState.IDLE, MissionState.PREFLIGHT}
 
 
 class ReplayedVehicle:
@@ -120,7 +121,7 @@ class ReplayedVehicle:
         The states do not contain the reason for the wait.
         """
         for record in self._recording.records(schemas=("aerodaas.MissionStatus",)):
-            if record.value["robot"] == self._id and record.value["state"] not in _WAITING:
+            if record.labels.robot == self._id and record.value.state not in _WAITING:
                 return record.stamp
         return 0
 

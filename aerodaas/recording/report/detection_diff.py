@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+
+from aerodaas.geometry.frames import Box
+from aerodaas.messages.detections import Detection
 
 __all__ = ["DetectionDiff", "box_shift"]
 
 _OVERLAP = 0.5
 """Least intersection over union of two boxes of the same object, as in PASCAL VOC."""
-
-Item = dict[str, Any]
-Box = list[float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +41,11 @@ class DetectionDiff:
         )
 
 
-def box_shift(results: Iterable[tuple[list[Item], list[Item]]]) -> DetectionDiff:
+def box_shift(results: Iterable[tuple[Sequence[Detection], Sequence[Detection]]]) -> DetectionDiff:
     """Pair the objects of each frame's two results and measure their differences.
 
     Args:
-        results: For each frame, both results: objects with `label`, `score` and `box`.
+        results: For each frame, both results.
     """
     moves, scores = [], []
     lost = new = 0
@@ -58,9 +57,9 @@ def box_shift(results: Iterable[tuple[list[Item], list[Item]]]) -> DetectionDiff
                 lost += 1
                 continue
             left.remove(match)
-            pairs = zip(item["box"], match["box"], strict=True)
+            pairs = zip(item.box, match.box, strict=True)
             moves.append(max(abs(a - b) for a, b in pairs))
-            scores.append(abs(item["score"] - match["score"]))
+            scores.append(abs(item.score - match.score))
         new += len(left)
     return DetectionDiff(
         len(moves),
@@ -72,9 +71,9 @@ def box_shift(results: Iterable[tuple[list[Item], list[Item]]]) -> DetectionDiff
     )
 
 
-def _likeness(one: Item, other: Item) -> float:
+def _likeness(one: Detection, other: Detection) -> float:
     """Intersection over union; -1 for different labels."""
-    return _overlap(one["box"], other["box"]) if one["label"] == other["label"] else -1.0
+    return _overlap(one.box, other.box) if one.label == other.label else -1.0
 
 
 def _overlap(one: Box, other: Box) -> float:

@@ -13,6 +13,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import Decision, MissionState, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.recording.encoding import plain
+from aerodaas.recording.messages import NavigationRecord
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.report.detection_diff import DetectionDiff, box_shift
 
@@ -108,22 +113,22 @@ def difference(first: str | Path, second: str | Path) -> Difference:
 def _last_turn(path: str | Path) -> int | None:
     with Recording.open(path) as recording:
         turns = recording.records(schemas=("aerodaas.Setpoint",))
-        return max((record.value["stamp"] for record in turns), default=None)
+        return max((record.value.stamp for record in turns), default=None)
 
 
 def _contents(path: str | Path, end: int | None) -> dict[str, dict[Key, Content]]:
     """Compared contents up to mission time `end`, by stream and pairing key."""
     found: dict[str, dict[Key, Content]] = defaultdict(dict)
-    states: dict[str, list[str]] = defaultdict(list)
+    states: dict[str, MissionState] = {}
     with Recording.open(path) as recording:
         for record in recording.records(schemas=_READERS):
-            if end is not None and record.value["stamp"] > end:
+            if end is not None and _stamp(record.value) > end:
                 continue
             if record.schema == "aerodaas.MissionStatus":
-                robot, state = record.value["robot"], record.value["state"]
-                if states[robot][-1:] == [state]:
+                robot, state = record.labels.robot, record.value.state
+                if states.get(robot) is state:
                     continue
-                states[robot].append(state)
+                states[robot] = state
             what, key, content = _READERS[record.schema](record)
             entries = found[what]
             if key in entries:
@@ -161,51 +166,58 @@ def _compare(what: str, one: dict[Key, Content], other: dict[Key, Content]) -> S
 
 
 def _words(content: Content) -> str:
-    text = content if isinstance(content, str) else json.dumps(content)
+    text = content if isinstance(content, str) else json.dumps(plain(content))
     longest = 100
     return text if len(text) <= longest else f"{text[:longest]} …"
 
 
+def _stamp(message: Any) -> int:  # noqa: ANN401 - of a class of `_READERS`
+    """Mission time of the measurement or of the event, nanoseconds."""
+    stamp: int = message.header.stamp if hasattr(message, "header") else message.stamp
+    return stamp
+
+
+def _result(record: Record, what: str, kind: str, content: Content) -> tuple[str, Key, Content]:
+    """What was computed from one measurement."""
+    header: Header = record.value.header
+    stream = record.topic.removesuffix(f"/{kind}").strip("/")
+    return f"{stream} {what}", (header.source, header.stamp), content
+
+
 def _detections(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    stream = record.topic.removesuffix("/detections").strip("/")
-    return f"{stream} detections", (value["source"], value["stamp"]), value["items"]
+    return _result(record, "detections", "detections", record.value.items)
 
 
 def _navigation(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    stream = record.topic.removesuffix("/navigation").strip("/")
-    content = {key: value[key] for key in ("type", "waypoints", "commands")}
-    return f"{stream} navigation", (value["source"], value["stamp"]), content
+    found: NavigationRecord = record.value
+    content = found.type, found.waypoints, found.commands
+    return _result(record, "navigation", "navigation", content)
 
 
 def _value(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    stream = record.topic.removesuffix("/value").strip("/")
-    return f"{stream} results", (value["source"], value["stamp"]), value["value"]
+    return _result(record, "results", "value", record.value.value)
 
 
 def _decision(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    return "scheduler decisions", (value["task"],), f"{value['action']} of {value['task']}"
+    found: Decision = record.value
+    return "scheduler decisions", (found.task,), f"{found.action} of {found.task}"
 
 
 def _mission(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    text = f"{value['state']} at {value['stamp'] / 1e9:.3f} s ({value['reason']})"
-    return f"{value['robot']} mission states", (value["stamp"],), text
+    status: MissionStatus = record.value
+    text = f"{status.state.value} at {status.stamp / 1e9:.3f} s ({status.reason})"
+    return f"{record.labels.robot} mission states", (status.stamp,), text
 
 
 def _setpoint(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
     # In real time the loop's cycles are a few milliseconds early or late.
-    turn = round(value["stamp"] / _TURN)
-    return f"{value['robot']} setpoints asked for", (turn,), value["asked"]
+    turn = round(record.value.stamp / _TURN)
+    return f"{record.labels.robot} setpoints asked for", (turn,), record.value.asked
 
 
 def _alert(record: Record) -> tuple[str, Key, Content]:
-    value = record.value
-    return "alerts", (value["source"], value["stamp"], value["kind"]), value["text"]
+    alert: Alert = record.value
+    return "alerts", (alert.header.source, alert.header.stamp, alert.kind), alert.text
 
 
 _READERS: dict[str, Callable[[Record], tuple[str, Key, Content]]] = {

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.clock import seconds
+from aerodaas.messages.detections import Detections
+from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.decoding.limits import MAX_KEYS
+from aerodaas.recording.messages import Latency
 from aerodaas.recording.reader import Record, Recording
 
 __all__ = [
@@ -24,6 +31,8 @@ __all__ = [
     "StreamLatency",
 ]
 
+_MOST_GPUS = 64
+"""Of one machine."""
 Floats = NDArray[np.float64]
 V = TypeVar("V")
 
@@ -85,6 +94,12 @@ class Load:
     memory: list[float] = field(default_factory=list)
     """Megabytes of a process; fraction, 0 to 1, of a machine."""
 
+    def add(self, time: float, cpu: float, memory: float) -> None:
+        """Add a reading."""
+        self.time.append(time)
+        self.cpu.append(cpu)
+        self.memory.append(memory)
+
 
 @dataclass
 class RobotFlight:
@@ -97,7 +112,7 @@ class RobotFlight:
     """All waypoints planned during the flight, by id, local ENU metres."""
     visited: tuple[str, ...] = ()
     visits: int = 0
-    """How often a waypoint was reached, if the recording says so."""
+    """How often a waypoint was reached."""
     given_up: tuple[str, ...] = ()
     distance: float = 0.0
     """Metres flown, from the mission status."""
@@ -229,119 +244,106 @@ def _closed(robot: RobotFlight) -> Iterator[Band]:
 
 
 def _state(flight: RecordedFlight, record: Record) -> None:
-    value = record.value
-    at = value["odometry"]["position"]
-    row = (seconds(value["stamp"]), at["x"], at["y"], at["z"], value["battery"]["fraction"])
-    numbers = [float("nan") if number is None else float(number) for number in row]
-    flight.robots[value["robot"]].states.append((*numbers,))  # type: ignore[arg-type]
+    state: VehicleState = record.value
+    place = map(float, state.odometry.position)
+    row = (seconds(state.stamp), *place, state.battery.fraction)
+    flight.robots[record.labels.robot].states.append(row)  # type: ignore[arg-type]
 
 
 def _mission(flight: RecordedFlight, record: Record) -> None:
-    value = record.value
-    robot = flight.robots[value["robot"]]
-    now = seconds(value["stamp"])
-    if not robot.bands or robot.bands[-1].state != value["state"]:
-        robot.bands.append(Band(value["state"], now, now, value["reason"]))
+    status: MissionStatus = record.value
+    robot = flight.robots[record.labels.robot]
+    now, state = seconds(status.stamp), status.state.value
+    if not robot.bands or robot.bands[-1].state != state:
+        robot.bands.append(Band(state, now, now, status.reason))
     else:
         last = robot.bands[-1]
-        robot.bands[-1] = Band(last.state, last.start, now, value["reason"] or last.reason)
-    _visit(robot, value["visited"], value.get("visits"))
-    robot.given_up = tuple(dict.fromkeys((*robot.given_up, *value["given_up"])))
-    robot.distance = float(value["distance"])
-
-
-def _visit(robot: RobotFlight, recent: list[str], visits: int | None) -> None:
-    """Take over the last visits of `visits`; early recordings have all of them and no number."""
-    if visits is None:
-        robot.visited = tuple(recent)
-    elif visits > robot.visits:
-        robot.visited = (*robot.visited, *recent[robot.visits - visits :])
-        robot.visits = visits
+        robot.bands[-1] = Band(last.state, last.start, now, status.reason or last.reason)
+    if status.visits > robot.visits:
+        robot.visited = (*robot.visited, *status.visited[robot.visits - status.visits :])
+        robot.visits = status.visits
+    robot.given_up = tuple(dict.fromkeys((*robot.given_up, *status.given_up)))
+    robot.distance = status.distance
 
 
 def _plan(flight: RecordedFlight, record: Record) -> None:
-    robot = flight.robots[record.value["robot"]]
-    for waypoint in record.value["waypoints"]:
-        robot.plan[waypoint["id"]] = (waypoint["x"], waypoint["y"], waypoint["z"])
+    robot = flight.robots[record.labels.robot]
+    for waypoint in record.value.waypoints:
+        robot.plan[waypoint.id] = (waypoint.x, waypoint.y, waypoint.z)
 
 
 def _fence(flight: RecordedFlight, record: Record) -> None:
-    flight.robots[record.value["robot"]].fence = [(x, y) for x, y in record.value["polygon"]]
+    flight.robots[record.labels.robot].fence = record.value.polygon
 
 
 def _setpoint(flight: RecordedFlight, record: Record) -> None:
-    robot, now = flight.robots[record.value["robot"]], seconds(record.value["stamp"])
-    robot.clipped.update(record.value["clipped_by"])
-    for limit in record.value["clipped_by"]:
+    setpoint: SetpointRecord = record.value
+    robot, now = flight.robots[record.labels.robot], seconds(setpoint.stamp)
+    robot.clipped.update(setpoint.clipped_by)
+    for limit in setpoint.clipped_by:
         robot.clipped_at.setdefault(limit, now)
 
 
 def _latency(flight: RecordedFlight, record: Record) -> None:
-    if len(record.value["hops"]) == 1:
+    told: Latency = record.value
+    if len(told.hops) == 1:
         return
-    latency = flight.latencies[record.value["stream"]]
-    latency.total.append(float(record.value["total_ms"]))
-    if not record.value.get("empty", False):
+    latency = flight.latencies[told.stream]
+    latency.total.append(told.total_ms)
+    if not told.empty:
         latency.age.append((record.stamp - record.captured) / 1e6)
-    for hop in record.value["hops"]:
-        latency.wait[hop["node"]].append(float(hop["wait_ms"]))
-        latency.work[hop["node"]].append(float(hop["work_ms"]))
-    latency.overhead.append(sum(float(hop["wait_ms"]) for hop in record.value["hops"]))
+    for hop in told.hops:
+        latency.wait[hop.node].append(hop.wait_ms)
+        latency.work[hop.node].append(hop.work_ms)
+    latency.overhead.append(sum(hop.wait_ms for hop in told.hops))
 
 
 def _frame(flight: RecordedFlight, record: Record) -> None:
-    flight.frame_stamps[record.value["source"]].append(record.value["stamp"])
-    flight.frames[record.value["source"]] += 1
+    header: Header = record.value.header
+    flight.frame_stamps[header.source].append(header.stamp)
+    flight.frames[header.source] += 1
 
 
 def _detections(flight: RecordedFlight, record: Record) -> None:
-    value = record.value
-    flight.detections.update(item["label"] for item in value["items"])
+    found: Detections = record.value
+    header = found.header
+    flight.detections.update(item.label for item in found)
     flight.sightings.extend(
-        RecordedDetection(value["stamp"], value["source"], item["label"], item["score"])
-        for item in value["items"]
+        RecordedDetection(header.stamp, header.source, item.label, item.score) for item in found
     )
 
 
 def _decision(flight: RecordedFlight, record: Record) -> None:
-    value = record.value
-    flight.decisions[value["action"]] += 1
-    flight.reasons[value["action"], value["reason"]] += 1
+    found: Decision = record.value
+    flight.decisions[found.action] += 1
+    flight.reasons[found.action, found.reason] += 1
     totals = {"QoS": "qos_total", "QoE": "qoe_total"}
-    values = value["values"]
+    values = found.values
     flight.utility |= {name: values[key] for name, key in totals.items() if key in values}
-    analysis = value["task"].rpartition("#")[0]
-    flight.outcomes.append(RecordedDecision(seconds(value["stamp"]), analysis, value["action"]))
+    analysis = found.task.rpartition("#")[0]
+    flight.outcomes.append(RecordedDecision(seconds(found.stamp), analysis, found.action))
 
 
 def _alert(flight: RecordedFlight, record: Record) -> None:
-    value: dict[str, Any] = record.value
-    flight.alerts.append((seconds(value["stamp"]), value["kind"], value["text"]))
+    alert: Alert = record.value
+    flight.alerts.append((seconds(alert.header.stamp), alert.kind, alert.text))
 
 
 def _drops(flight: RecordedFlight, record: Record) -> None:
-    flight.drops[record.value["stream"]] = int(record.value["total"])
+    flight.drops[record.value.stream] = record.value.total
 
 
 def _vitals(flight: RecordedFlight, record: Record) -> None:
-    value = record.value
-    now = seconds(value["stamp"])
-    if "cpu_cores" in value:
-        load = flight.loads[value["actor"]]
-        load.time.append(now)
-        load.cpu.append(value["cpu_cores"])
-        load.memory.append(value["memory_mb"])
-    machine = flight.machines[value["machine"]]
+    vitals: Vitals = record.value
+    labels, now = record.labels, seconds(record.stamp)
+    if labels.cpu_cores is not None:
+        flight.loads[labels.actor].add(now, labels.cpu_cores, vitals.memory / 1e6)
+    machine = flight.machines[labels.machine]
     # Every actor of a machine reports the machine's load; one reading per moment is enough.
     if not machine.time or now > machine.time[-1]:
-        machine.time.append(now)
-        machine.cpu.append(value["machine_cpu"])
-        machine.memory.append(value["machine_memory"])
-        for number, gpu in enumerate(value.get("gpus", ())):
-            load = flight.gpus[f"{value['machine']} {number}"]
-            load.time.append(now)
-            load.cpu.append(gpu["busy"])
-            load.memory.append(gpu["memory"])
+        machine.add(now, vitals.machine_cpu, vitals.machine_memory)
+        for number, gpu in enumerate(vitals.gpus[:_MOST_GPUS]):
+            flight.gpus[f"{labels.machine} {number}"].add(now, gpu.busy, gpu.memory)
 
 
 _READERS: dict[str, Callable[[RecordedFlight, Record], None]] = {

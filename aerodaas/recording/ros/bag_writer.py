@@ -14,13 +14,12 @@ import numpy as np
 from aerodaas.errors import RecordingError
 from aerodaas.geometry.frames import is_finite
 from aerodaas.recording.export.output import new_file
-from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, detections_of, shots
+from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, shots
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.recording.states import state_of
 from aerodaas.ros.names import permitted_topic
 
 if TYPE_CHECKING:
@@ -143,7 +142,7 @@ class _Conversion:
         return heapq.merge(records, pictures, key=lambda pair: pair[0].stamp)
 
     def _state(self, record: Record) -> Iterator[_Message]:
-        robot, state = record.value["robot"], state_of(record.value)
+        robot, state = record.labels.robot, record.value
         odometry, stamp = state.odometry, state.stamp
         # Readers of transforms refuse one that is not newer than the one before.
         if stamp <= self._newest.get(robot, stamp - 1) or not is_finite(odometry.position):
@@ -202,7 +201,7 @@ class _Conversion:
             yield _Message(f"{stream}/aligned_depth", typestore.IMAGE, measured)
 
     def _detections(self, record: Record) -> Iterator[_Message]:
-        value = self._build.detections(detections_of(record.value))
+        value = self._build.detections(record.value)
         yield _Message(record.topic, typestore.DETECTIONS, value)
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from typing_extensions import Self
 
 from aerodaas.clock import seconds
 from aerodaas.errors import RecordingError, UnknownIdError
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.vehicle_log.clock_line import ClockLine, fit_clock_line, starts_of
 from aerodaas.recording.vehicle_log.log import Floats, VehicleLog
@@ -43,16 +43,14 @@ class RecordedClock:
     armed: list[float] = field(default_factory=list)
     """Mission seconds of the states with motors armed."""
 
-    def take(self, value: dict[str, Any]) -> None:
-        """Take a state from its JSON."""
-        now, extra = seconds(value["stamp"]), value["extra"]
-        clock, error = extra.get("autopilot_time"), extra.get("autopilot_time_error")
-        if isinstance(clock, int | float):
-            known = isinstance(error, int | float)
-            self.pairs.append((now, float(clock), float(error) if known else np.nan))
-        velocity = (value["odometry"]["velocity"][axis] for axis in "xyz")
-        self.motion.append((now, *(np.nan if one is None else one for one in velocity)))  # type: ignore[arg-type]
-        if value["armed"]:
+    def take(self, state: VehicleState) -> None:
+        """Take a state."""
+        now = seconds(state.stamp)
+        clock = state.extra.get("autopilot_time", np.nan)
+        if np.isfinite(clock):
+            self.pairs.append((now, clock, state.extra.get("autopilot_time_error", np.nan)))
+        self.motion.append((now, *state.odometry.velocity.tolist()))  # type: ignore[arg-type]
+        if state.armed:
             self.armed.append(now)
 
     @property
@@ -101,7 +99,7 @@ def recorded_clocks(recording: Recording) -> dict[str, RecordedClock]:
     """Read what a recording tells of each robot's autopilot, by robot."""
     clocks: dict[str, RecordedClock] = {}
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
-        clocks.setdefault(record.value["robot"], RecordedClock()).take(record.value)
+        clocks.setdefault(record.labels.robot, RecordedClock()).take(record.value)
     return clocks
 
 
