@@ -17,7 +17,14 @@ from pydantic_core import PydanticSerializationError, from_json, to_json
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.records import secrets_of
 
-__all__ = ["MessageError", "json_of", "json_schema_of", "json_text", "message_of"]
+__all__ = [
+    "MessageError",
+    "json_of",
+    "json_schema_of",
+    "json_text",
+    "message_of",
+    "message_of_text",
+]
 
 T = TypeVar("T")
 _LONGEST_REASON = 300
@@ -119,6 +126,19 @@ def message_of(
     try:
         # As text, since JSON has no tuples and no enumerations to be strict about.
         text = to_json(value, inf_nan_mode="constants")
+    except (ValueError, TypeError, RecursionError) as error:
+        raise _malformed(kind, error) from None
+    return message_of_text(kind, text, unknown_fields=unknown_fields)
+
+
+def message_of_text(
+    kind: type[T],
+    text: bytes,
+    *,
+    unknown_fields: Literal["forbid", "ignore"] = "forbid",
+) -> T:
+    """Read a message from its JSON text; arguments and errors are those of `message_of`."""
+    try:
         return _adapter(kind).validate_json(text, strict=True, extra=unknown_fields)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
@@ -127,5 +147,9 @@ def message_of(
     except AeroDaaSError as error:
         raise MessageError(f"{kind.__name__}: {error}"[:_LONGEST_REASON]) from None
     except (ValueError, TypeError, RecursionError) as error:
-        reason = f"{kind.__name__}: {type(error).__name__}: {error}"
-        raise MessageError(reason[:_LONGEST_REASON]) from None
+        raise _malformed(kind, error) from None
+
+
+def _malformed(kind: type, error: Exception) -> MessageError:
+    reason = f"{kind.__name__}: {type(error).__name__}: {error}"
+    return MessageError(reason[:_LONGEST_REASON])

@@ -26,7 +26,12 @@ from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.records import fast_pickle
-from aerodaas.messages.schema import json_schema_of, json_text, message_of
+from aerodaas.messages.schema import (
+    MessageError,
+    json_schema_of,
+    json_text,
+    message_of_text,
+)
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.messages.vitals import Vitals
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, VelocityCommand, Waypoint
@@ -269,23 +274,26 @@ def json_entry(
     return Entry(name, _schema(channel.name, tuple(labels)), data, stamp)
 
 
-def labels_and_message(schema: str, value: dict[str, Any]) -> tuple[Labels, Any]:
+def labels_and_message(schema: str, text: bytes) -> tuple[Labels, Any]:
     """Read a message from its recorded JSON, which may be a stranger's.
 
     Args:
         schema: A key of `CHANNELS`.
-        value: The JSON value, of the present format.
+        text: The JSON text, of the present format.
 
     Returns:
         The labels and the message.
 
     Raises:
-        MessageError: If a field is malformed.
-        KeyError: If a label is missing.
+        MessageError: If a field is malformed, or the robot's id is missing.
     """
     channel = CHANNELS[schema]
-    labels = message_of(Labels, {name: value[name] for name in channel.labels})
-    return labels, message_of(channel.kind, value, unknown_fields="ignore")
+    labels = NO_LABELS
+    if channel.labels:
+        labels = message_of_text(Labels, text, unknown_fields="ignore")
+        if "robot" in channel.labels and not labels.robot:
+            raise MessageError(f"{channel.name} of no robot")
+    return labels, message_of_text(channel.kind, text, unknown_fields="ignore")
 
 
 @lru_cache(maxsize=64)

@@ -17,6 +17,7 @@ from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
+from pydantic_core import to_json
 
 from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
 from aerodaas.errors import AeroDaaSError
@@ -38,8 +39,10 @@ __all__ = ["BrokenMessageError", "MessageDecoder", "decode_json", "plain_fields"
 Decoder: TypeAlias = Callable[[bytes], Any]
 _PICTURES = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _ESCAPED_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
-_MAY_BE_LARGE = re.compile(rb"[0-9](?:[eE]\+?[0-9]|[0-9]{18})|NaN|Infinity")
-"""What each text has that holds a number which is too large, or none."""
+_DIGITS = bytes.maketrans(b"123456789+E", b"0000000000e")
+_LARGE = (b"0e0", 22 * b"0")
+"""A text has one of these, translated by `_DIGITS`, if a number of it is far over `MAX_NUMBER`."""
+_NO_NUMBERS = (b"NaN", b"Infinity")
 
 
 class BrokenMessageError(ValueError):
@@ -76,12 +79,12 @@ class MessageDecoder:
         """
         name = schema.name if schema else ""
         try:
+            if name in CHANNELS and channel.message_encoding == "json":
+                labels, message = self._message(name, data)
+                return labels, decode_json(data) if as_json else message
             value = self._decoder(channel, schema)(data)
             if name in _PICTURES:
                 check_picture(value, video=name in VIDEO_SCHEMAS)
-            elif name in CHANNELS:
-                labels, message = self._message(name, value, data)
-                return labels, value if as_json else message
         except MessageError as error:
             raise BrokenMessageError(f"{channel.topic}: {error}") from None
         except AeroDaaSError:
@@ -92,11 +95,13 @@ class MessageDecoder:
             raise BrokenMessageError(f"{channel.topic}: {error}") from error
         return NO_LABELS, value
 
-    def _message(self, name: str, value: Any, data: bytes) -> tuple[Labels, Any]:  # noqa: ANN401
-        if _MAY_BE_LARGE.search(data):
-            _check_numbers(value)
+    def _message(self, name: str, data: bytes) -> tuple[Labels, Any]:
         convert = self._conversions.get(name)
-        labels, message = labels_and_message(name, value if convert is None else convert(value))
+        if convert is not None or len(data) > MAX_JSON or _may_be_large(data):
+            value = decode_json(data)
+            _check_numbers(value)
+            data = to_json(value if convert is None else convert(value))
+        labels, message = labels_and_message(name, data)
         return labels, _known(message)
 
     def _decoder(self, channel: Channel, schema: Schema | None) -> Decoder:
@@ -187,6 +192,12 @@ def plain_fields(message: Message) -> dict[str, Any]:
         # As in `MessageDecoder.decode`: a stranger's schema may misuse well-known names.
         raise BrokenMessageError(f"not a message with plain fields: {error}") from error
     return fields | lengths
+
+
+def _may_be_large(data: bytes) -> bool:
+    """Whether a JSON text may hold a number beyond `MAX_NUMBER`, or one that is none."""
+    digits = data.translate(_DIGITS)
+    return any(part in digits for part in _LARGE) or any(part in data for part in _NO_NUMBERS)
 
 
 def _check_numbers(value: object) -> None:
