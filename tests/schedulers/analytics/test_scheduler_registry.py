@@ -71,7 +71,8 @@ def test_a_file_travels_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyP
     name = type(found).__module__
     assert "Mine" in capture(Graph(), config, found).modules[name]
     del sys.modules[name]  # as in an actor: nobody finds the class there
-    again = pickle.loads(cloudpickle.dumps(found))  # noqa: S301 - our own
+    data = cloudpickle.dumps(found)  # pyright: ignore[reportPrivateImportUsage]
+    again = pickle.loads(data)  # noqa: S301 - our own
     assert type(again).__name__ == "Mine"
 
 
