@@ -15,7 +15,6 @@ from __future__ import annotations
 import io
 import pickle
 import struct
-from contextlib import suppress
 from functools import lru_cache
 from types import FunctionType
 from typing import Any
@@ -37,8 +36,8 @@ _LENGTHS = struct.Struct("<III")
 _LONGEST_IN_BAND = 256
 """Bytes of an array up to which it is part of the pickle: apart, it would cost several times as
 much."""
-_NUMBERS = "biufc"
-"""Kinds of NumPy's numbers; arrays of anything else are pickled by NumPy."""
+_NUMBERS = f"?{np.typecodes['AllInteger']}{np.typecodes['AllFloat']}"
+"""Codes of NumPy's numbers; arrays of anything else are pickled by NumPy."""
 
 
 class UnsendableError(AeroDaaSError):
@@ -70,7 +69,20 @@ class Encoded:
         for buffer in self._buffers:
             self._places.append(_aligned(self._length))
             self._length = self._places[-1] + buffer.nbytes
-        envelope = _envelope(message, self._places, self._buffers)
+        envelope = pickle.dumps(
+            (
+                message.stream,
+                message.seq,
+                message.stamp,
+                tuple(message.header),
+                message.captured,
+                tuple([tuple(span) for span in message.spans]),
+                type(message.item).__name__,
+                self._places,
+                [buffer.nbytes for buffer in self._buffers],
+            ),
+            _PROTOCOL,
+        )
         self._lengths = len(envelope), len(item)
         self._head = envelope + item
         self._start = _LENGTHS.size + len(self._head)
@@ -120,33 +132,18 @@ def decode(source: memoryview) -> Message[Any]:
     source = source.toreadonly()
     envelope_length, item_length, start = _LENGTHS.unpack_from(source)
     item = _LENGTHS.size + envelope_length
-    stream, seq, stamp, header, captured, spans, kind, places = pickle.loads(  # noqa: S301 - our own bytes
+    stream, seq, stamp, header, captured, spans, kind, places, sizes = pickle.loads(  # noqa: S301 - our own bytes
         source[_LENGTHS.size : item]
     )
     told = tuple([TraceSpan._make(span) for span in spans])
     envelope = stream, seq, stamp, Header._make(header), captured, told
-    buffers = [source[start + place : start + place + size] for place, size in places]
+    begins = [start + place for place in places]
+    buffers = [source[at : at + size] for at, size in zip(begins, sizes, strict=True)]
     try:
         return Message(*envelope, pickle.loads(source[item : item + item_length], buffers=buffers))  # noqa: S301 - our own
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise UnreadableError(Message(*envelope, None), kind, reason) from error
-
-
-def _envelope(message: Message[Any], places: list[int], buffers: list[memoryview]) -> bytes:
-    return pickle.dumps(
-        (
-            message.stream,
-            message.seq,
-            message.stamp,
-            tuple(message.header),
-            message.captured,
-            [tuple(span) for span in message.spans],
-            type(message.item).__name__,
-            [(place, buffer.nbytes) for place, buffer in zip(places, buffers, strict=True)],
-        ),
-        _PROTOCOL,
-    )
 
 
 def _aligned(offset: int) -> int:
@@ -160,8 +157,10 @@ def _address(array: NDArray[np.uint8]) -> int:
 
 def _pickled(item: object) -> tuple[bytes, list[memoryview]]:
     """Pickle of an item, and its large arrays. Raises UnsendableError."""
-    with suppress(Exception):
+    try:
         return _pickled_by(_Pickler, item)
+    except Exception:  # noqa: BLE001, S110 - the attempt below reports the reason
+        pass
     try:
         return _pickled_by(_ValuePickler, item)
     except Exception as error:
@@ -169,7 +168,8 @@ def _pickled(item: object) -> tuple[bytes, list[memoryview]]:
 
 
 def _pickled_by(pickler: Any, item: object) -> tuple[bytes, list[memoryview]]:  # noqa: ANN401 - a class
-    file, buffers = io.BytesIO(), list[pickle.PickleBuffer]()
+    file = io.BytesIO()
+    buffers: list[pickle.PickleBuffer] = []
     pickler(file, _PROTOCOL, buffer_callback=buffers.append).dump(item)
     return file.getvalue(), [buffer.raw() for buffer in buffers]
 
@@ -196,18 +196,19 @@ class _ValuePickler(cloudpickle.Pickler):
 
 def _reduced(array: NDArray[Any]) -> Any:  # noqa: ANN401 - pickle's
     """How an array is made: NumPy's own way says the same at several times the cost."""
-    kind, shape = array.dtype, array.shape
-    if kind.kind not in _NUMBERS:
+    dtype, shape = array.dtype, array.shape
+    code = dtype.char
+    if code not in _NUMBERS or not dtype.isnative:
         return NotImplemented
     if array.nbytes <= _LONGEST_IN_BAND:
-        return np.ndarray, (shape, kind.str, array.tobytes())
+        return np.ndarray, (shape, code, array.tobytes())
     whole: Any = np.ascontiguousarray(array)
-    return _array, (shape, kind.str, pickle.PickleBuffer(whole))
+    return _array, (shape, code, pickle.PickleBuffer(whole))
 
 
-def _array(shape: tuple[int, ...], kind: str, content: memoryview) -> NDArray[Any]:
+def _array(shape: tuple[int, ...], code: str, content: memoryview) -> NDArray[Any]:
     # Not np.ndarray, which would keep the owner of all the memory instead of this view of it.
-    array: NDArray[Any] = np.frombuffer(content, kind).reshape(shape)
+    array: NDArray[Any] = np.frombuffer(content, code).reshape(shape)
     return array
 
 

@@ -38,6 +38,10 @@ class Header(NamedTuple):
     source: str
     """Identifier of the sensor, `robot/sensor`."""
 
+    def __reduce__(self) -> tuple[type[Header], tuple[int | str, ...]]:
+        """Pickle it by its fields, at half the cost of a named tuple's own way."""
+        return Header, tuple(self)
+
     @classmethod
     def __get_pydantic_core_schema__(
         cls, source: object, handler: GetCoreSchemaHandler
