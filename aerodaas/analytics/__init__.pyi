@@ -22,5 +22,5 @@ from .monitoring.gps_logger import GpsLoggerAnalytics as GpsLoggerAnalytics
 from .people.body_pose import BodyPoseEmergencyAnalytics as BodyPoseEmergencyAnalytics
 from .people.crowd_density import CrowdDensityAnalytics as CrowdDensityAnalytics
 from .people.pose import PoseAnalytics as PoseAnalytics
-from .remote.analytics import RemoteAnalytics as RemoteAnalytics
+from .remote import RemoteAnalytics as RemoteAnalytics
 from .synthetic import SyntheticAnalytics as SyntheticAnalytics

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import uuid
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
+from aerodaas.analytics.remote import TOKEN_VARIABLE
 from aerodaas.cli.help_examples import ExampleGroup
+
+if TYPE_CHECKING:
+    from aerodaas.environment.remote_client import RemoteClient
 
 __all__ = ["app"]
 
@@ -40,17 +43,19 @@ def connect(
     env: Annotated[
         Path | None, typer.Option(help="Environment file that tells address and token.")
     ] = None,
+    robot: Annotated[str | None, typer.Option(help="Default: the only one that flies.")] = None,
     token: Annotated[
         str | None, typer.Option(envvar=TOKEN_VARIABLE, hidden=True, show_envvar=False)
     ] = None,
 ) -> None:
     """Know whom to speak to."""
     from aerodaas.config.model import EnvironmentConfig, RemoteConfig  # noqa: PLC0415 - slow to load
+    from aerodaas.environment.remote_client import RemoteClient  # noqa: PLC0415 - as above
 
     settings = EnvironmentConfig.load(env).remote if env else RemoteConfig()
     secret = settings.token.get_secret_value() if settings.token else None
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
-    context.obj = RemoteClient(url or f"http://{host}:{settings.port}", token or secret)
+    context.obj = RemoteClient(url or f"http://{host}:{settings.port}", token or secret, robot)
 
 
 @app.command("add-waypoint", context_settings={"ignore_unknown_options": True})
@@ -129,7 +134,7 @@ def return_home(context: typer.Context) -> None:
 @app.command()
 def abort(context: typer.Context) -> None:
     """Land at once, where the drone is."""
-    _say(context, "abort", "the drone lands")
+    _say(context, "land", "the drone lands")
 
 
 @app.command()
@@ -152,8 +157,7 @@ def status(
 
 
 def _client(context: typer.Context) -> RemoteClient:
-    client = context.obj
-    assert isinstance(client, RemoteClient)  # noqa: S101 - the callback's
+    client: RemoteClient = context.obj
     return client
 
 

@@ -103,6 +103,8 @@ class RunOptions:
     """Publish the flight on ROS 2 topics of this DDS domain."""
     console: str | None = None
     """Serve the console to browsers at this `host:port` while flying."""
+    remote: bool = True
+    """Serve the flight to a remote user, if the application uses `RemoteAnalytics`."""
     replay: Path | None = None
     """Recording to be flown again: its environment takes the place of the application's."""
     scheduler: str | None = None

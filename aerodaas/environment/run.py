@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from aerodaas.runtime.plan import FlightPlan
     from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-    from aerodaas.service.own.server import ConsoleServer
+    from aerodaas.service.own.flight import OwnFlight
+    from aerodaas.service.own.server import FlightServer
     from aerodaas.terminal.console import FlightView
 
 MakeFlight: TypeAlias = "Callable[..., Flight | InlineFlight]"
@@ -79,7 +80,11 @@ class Run:
         self.on_end: list[Callable[[], None]] = []
         self.recording = recording_path(self.options, self.config, number)
         self.state: FlightState | None = None
-        self._console: ConsoleServer | None = None
+        self._api: OwnFlight | None = None
+        self._console: FlightServer | None = None
+        self._servers: list[FlightServer] = []
+        self._remote = False
+        """Whether one of them is for a remote user."""
         self._environment = environment
         self._flight: Flight | InlineFlight | None = None
         self._view: FlightView
@@ -128,7 +133,7 @@ class Run:
                 f"{self.recording} already exists and is not overwritten; "
                 "give --record another path or move the file away"
             )
-        console = self._console_server()
+        self._listen()
         with StartupView(self.options) as starting:
             make_flight = self._runtime(plan, starting.begin)
             raise_on_signals()
@@ -146,8 +151,7 @@ class Run:
                 flight.launch(starting.step)
             except BaseException:
                 flight.stop()
-                if console is not None:
-                    console.close()
+                self._close_servers()
                 raise
         self._view = FlightView(self.options, self.config)
         self._flight = flight
@@ -168,8 +172,12 @@ class Run:
         for callback in self.graph.on_launch:
             callback()
         threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
-        if console is not None:
-            self._open_console(console)
+        if self._servers:
+            self._serve()
+        if self._console is not None:
+            from aerodaas.terminal.console import show_console  # noqa: PLC0415
+
+            show_console(self._console.address(), self._console.address(viewer=True))
         atexit.register(self.abandon)
 
     def _runtime(self, plan: FlightPlan, begin_step: Callable[[str], None]) -> MakeFlight:
@@ -213,24 +221,50 @@ class Run:
             if self.recording is None:
                 raise ConfigError('--ros2 shows what is recorded; set "recording.enabled" to true')
 
-    def _console_server(self) -> ConsoleServer | None:
-        """The console's server, listening, if it is asked for."""
-        if self.options.console is None:
-            return None
-        from aerodaas.service.own.server import ConsoleServer  # noqa: PLC0415 - only where asked for
+    def _listen(self) -> None:
+        """Listen for those who are to be served while flying."""
+        if self.options.console is not None:
+            from aerodaas.service.own.server import FlightServer  # noqa: PLC0415 - only where asked
 
-        return ConsoleServer(self.options.console)
+            self._console = FlightServer(self.options.console, "--console-address")
+            self._servers.append(self._console)
+        self._listen_for_remote()
 
-    def _open_console(self, console: ConsoleServer) -> None:
-        from aerodaas.terminal.console import show_console  # noqa: PLC0415
+    def _listen_for_remote(self) -> None:
+        """Listen for a remote user, once the application has asked for it."""
+        from aerodaas.analytics.remote import RemoteAnalytics  # noqa: PLC0415 - slow to load
 
-        self._start_console(console)
-        show_console(console.address(), console.address(viewer=True))
+        works = (node.work for node in self.graph.nodes.values())
+        wanted = [one.settings for one in works if isinstance(one, RemoteAnalytics)]
+        if not wanted or not self.options.remote:
+            return
+        if any(one != wanted[0] for one in wanted):
+            raise ConfigError(
+                "one API serves all robots of a flight: give each RemoteAnalytics the same "
+                "address and token"
+            )
+        if not self._remote:
+            from aerodaas.service.own.server import FlightServer  # noqa: PLC0415 - only where asked
 
-    def _start_console(self, console: ConsoleServer) -> None:
-        self._console = console
-        application = self.options.application
-        console.start(self, application.stem if application else self.config.name)
+            self._servers.append(FlightServer.of_remote(wanted[0]))
+            self._remote = True
+
+    def _serve(self) -> None:
+        """Serve the flight, which has begun, by each server that does not serve it yet."""
+        from aerodaas.service.own.flight import OwnFlight  # noqa: PLC0415 - only where asked for
+
+        if self._servers and self._api is None:
+            application = self.options.application
+            self._api = OwnFlight(self, application.stem if application else self.config.name)
+        for server in self._servers:
+            if self._api is not None and not server.serving:
+                server.start(self._api)
+
+    def _close_servers(self) -> None:
+        if self._api is not None:
+            self._api.close()
+        for server in self._servers:
+            server.close()
 
     def console(self, address: str, *, viewer: bool) -> str:
         """Serve the console from now on, unless it is served already; returns its address.
@@ -241,10 +275,12 @@ class Run:
         require_extra("remote", "the console")
         check_served("address", address)
         if self._console is None:
-            from aerodaas.service.own.server import ConsoleServer  # noqa: PLC0415 - only where asked
+            from aerodaas.service.own.server import FlightServer  # noqa: PLC0415 - only where asked
 
-            self._start_console(ConsoleServer(address, framed=True))
-        assert self._console is not None  # noqa: S101 - started
+            self._console = FlightServer(address, "address")
+            self._console.framed = True
+            self._servers.append(self._console)
+            self._serve()
         return self._console.address(viewer=viewer)
 
     def end_sensing(self) -> None:
@@ -276,6 +312,7 @@ class Run:
 
         flight = self._flying("nothing can be added")
         self._change_models()
+        self._listen_for_remote()
         flight.learn(self._application())
         flight.grow(
             make_plan(
@@ -286,6 +323,7 @@ class Run:
                 self._environment.analytics_scheduler(),
             )
         )
+        self._serve()
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
         """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
@@ -501,8 +539,7 @@ class Run:
         self._over = True
         self.graph.on_growth = None
         atexit.unregister(self.abandon)
-        if self._console is not None:
-            self._console.close()
+        self._close_servers()
         flown = time.monotonic() - self._launched
         with self._polling:
             if self._flight.flying:

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
-import socket
 import threading
 import time
 from functools import cached_property
 from pathlib import Path
 
-from pydantic import SecretStr
-
 from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.config.model import EnvironmentConfig, RemoteConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
@@ -63,16 +59,6 @@ def fly(path: Path) -> None:
         os.nice(_NICENESS)
     with RobotLocks(order.locks).hold(order.robots), folder.claim():
         folder.end(Flying(folder, order).outcome())
-
-
-def _closed_remote() -> RemoteConfig:
-    """Remote control that nobody can reach: commands come by the service, with their lease.
-
-    An application's `RemoteAnalytics` runs all the same, at a free port with a token of its own.
-    """
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port: int = free.getsockname()[1]
-    return RemoteConfig(host="127.0.0.1", port=port, token=SecretStr(secrets.token_urlsafe()))
 
 
 class Flying:
@@ -122,7 +108,7 @@ class Flying:
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
         simulated_time = order.speed == "max"
-        self.config = environment_of(order).model_copy(update={"remote": _closed_remote()})
+        self.config = environment_of(order)
         current_options.set(
             RunOptions(
                 environment=order.fleet,
@@ -136,6 +122,7 @@ class Flying:
                 locks=None if order.rehearsal else order.locks,
                 edge=None if order.edge is None else EdgeShare(**dict(order.edge)),
                 view=False,
+                remote=False,
                 report=None if order.rehearsal or order.attached else "page",
             )
         )

@@ -10,7 +10,7 @@ import json
 import sys
 import time
 
-from aerodaas.analytics.remote.client import RemoteClient
+from aerodaas.environment.remote_client import RemoteClient
 from aerodaas.errors import AeroDaaSError
 
 _PATIENCE = 300.0

@@ -19,7 +19,8 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.service.own.server import ConsoleServer
+from aerodaas.service.own.flight import OwnFlight
+from aerodaas.service.own.server import FlightServer
 
 __all__ = ["Run", "console"]
 
@@ -83,12 +84,15 @@ class Run:
 
 
 @contextmanager
-def console(*, framed: bool = False, **environment: object) -> Iterator[tuple[ConsoleServer, Run]]:
+def console(*, framed: bool = False, **environment: object) -> Iterator[tuple[FlightServer, Run]]:
     """The console of a flight that never ends, in an environment with further fields."""
     run = Run(**environment)
-    server = ConsoleServer("127.0.0.1:0", framed=framed)
-    server.start(run, "survey")
+    server = FlightServer("127.0.0.1:0", "--console-address")
+    server.framed = framed
+    flight = OwnFlight(run, "survey")
+    server.start(flight)
     try:
         yield server, run
     finally:
+        flight.close()
         server.close()

@@ -17,7 +17,7 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
-from aerodaas.service.own.server import ConsoleServer
+from aerodaas.service.own.server import FlightServer
 
 __all__ = ["SHOWN", "Reader", "camera_console", "require_own_frames"]
 
@@ -91,7 +91,7 @@ def body(left: float) -> Detection:
 
 
 @contextmanager
-def camera_console() -> Iterator[ConsoleServer]:
+def camera_console() -> Iterator[FlightServer]:
     """The console of this flight."""
     nodes = {
         name: SimpleNamespace(id=name, item=kind, dormant=False)

@@ -23,13 +23,13 @@ from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause
 from aerodaas.service.http.bearer import bearer
-from aerodaas.service.own.server import ConsoleServer
+from aerodaas.service.own.server import FlightServer
 
 HOVER = {"robot": "drone", "command": "pause"}
 
 
 @pytest.fixture(scope="module")
-def flying() -> Iterator[tuple[ConsoleServer, Run]]:
+def flying() -> Iterator[tuple[FlightServer, Run]]:
     """One for all tests here."""
     with console() as both:
         yield both
@@ -71,7 +71,7 @@ def test_a_host_that_looks_like_the_page_opens_nothing() -> None:
 
 @pytest.mark.parametrize("path", ["/", "/console.js", "/console.css", "/icon.svg"])
 def test_the_page_needs_no_token_and_admits_nothing_from_elsewhere(
-    flying: tuple[ConsoleServer, Run], path: str
+    flying: tuple[FlightServer, Run], path: str
 ) -> None:
     """It holds no secret, and runs no script but its own."""
     status, headers, content = ask(flying[0].address(), path, token="")
@@ -114,7 +114,7 @@ def test_a_notebook_of_this_machine_may_frame_the_page() -> None:
 
 
 @pytest.mark.parametrize("token", ["", "wrong", "é"])
-def test_all_else_needs_one(flying: tuple[ConsoleServer, Run], token: str) -> None:
+def test_all_else_needs_one(flying: tuple[FlightServer, Run], token: str) -> None:
     """Neither state nor commands without one of the two tokens."""
     if not token.isascii():
         token = token.encode().decode("latin-1")
@@ -125,7 +125,7 @@ def test_all_else_needs_one(flying: tuple[ConsoleServer, Run], token: str) -> No
     assert not flying[1].commands
 
 
-def test_a_viewer_watches_and_does_not_fly(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_viewer_watches_and_does_not_fly(flying: tuple[FlightServer, Run]) -> None:
     """The second token sees the state; whatever it asks of the drone is refused."""
     address = flying[0].address(viewer=True)
     assert ask(address, "/v1/me")[2]["role"] == "viewer"
@@ -137,7 +137,7 @@ def test_a_viewer_watches_and_does_not_fly(flying: tuple[ConsoleServer, Run]) ->
     assert not flying[1].commands
 
 
-def test_a_pilot_flies_and_people_are_told(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_pilot_flies_and_people_are_told(flying: tuple[FlightServer, Run]) -> None:
     """Commands and waypoints reach the drone; the answer is its own, and an alert repeats it."""
     server, run = flying
     status, _, answer = ask(server.address(), "/v1/missions/own/commands", HOVER)
@@ -171,7 +171,7 @@ def test_a_pilot_flies_and_people_are_told(flying: tuple[ConsoleServer, Run]) ->
     ],
 )
 def test_refusals_have_their_reason(
-    flying: tuple[ConsoleServer, Run], path: str, body: object, status: int, text: str
+    flying: tuple[FlightServer, Run], path: str, body: object, status: int, text: str
 ) -> None:
     """As the service's do: a status and one text."""
     found = ask(flying[0].address(), path, body)
@@ -183,20 +183,20 @@ def test_refusals_have_their_reason(
     "headers", [{"Host": "evil.example"}, {"Origin": "https://evil.example"}, {"Origin": "null"}]
 )
 def test_no_page_of_a_strangers_looks_on(
-    flying: tuple[ConsoleServer, Run], headers: dict[str, str]
+    flying: tuple[FlightServer, Run], headers: dict[str, str]
 ) -> None:
     """Nor one whose name was made to resolve to this machine; not even with the token."""
     assert ask(flying[0].address(), "/v1/missions", **headers)[0] == 403
 
 
-def test_a_body_without_end_is_not_read(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_body_without_end_is_not_read(flying: tuple[FlightServer, Run]) -> None:
     """Its size is looked at first."""
     words = {"Content-Length": "2000000"}
     assert ask(flying[0].address(), "/v1/missions/own/commands", HOVER, **words)[0] == 413
 
 
 def test_a_browsers_socket_brings_its_token_as_a_subprotocol(
-    flying: tuple[ConsoleServer, Run],
+    flying: tuple[FlightServer, Run],
 ) -> None:
     """The token itself is not sent back; the state has the waypoint's place."""
     address = flying[0].address(viewer=True)
@@ -247,7 +247,7 @@ def test_an_address_in_use_is_named() -> None:
     with console() as (server, _):
         taken = server.address().partition("//")[2].partition("/")[0]
         with pytest.raises(ConfigError, match="--console-address"):
-            ConsoleServer(taken)
+            FlightServer(taken, "--console-address")
 
 
 def test_the_list_before_take_off_is_told_to_whoever_watches() -> None:

@@ -31,14 +31,14 @@ from aerodaas.mission.commands import (
 from aerodaas.protocol.schemas import AnswerOut
 from aerodaas.service.live import controls, surveys
 from aerodaas.service.live.controls import Freshness
-from aerodaas.service.own.server import ConsoleServer
+from aerodaas.service.own.server import FlightServer
 
 FIELD = [[0, 0], [20, 0], [20, 10], [0, 10]]
 SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"}
 
 
 @pytest.fixture(scope="module")
-def watched() -> Iterator[tuple[ConsoleServer, Run]]:
+def watched() -> Iterator[tuple[FlightServer, Run]]:
     """A drone on its way to one waypoint, whose status is known."""
     with console() as (server, run):
         while not ask(server.address(), "/v1/missions/own")[2]["status"]:
@@ -47,7 +47,7 @@ def watched() -> Iterator[tuple[ConsoleServer, Run]]:
 
 
 @pytest.fixture
-def flying(watched: tuple[ConsoleServer, Run]) -> tuple[ConsoleServer, Run]:
+def flying(watched: tuple[FlightServer, Run]) -> tuple[FlightServer, Run]:
     """The same, and it was told nothing yet."""
     watched[1].commands.clear()
     watched[1].notes.clear()
@@ -55,7 +55,7 @@ def flying(watched: tuple[ConsoleServer, Run]) -> tuple[ConsoleServer, Run]:
 
 
 @contextmanager
-def hand(server: ConsoleServer, robot: str = "drone", **words: Any) -> Iterator[ClientConnection]:  # noqa: ANN401
+def hand(server: FlightServer, robot: str = "drone", **words: Any) -> Iterator[ClientConnection]:  # noqa: ANN401
     """Take the controls of a drone."""
     address = server.address(**words)
     url = address.partition("/#")[0].replace("http", "ws")
@@ -85,7 +85,7 @@ def until(run: Run, kind: type[Command]) -> float:
     return time.monotonic() - began
 
 
-def test_a_survey_is_planned_and_not_flown(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_survey_is_planned_and_not_flown(flying: tuple[FlightServer, Run]) -> None:
     """Waypoints, figures and the battery's share, from the waypoint that comes before."""
     server, run = flying
     status, _, answer = ask(server.address(), "/v1/missions/own/survey", SURVEY)
@@ -105,7 +105,7 @@ def test_a_survey_is_planned_and_not_flown(flying: tuple[ConsoleServer, Run]) ->
 
 
 @pytest.fixture(scope="module")
-def mapper() -> Iterator[ConsoleServer]:
+def mapper() -> Iterator[FlightServer]:
     """The console of a drone with a camera on a gimbal, and one that looks ahead."""
     hung = {"gimbal": {}, "width": 4000, "height": 3000, "horizontal_fov": 60, "photo_interval": 2}
     sensors = [
@@ -118,7 +118,7 @@ def mapper() -> Iterator[ConsoleServer]:
         yield server
 
 
-def test_a_survey_is_planned_by_its_camera(mapper: ConsoleServer) -> None:
+def test_a_survey_is_planned_by_its_camera(mapper: FlightServer) -> None:
     """Height by resolution, lines and pictures by overlap, and a warning where it is too slow."""
     wanted = {
         **SURVEY,
@@ -161,7 +161,7 @@ def test_a_survey_is_planned_by_its_camera(mapper: ConsoleServer) -> None:
     ],
 )
 def test_a_camera_that_cannot_survey_is_refused(
-    mapper: ConsoleServer, changes: dict[str, object], status: int, text: str
+    mapper: FlightServer, changes: dict[str, object], status: int, text: str
 ) -> None:
     """With the reason, and the remedy."""
     wanted = {"robot": "drone", "area": FIELD, "height": 4, "camera": "map", **changes}
@@ -189,7 +189,7 @@ def test_a_camera_that_cannot_survey_is_refused(
     ],
 )
 def test_surveys_are_refused_with_their_reason(
-    flying: tuple[ConsoleServer, Run], changes: dict[str, object], status: int, text: str
+    flying: tuple[FlightServer, Run], changes: dict[str, object], status: int, text: str
 ) -> None:
     """What is malformed, and what cannot be flown."""
     found = ask(flying[0].address(), "/v1/missions/own/survey", {**SURVEY, **changes})
@@ -197,7 +197,7 @@ def test_surveys_are_refused_with_their_reason(
 
 
 def test_surveys_wait_for_few_others(
-    flying: tuple[ConsoleServer, Run], monkeypatch: pytest.MonkeyPatch
+    flying: tuple[FlightServer, Run], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each that waits has a thread, without which no command would come through."""
     free, begun = threading.Event(), threading.Event()
@@ -227,7 +227,7 @@ def test_surveys_wait_for_few_others(
     assert sum("other surveys are being planned" in one for one in told) == 50 - surveys._MOST_ASKED
 
 
-def test_the_order_is_one_command(flying: tuple[ConsoleServer, Run]) -> None:
+def test_the_order_is_one_command(flying: tuple[FlightServer, Run]) -> None:
     """With what is left out; people are told."""
     server, run = flying
     change = {"robot": "drone", "order": ["c", "b"], "remove": ["a"]}
@@ -242,7 +242,7 @@ def test_the_order_is_one_command(flying: tuple[ConsoleServer, Run]) -> None:
         assert ask(server.address(), "/v1/missions/own/plan", body)[0] == 422
 
 
-def test_a_viewer_does_none_of_it(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_viewer_does_none_of_it(flying: tuple[FlightServer, Run]) -> None:
     """The server refuses it, the socket before it is accepted."""
     server, run = flying
     address = server.address(viewer=True)
@@ -254,7 +254,7 @@ def test_a_viewer_does_none_of_it(flying: tuple[ConsoleServer, Run]) -> None:
     assert not run.commands
 
 
-def test_a_drone_is_steered_and_let_go(flying: tuple[ConsoleServer, Run]) -> None:
+def test_a_drone_is_steered_and_let_go(flying: tuple[FlightServer, Run]) -> None:
     """Each velocity is answered with its moment; the end of the connection lets go at once."""
     server, run = flying
     with hand(server) as socket:
@@ -281,7 +281,7 @@ def test_a_drone_is_steered_and_let_go(flying: tuple[ConsoleServer, Run]) -> Non
     ]
 
 
-def test_who_falls_silent_loses_the_controls(flying: tuple[ConsoleServer, Run]) -> None:
+def test_who_falls_silent_loses_the_controls(flying: tuple[FlightServer, Run]) -> None:
     """The connection stands, and nothing is said: the drone is let go, the page told why."""
     server, run = flying
     with hand(server) as socket:
@@ -296,7 +296,7 @@ def test_who_falls_silent_loses_the_controls(flying: tuple[ConsoleServer, Run]) 
 
 
 def test_velocities_that_were_long_under_way_are_not_obeyed(
-    flying: tuple[ConsoleServer, Run],
+    flying: tuple[FlightServer, Run],
 ) -> None:
     """A network that stands still and then brings all at once moves no drone."""
     server, run = flying
@@ -315,7 +315,7 @@ def test_velocities_that_were_long_under_way_are_not_obeyed(
 
 
 def test_a_velocity_that_waited_for_the_drone_is_not_obeyed(
-    flying: tuple[ConsoleServer, Run], monkeypatch: pytest.MonkeyPatch
+    flying: tuple[FlightServer, Run], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A drone that answers slowly is not flown by what was asked for meanwhile."""
     server, run = flying
@@ -406,7 +406,7 @@ def test_freshness_is_measured_against_the_quickest() -> None:
         ("[]", "object"),
     ],
 )
-def test_nonsense_ends_it(flying: tuple[ConsoleServer, Run], text: str, said: str) -> None:
+def test_nonsense_ends_it(flying: tuple[FlightServer, Run], text: str, said: str) -> None:
     """With the reason, and the controls are let go."""
     server, run = flying
     with hand(server) as socket:
@@ -419,7 +419,7 @@ def test_nonsense_ends_it(flying: tuple[ConsoleServer, Run], text: str, said: st
 
 
 def test_a_drone_that_does_not_obey_ends_it(
-    flying: tuple[ConsoleServer, Run], monkeypatch: pytest.MonkeyPatch
+    flying: tuple[FlightServer, Run], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What refuses the takeover, and what refuses later, is told; nothing is steered after it."""
     server, run = flying

@@ -22,8 +22,8 @@ from aerodaas import (
     VelocityCommand,
 )
 from aerodaas.analytics.base import Context
-from aerodaas.analytics.remote.client import RemoteClient
 from aerodaas.clock import seconds
+from aerodaas.environment.remote_client import RemoteClient
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["Drift", "RemoteUser", "ScriptedDetector", "free_port"]

@@ -10,12 +10,12 @@ import pytest
 from scripted import ScriptedDetector
 
 from aerodaas import Environment, Robot
-from aerodaas.analytics.remote.app import _COMMANDS
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.plugins import plugin_names
 from aerodaas.environment.run import Run
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.state_machine import mermaid
+from aerodaas.protocol.commands import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
@@ -40,8 +40,8 @@ def test_every_state_limit_scheduler_and_command_is_explained() -> None:
         assert getattr(limits, name) == float(value), name
     for name in plugin_names("trajectory_schedulers"):
         assert f"| `{name}` |" in PAGE
-    for name in _COMMANDS:
-        assert f"/{name}`" in PAGE
+    for name in COMMANDS:
+        assert f"`{name}`" in PAGE
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from aerodaas import Environment
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.run import Run
 from aerodaas.errors import ConfigError, MissionError
-from aerodaas.service.own.server import ConsoleServer
 
 NOTEBOOKS = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
@@ -144,20 +143,14 @@ def test_the_console_is_served_once(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     environment._mission = run
     with pytest.raises(MissionError, match="nothing to be watched"):
         environment.console()
-    servers: list[ConsoleServer] = []
-
-    def start(run: Run, server: ConsoleServer) -> None:
-        servers.append(server)
-        run._console = server
-
-    monkeypatch.setattr(Run, "_start_console", start)
+    monkeypatch.setattr(Run, "_serve", lambda _: None)
     monkeypatch.setattr(run, "_flight", SimpleNamespace())
     with pytest.raises(ConfigError, match="takes host:port"):
         environment.console("localhost")
     first, again, watching = (
         environment.console(), environment.console(), environment.console(viewer=True)
     )  # fmt: skip
-    (server,) = servers
+    (server,) = run._servers
     server.close()
     assert first == again != watching
     assert first.url.startswith("http://127.0.0.1:")

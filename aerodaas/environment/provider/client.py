@@ -34,6 +34,7 @@ from aerodaas.protocol.schemas import (
     MissionIn,
     MissionOut,
     NavigationIn,
+    PictureForm,
     Role,
     Scope,
     TenantChange,
@@ -234,12 +235,20 @@ class ProviderClient:
         path = f"/v1/missions/{_part(mission)}/rehearsal.png"
         self._exchange.download(path, target, _nothing)
 
-    def live(self, mission: str, rate: float = 5.0, *streams: str) -> LiveConnection:
+    def live(
+        self,
+        mission: str,
+        rate: float = 5.0,
+        *streams: str,
+        pictures: PictureForm = PictureForm.WHOLE,
+    ) -> LiveConnection:
         """Connect to a mission's state, `rate` times a second at most, and items of `streams`.
 
         Raises SourceError if there is no connection, else what `mission` raises.
         """
-        query = urlencode({"rate": f"{rate:g}", "streams": ",".join(streams)})
+        query = urlencode(
+            {"rate": f"{rate:g}", "streams": ",".join(streams), "pictures": pictures.value}
+        )
         path = f"/v1/missions/{_part(mission)}/live?{query}"
         return LiveConnection.open(self._exchange, path)
 

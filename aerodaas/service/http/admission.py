@@ -51,11 +51,19 @@ class Tokens(Protocol):
 class Admission:
     """Tells who sends a request, and whether they may; refusals are audited."""
 
-    def __init__(self, tokens: Tokens, audit: Audit | None = None) -> None:
-        """Admit by `tokens`; refusals and drones' answers go to `audit`, if there is one."""
+    def __init__(
+        self, tokens: Tokens, audit: Audit | None = None, rates: RateLimiter | None = None
+    ) -> None:
+        """Admit by `tokens`.
+
+        Args:
+            tokens: Tokens that are good.
+            audit: Log of refusals and of drones' answers; None for none.
+            rates: How often an account may ask; None for the usual.
+        """
         self._audit = audit
         self._tokens = tokens
-        self._rates = RateLimiter(_RATE, _BURST)
+        self._rates = rates or RateLimiter(_RATE, _BURST)
         self._threads = ThreadPoolExecutor(_THREADS, "admission")
 
     async def admit(self, connection: HTTPConnection) -> Principal:

@@ -39,6 +39,8 @@ Form: TypeAlias = Annotated[PictureForm, Query()]
 _MOST_STREAMS = 16
 _RENEWAL_SECONDS = 5.0
 """Wall seconds between two looks at whether a connection still may be had."""
+_END_SECONDS = 0.2
+"""Most seconds between two looks at whether a mission is over."""
 _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
 
@@ -122,7 +124,16 @@ class LiveSession:
                     if over:
                         await self._socket.send_text('{"kind": "end"}')
                         return
-            await asyncio.sleep(1.0 / rate)
+            await self._pause(1.0 / rate)
+
+    async def _pause(self, seconds: float) -> None:
+        """Wait, but not beyond the mission's end: the server may end with it."""
+        loop = asyncio.get_running_loop()
+        until = loop.time() + seconds
+        while True:
+            await asyncio.sleep(min(_END_SECONDS, seconds))
+            if loop.time() >= until or self._missions.version(self._mission) < 0:
+                return
 
     async def _items(self, stream: str, form: PictureForm) -> None:
         """Send the items of one stream; begins again where the flight has not begun yet."""

@@ -12,15 +12,26 @@ from aerodaas.protocol.schemas import AccountOut, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 
-__all__ = ["OWN", "FlightTokens", "account_of", "new_tokens"]
+__all__ = ["OWN", "REMOTE", "FlightTokens", "account_of", "new_tokens", "principal_of"]
 
 OWN = "own"
 """Id of the mission and of its tenant: there is nobody else's."""
 
 
-def new_tokens() -> dict[str, Role]:
+REMOTE = "remote"
+"""Account of a remote user."""
+
+
+def principal_of(account: str, role: Role) -> Principal:
+    """Make the account of a token; who watches only may have pictures, and no more."""
+    scopes = frozenset({Scope.SENSE}) if role is Role.VIEWER else frozenset(Scope)
+    return Principal(account=account, tenant=OWN, role=role, scopes=scopes, token=account)
+
+
+def new_tokens() -> dict[str, Principal]:
     """Make a token for who flies, and one for who watches only."""
-    return {secrets.token_urlsafe(24): role for role in (Role.PILOT, Role.VIEWER)}
+    roles = (Role.PILOT, Role.VIEWER)
+    return {secrets.token_urlsafe(24): principal_of(role.value, role) for role in roles}
 
 
 def account_of(principal: Principal) -> AccountOut:
@@ -38,33 +49,47 @@ class FlightTokens:
     """Tokens of one flight; wrong ones are counted and slowed down. Threads may share it."""
 
     def __init__(
-        self, tokens: Mapping[str, Role], tell: Callable[[str], None], what: str = "the console"
+        self,
+        tokens: Mapping[str, Principal],
+        what: str = "the console",
+        remedy: str = "open the console by the address that the flight told",
+        anybody: Principal | None = None,
     ) -> None:
-        """Admit `tokens` with a role each; `tell` people of many wrong ones at `what`."""
+        """Admit who has one of `tokens`.
+
+        Args:
+            tokens: Tokens, and whose they are.
+            what: Name of what they open, for people.
+            remedy: Where a token is to be found.
+            anybody: Account of all who ask, if they need no token.
+        """
+        self.tell: Callable[[str], None] = lambda _: None
+        """Tells people of many wrong tokens."""
         self._tokens = tokens
-        self._wrong = WrongTokens(tell, what=what)
+        self._wrong = WrongTokens(self._tell, what=what)
+        self._remedy = remedy
+        self._anybody = anybody
         self._lock = threading.Lock()
+
+    def token(self, role: Role) -> str:
+        """The token of an account with this role."""
+        return next(token for token, who in self._tokens.items() if who.role is role)
 
     def of(self, token: str, address: str) -> Principal:
         """Who sends a token; raises RefusedError for a wrong one, from an `address`."""
+        if self._anybody is not None:
+            return self._anybody
         # All of them are compared, each in constant time.
         given = token.encode()
-        found = [
-            role
-            for known, role in self._tokens.items()
-            if hmac.compare_digest(given, known.encode())
-        ]
+        known = self._tokens.items()
+        found = [who for one, who in known if hmac.compare_digest(given, one.encode())]
         if found:
-            return _principal(found[0])
+            return found[0]
         with self._lock:
             pause = self._wrong.count(address)
         if pause:
             raise RefusedError(429, "too many wrong tokens", retry_after=pause)
-        raise RefusedError(
-            401, "wrong or missing token: open the console by the address that the flight told"
-        )
+        raise RefusedError(401, f"wrong or missing token: {self._remedy}")
 
-
-def _principal(role: Role) -> Principal:
-    scopes = frozenset({Scope.SENSE}) if role is Role.VIEWER else frozenset(Scope)
-    return Principal(account=role.value, tenant=OWN, role=role, scopes=scopes, token=role.value)
+    def _tell(self, text: str) -> None:
+        self.tell(text)

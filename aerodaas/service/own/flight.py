@@ -11,9 +11,10 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
+from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
-from aerodaas.mission.commands import Answer, Command
+from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.preflight import PreflightOut
@@ -36,7 +37,7 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.live.controls import told_of_controls
 from aerodaas.service.live.meter import FlightMeter
 from aerodaas.service.live.packed_reader import PackedReader, drawn_streams, ground_of
-from aerodaas.service.own.access import OWN, account_of
+from aerodaas.service.own.access import OWN, REMOTE, account_of
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig
@@ -51,6 +52,8 @@ _LOOK_SECONDS = 0.1
 _WATCHED_SECONDS = 2.0
 """Wall seconds after which a flight that nobody asked for is not watched any more."""
 _ITEM_SECONDS = 0.5
+_FAREWELL = 1.0
+"""Wall seconds in which watchers are told that the flight is over."""
 _PATIENCE = 5.0
 """Wall seconds for a drone's answer; its loop runs at 20 Hz."""
 _MOST_ASKED = 32
@@ -104,10 +107,21 @@ class OwnFlight:
         threading.Thread(target=self._look, name="console", daemon=True).start()
 
     def close(self) -> None:
-        """Look no more; whoever watches is told that the flight is over."""
+        """Look no more, and tell whoever watches that the flight is over."""
         if self._run.state is not None:
             self._take(self._run.state)
         self._closed.set()
+        if self._watched:
+            time.sleep(_FAREWELL)
+
+    @property
+    def config(self) -> EnvironmentConfig:
+        """What is flown in."""
+        return self._run.config
+
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert."""
+        self._run.note(kind, text)
 
     @property
     def over(self) -> bool:
@@ -125,7 +139,7 @@ class OwnFlight:
 
     @cached_property
     def _fleet(self) -> FleetOut:
-        config = self._run.config
+        config = self.config
         robots = [
             RobotOut(id=robot.id, sensors=[one.full_id for one in robot.sensors], mission=OWN)
             for robot in config.robots
@@ -139,11 +153,11 @@ class OwnFlight:
 
     @cached_property
     def _scenery(self) -> SceneryOut:
-        return SceneryOut.of(self._run.config)
+        return SceneryOut.of(self.config)
 
     def preflight(self, robot: str) -> PreflightOut:
         """A robot's list before take-off; raises RefusedError for an unknown robot."""
-        if robot not in {one.id for one in self._run.config.robots}:
+        if robot not in {one.id for one in self.config.robots}:
             raise RefusedError(404, f"there is no robot {robot}")
         self._refresh()
         return self._meter.preflight.get(robot, PreflightOut(robot=robot))
@@ -169,7 +183,10 @@ class OwnFlight:
         """Give a robot a command, of which an alert tells; raises AeroDaaSError."""
         self.require_pilot(principal, mission)
         given, told = _worded(command)
-        asked = f"the console asked {command.robot} to {told}" if told else ""
+        if isinstance(given, AddNavigation):
+            given = self._as_stream_item(command.robot, given)
+        sender = "a remote user" if principal.account == REMOTE else "the console"
+        asked = f"{sender} asked {command.robot} to {told}" if told else ""
         try:
             asking = self._commands.submit(self._run.command, command.robot, given)
             answer = asking.result(_PATIENCE)
@@ -189,7 +206,7 @@ class OwnFlight:
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
         """The flight's environment."""
         self.require_pilot(principal, mission)
-        return self._run.config
+        return self.config
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """False: the application, which is here, is the flight's user."""
@@ -228,7 +245,24 @@ class OwnFlight:
     @cached_property
     def _ground(self) -> Ground | None:
         """What is flown over; it is read when something is watched."""
-        return ground_of(self._run.config)
+        return ground_of(self.config)
+
+    def _as_stream_item(self, robot: str, command: AddNavigation) -> Command:
+        """Waypoints as the stream of a `RemoteAnalytics`, as the application has added that.
+
+        So its priority, deadline and order apply; a command with settings of its own stays.
+        """
+        if command.clear_first or command.deadline is not None:
+            return command
+        graph = self._run.graph
+        for edge in graph.navigation:
+            stream = edge.navigation.stream
+            if edge.robot != robot or stream is None:
+                continue
+            if isinstance(graph.nodes[stream.name].work, RemoteAnalytics):
+                navigation, index = command.navigation, command.index
+                return StreamItem(stream.name, navigation, index=index, replaces=False)
+        return command
 
     def _tell(self, asked: str, answer: str) -> None:
         """Have an alert tell people of a command and its answer; not of one without words."""
@@ -244,7 +278,7 @@ class OwnFlight:
             tenant=OWN,
             account=OWN,
             phase=ended if self.over else MissionPhase.FLYING,
-            robots=[robot.id for robot in self._run.config.robots],
+            robots=[robot.id for robot in self.config.robots],
             submitted=self._began,
             started=self._began,
             status=self._meter.status,
@@ -256,14 +290,17 @@ class OwnFlight:
 
     def _refresh(self) -> None:
         """Look at the drones, unless that is done anyway because somebody watches."""
-        watched = time.monotonic() - self._asked < _WATCHED_SECONDS
-        self._asked = time.monotonic()
+        watched, self._asked = self._watched, time.monotonic()
         if not watched:
             self._look_once()
 
+    @property
+    def _watched(self) -> bool:
+        return time.monotonic() - self._asked < _WATCHED_SECONDS
+
     def _look(self) -> None:
         while not self._closed.wait(_LOOK_SECONDS):
-            if time.monotonic() - self._asked < _WATCHED_SECONDS:
+            if self._watched:
                 self._look_once()
 
     def _look_once(self) -> None:

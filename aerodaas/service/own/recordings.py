@@ -17,7 +17,7 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.live.playback import Player
 from aerodaas.service.own.access import OWN, account_of
-from aerodaas.service.own.server import PageServer
+from aerodaas.service.own.server import ApiServer
 from aerodaas.service.routes.fleet import FleetRoutes
 from aerodaas.service.routes.missions import MissionRoutes
 from aerodaas.service.routes.playback import PlaybackRoutes
@@ -25,7 +25,7 @@ from aerodaas.service.routes.playback import PlaybackRoutes
 __all__ = ["RecordingServer"]
 
 
-class RecordingServer(PageServer):
+class RecordingServer(ApiServer):
     """Serves the page for recordings until it is closed."""
 
     def __init__(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 
 from fastapi import FastAPI
+from starlette.types import ASGIApp
+from typing_extensions import Self
 
+from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError
 from aerodaas.http_server.addresses import HostGuard, listen
 from aerodaas.http_server.server import web_server
@@ -15,17 +17,15 @@ from aerodaas.protocol.schemas import Role
 from aerodaas.service.app import build_app
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.gate import Bounds
-from aerodaas.service.own.access import FlightTokens, new_tokens
-from aerodaas.service.own.flight import Flown, OwnFlight
+from aerodaas.service.own.access import REMOTE, FlightTokens, new_tokens, principal_of
+from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.routes.fleet import FleetRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes
 
-__all__ = ["ConsoleServer", "PageServer"]
+__all__ = ["ApiServer", "FlightServer", "flight_app"]
 
 _STOPPING = 5.0
-_FAREWELL = 1.0
-"""Wall seconds in which watchers are told that the flight is over."""
 _MOST_CONNECTIONS = 640
 """A page has two that stay, and a few that come and go."""
 _MOST_WATCHERS = 320
@@ -35,15 +35,23 @@ _MOST_BYTES_SENT = 4096
 _PING_SECONDS = 5.0
 
 
-class PageServer:
+class ApiServer:
     """Serves the API and its page to who has a token, until it is closed."""
 
-    def __init__(self, address: str, option: str) -> None:
+    def __init__(
+        self,
+        address: str,
+        option: str,
+        tokens: FlightTokens | None = None,
+        guard: Callable[[ASGIApp, str], ASGIApp] = HostGuard,
+    ) -> None:
         """Listen.
 
         Args:
             address: `host:port`; port 0 selects a free one.
             option: The option that has it, for the error's text.
+            tokens: Tokens that are good; None for new ones, of who flies and of who watches.
+            guard: Makes what stands before the application, which listens at a host.
 
         Raises:
             ConfigError: If it cannot be listened on.
@@ -54,9 +62,10 @@ class PageServer:
             self._socket = listen(host.strip("[]"), int(port))
         except (OSError, OverflowError, ValueError) as error:
             raise ConfigError(
-                f"cannot serve the console at {address}: {error}; give another {option}"
+                f"cannot serve the flight at {address}: {error}; give another {option}"
             ) from None
-        self._tokens = new_tokens()
+        self._tokens = tokens or FlightTokens(new_tokens())
+        self._guard = guard
         self._thread: threading.Thread | None = None
 
     def address(self, *, viewer: bool = False) -> str:
@@ -65,15 +74,19 @@ class PageServer:
         The token stands in the fragment, which a browser sends to nobody.
         """
         host = "127.0.0.1" if self._host in {"0.0.0.0", "[::]"} else self._host  # noqa: S104 - compared
-        role = Role.VIEWER if viewer else Role.PILOT
-        token = next(one for one, its_role in self._tokens.items() if its_role is role)
+        token = self._tokens.token(Role.VIEWER if viewer else Role.PILOT)
         return f"http://{host}:{self._socket.getsockname()[1]}/#token={token}"
+
+    @property
+    def serving(self) -> bool:
+        """Whether it has begun to serve."""
+        return self._thread is not None
 
     def serve(self, build: Callable[[Admission], FastAPI], tell: Callable[[str], None]) -> None:
         """Serve what `build` makes, in a thread; `tell` tells people of many wrong tokens."""
-        app = build(Admission(FlightTokens(self._tokens, tell)))
+        self._tokens.tell = tell
         self._server = web_server(
-            HostGuard(app, self._host),
+            self._guard(build(Admission(self._tokens)), self._host),
             most_connections=_MOST_CONNECTIONS,
             timeout_graceful_shutdown=1,
             ws_max_size=_MOST_BYTES_SENT,
@@ -84,7 +97,7 @@ class PageServer:
         )
         words = {"sockets": [self._socket]}
         self._thread = threading.Thread(
-            target=self._server.run, kwargs=words, name="console server", daemon=True
+            target=self._server.run, kwargs=words, name="api server", daemon=True
         )
         self._thread.start()
 
@@ -96,42 +109,60 @@ class PageServer:
         self._socket.close()
 
 
-class ConsoleServer(PageServer):
+class FlightServer(ApiServer):
     """Serves the API of one flight until it is closed."""
 
-    def __init__(self, address: str, *, framed: bool = False) -> None:
-        """Listen at `host:port`; raises ConfigError if that cannot be listened on.
+    framed = False
+    """Whether a page of this machine, such as a notebook, may hold the page in a frame."""
 
-        `framed`: a page of this machine, such as a notebook, may hold it in a frame.
+    @classmethod
+    def of_remote(cls, settings: RemoteConfig) -> Self:
+        """Listen for a remote user, who has the one token of `settings`.
+
+        Without one, which is for loopback only, programs of this machine need none.
         """
-        super().__init__(address, "--console-address")
-        self._framed = framed
-        self._flight: OwnFlight | None = None
+        host = f"[{settings.host}]" if ":" in settings.host else settings.host
+        what, user = "remote control", principal_of(REMOTE, Role.PILOT)
+        if settings.token is None:
+            tokens = FlightTokens({}, what, anybody=user)
+            guard: Callable[[ASGIApp, str], ASGIApp] = _without_pages
+        else:
+            remedy = "send it as `Authorization: Bearer …`"
+            tokens = FlightTokens({settings.token.get_secret_value(): user}, what, remedy)
+            guard = _by_any_name
+        return cls(f"{host}:{settings.port}", "remote.port", tokens, guard)
 
-    def start(self, run: Flown, name: str) -> None:
-        """Show a flight that has begun, an application called `name`."""
-        flight = self._flight = OwnFlight(run, name)
+    def start(self, flight: OwnFlight) -> None:
+        """Serve a flight that has begun."""
+        self.serve(
+            lambda admission: flight_app(flight, admission, framed=self.framed),
+            lambda text: flight.note("wrong_tokens", text),
+        )
 
-        def build(admission: Admission) -> FastAPI:
-            routes = (
-                FleetRoutes(flight, admission),
-                MissionRoutes(flight, admission),
-                PilotingRoutes(flight, admission),
-                LiveRoutes(flight, admission),
-            )
-            return build_app(
-                admission,
-                [one.router() for one in routes],
-                bounds=Bounds(reserved=Role.PILOT, lasting=_MOST_WATCHERS),
-                tiles=run.config.map_tiles,
-                framed=self._framed,
-            )
 
-        self.serve(build, lambda text: run.note("console_wrong_tokens", text))
+def flight_app(flight: OwnFlight, admission: Admission, *, framed: bool = False) -> FastAPI:
+    """Build the application of one flight; `framed` as of `build_app`."""
+    routes = (
+        FleetRoutes(flight, admission),
+        MissionRoutes(flight, admission),
+        PilotingRoutes(flight, admission),
+        LiveRoutes(flight, admission),
+    )
+    return build_app(
+        admission,
+        [one.router() for one in routes],
+        bounds=Bounds(reserved=Role.PILOT, lasting=_MOST_WATCHERS),
+        tiles=flight.config.map_tiles,
+        framed=framed,
+    )
 
-    def close(self) -> None:
-        """Tell the watchers that the flight is over, and stop serving."""
-        if self._flight is not None:
-            self._flight.close()
-            time.sleep(_FAREWELL)
-        super().close()
+
+def _without_pages(app: ASGIApp, host: str) -> ASGIApp:
+    """A guard that keeps all web pages out, for they need no token."""
+    return HostGuard(app, host, pages=False)
+
+
+def _by_any_name(app: ASGIApp, host: str) -> ASGIApp:
+    """No guard: who has the token may address the host by any name."""
+    del host
+    return app

@@ -1,6 +1,6 @@
-"""Requests of a remote user to the service itself, which commands a flying mission.
+"""Requests of a remote user to the API of a flight, which commands a flying mission.
 
-An input is a text of requests, one a line: a path, a space and a body.
+An input is a text of requests, one a line: a path below the mission's, a space and a body.
 """
 
 from __future__ import annotations
@@ -8,19 +8,23 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Iterable
-from concurrent.futures import Future
 from copy import deepcopy
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
-from aerodaas.analytics.remote.app import build_app
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.dataflow.graph import Graph
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.messages.mission import MissionState, MissionStatus
-from aerodaas.messages.readings import Alert
-from aerodaas.messages.vehicle import VehicleState
-from aerodaas.mission.commands import Answer, Command, OpenStream, StreamItem
+from aerodaas.messages.mission import MissionState
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.schemas import Role
+from aerodaas.service.access.rates import RateLimiter
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.own.access import FlightTokens, principal_of
+from aerodaas.service.own.flight import OwnFlight
+from aerodaas.service.own.server import flight_app
 from tools.fuzz.flight import LIMITS, TURN, FuzzedFlight, require
 
 __all__ = ["run", "seeds"]
@@ -32,14 +36,13 @@ _ENVIRONMENT = EnvironmentConfig.model_validate(
         "simulation": {"world": "empty"},
     }
 )
-_STREAM = "drone/remote"
+_MISSION = b"/v1/missions/own"
 _REQUESTS = 8
 """Most requests of one input that are made."""
 _BETWEEN, _TURNS = 3, 12
 """Turns of the setpoint loop between two requests, and after the last one."""
 _CLIMB = 120
 """Most turns until the drone is on its way."""
-_OK = 200
 _SERVERS_FAULT = 500
 
 
@@ -55,11 +58,14 @@ def seeds() -> Iterable[bytes]:
         "deadline": 100,
         "waypoint_type": "local",
     }
-    body = json.dumps({"waypoints": [place, far], "index": 1, "ordered": True})
-    yield f"/waypoints {body}\n/pause \n/resume ".encode()
-    yield f"/clear \n/waypoints {json.dumps({'waypoints': [place]})}\n/status ".encode()
-    yield b"/return-home \n/abort "
-    yield b"/frame.jpg \n/nothing {}"
+    body = json.dumps({"robot": "drone", "waypoints": [place, far], "index": 1, "ordered": True})
+    alone = json.dumps({"robot": "drone", "waypoints": [place]})
+    given = {word: json.dumps({"robot": "drone", "command": word}) for word in COMMANDS}
+    yield f"/navigation {body}\n/commands {given['pause']}\n/commands {given['resume']}".encode()
+    yield f"/commands {given['clear']}\n/navigation {alone}\n".encode()
+    yield f"/commands {given['return-home']}\n/commands {given['land']}\n/scenery ".encode()
+    yield b'/plan {"robot": "drone", "order": [], "remove": ["a"]}\n/nothing {}'
+    yield b'/actuators {"robot": "drone", "actuator": "grip", "position": "open"}'
 
 
 def run(data: bytes) -> None:
@@ -69,11 +75,11 @@ def run(data: bytes) -> None:
     link.flight.by_hand = bool(len(data) % 2)
     for line in data.split(b"\n")[:_REQUESTS]:
         path, _, body = line.partition(b" ")
-        method = "GET" if path in {b"/status", b"/frame.jpg"} else "POST"
-        code, answer = loop.run_until_complete(_ask(app, method, path, body))
+        method = "GET" if path in {b"", b"/scenery"} else "POST"
+        code, answer = loop.run_until_complete(_ask(app, method, _MISSION + path, body))
         require(code < _SERVERS_FAULT, f"an answer of code {code}")
         if method == "POST":
-            require(answer["accepted"] == (code == _OK), "an answer that contradicts its code")
+            require("accepted" in answer or "text" in answer, "an answer that says nothing")
         link.turn(_BETWEEN)
     link.turn(_TURNS - _BETWEEN)
     kinds = {alert.kind for alert in link.flight.mission.alerts}
@@ -81,8 +87,12 @@ def run(data: bytes) -> None:
 
 
 class _Link:
-    """Hands what the service asks to a mission of this process; see `MissionLink`."""
+    """A run whose one mission is this process'; see `Flown`."""
 
+    config = _ENVIRONMENT
+    graph = Graph()
+    state: Any = None
+    over = False
     drone: SimulatedVehicle
     flight: FuzzedFlight
     _now = 0
@@ -102,22 +112,18 @@ class _Link:
             self.flight.turn()
         return self._now
 
-    def status(self) -> MissionStatus | None:
-        return self.flight.mission.status
+    def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
+        del newest
+        status, vehicle = self.flight.mission.status, self.drone.read()
+        drone = SimpleNamespace(status=status, state=vehicle, health=None)
+        return SimpleNamespace(robots={"drone": drone}, alerts=[], reports={})
 
-    def vehicle(self) -> VehicleState | None:
-        return self.drone.read()
+    def command(self, robot: str, command: Command) -> Answer:
+        del robot
+        return self.flight.mission.handle(command, self._now)
 
-    def command(self, command: Command) -> Future[Answer]:
-        future: Future[Answer] = Future()
-        future.set_result(self.flight.mission.handle(command, self._now))
-        return future
-
-    def fly(self, navigation: AeroNavigation, index: int | None = None) -> Future[Answer]:
-        return self.command(StreamItem(_STREAM, navigation, index=index, replaces=False))
-
-    def alert(self, alert: Alert) -> None:
-        require(alert.text.isprintable(), "an alert that cannot be printed")
+    def note(self, kind: str, text: str) -> None:
+        require(f"{kind}{text}".isprintable(), "an alert that cannot be printed")
 
 
 @cache
@@ -128,7 +134,6 @@ def _on_its_way() -> tuple[int, SimulatedVehicle, FuzzedFlight]:
     link.drone = SimulatedVehicle(robot, _ENVIRONMENT)
     link.drone.connect()
     link.flight = FuzzedFlight(link.drone, robot)
-    link.flight.mission.handle(OpenStream(_STREAM), 0)
     now = 0
     while link.flight.state is not MissionState.ENROUTE:
         require(now < _CLIMB * TURN * 1e9, "a flight that never begins")
@@ -143,7 +148,9 @@ def _service() -> tuple[_Link, Any, asyncio.AbstractEventLoop]:
     An event loop that an input has left broken would show in all later ones.
     """
     link = _Link()
-    return link, build_app(link, lambda: None), asyncio.new_event_loop()
+    tokens = FlightTokens({}, anybody=principal_of("remote", Role.PILOT))
+    app = flight_app(OwnFlight(link, "fuzzed"), Admission(tokens, rates=RateLimiter(1e9, 1e9)))
+    return link, app, asyncio.new_event_loop()
 
 
 async def _ask(app: Any, method: str, path: bytes, body: bytes) -> tuple[int, dict[str, Any]]:  # noqa: ANN401

@@ -5,26 +5,28 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from concurrent.futures import Future
-from dataclasses import dataclass
+from collections.abc import MutableMapping
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import Flight, add, flight, live
+from flights import Flight
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from remote_flight import STREAM, on_its_way
 
-from aerodaas.analytics.remote.app import build_app
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.messages.mission import MissionState, MissionStatus
-from aerodaas.messages.readings import Alert
-from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
-from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
-from aerodaas.mission.commands import Answer, Command, StreamItem
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
+from aerodaas.messages.waypoints import NavigationType, VelocityCommand
+from aerodaas.mission.commands import StreamItem
+from aerodaas.protocol.schemas import Role
+from aerodaas.service.http.admission import Admission
+from aerodaas.service.own.access import FlightTokens, principal_of
+from aerodaas.service.own.flight import OwnFlight
+from aerodaas.service.own.server import flight_app
 
-STREAM = "drone/remote"
 LIMITS = LimitsConfig(
     max_range=60.0,
     max_speed=5.0,
@@ -33,59 +35,55 @@ LIMITS = LimitsConfig(
 _FASTEST = math.hypot(LIMITS.max_speed, LIMITS.max_climb)
 
 
-@dataclass
-class Link:
-    """Hands what the service asks to a mission of this process."""
+class Api:
+    """The API of a flight, without a network, and its drone that is on its way."""
 
-    flown: Flight
+    def __init__(self) -> None:
+        run = on_its_way(LIMITS, 25.0)
+        self.flown = run.flown
+        self._flight = flight = OwnFlight(run, "survey")
+        tokens = FlightTokens({}, anybody=principal_of("remote", Role.PILOT))
+        self._app = flight_app(flight, Admission(tokens))
 
-    def status(self) -> MissionStatus:
-        """The mission's word."""
-        return self.flown.status
+    def close(self) -> None:
+        """End the flight's thread."""
+        self._flight.close()
 
-    def vehicle(self) -> VehicleState:
-        """The vehicle's state."""
-        return self.flown.vehicle.read()
+    def post(self, path: str, body: bytes) -> tuple[int, dict[str, Any]]:
+        """One request: its status and JSON."""
+        return self._ask("POST", path, body)
 
-    def command(self, command: Command) -> Future[Answer]:
-        """Answer at once."""
-        future: Future[Answer] = Future()
-        future.set_result(self.flown.tell(command))
-        return future
+    def status(self) -> dict[str, Any]:
+        """The drone's status."""
+        _, mission = self._ask("GET", "", b"")
+        found: dict[str, Any] = mission["status"]["drone"]
+        return found
 
-    def fly(self, navigation: AeroNavigation, index: int | None = None) -> Future[Answer]:
-        """Take navigation as an item of the stream."""
-        return self.command(StreamItem(STREAM, navigation, index=index, replaces=False))
+    def _ask(self, method: str, path: str, body: bytes) -> tuple[int, dict[str, Any]]:
+        sent: list[dict[str, Any]] = []
 
-    def alert(self, alert: Alert) -> None:
-        """Nobody watches."""
+        async def receive() -> dict[str, Any]:
+            return {"type": "http.request", "body": body, "more_body": False}
 
+        async def send(message: MutableMapping[str, Any]) -> None:
+            sent.append(dict(message))
 
-def ask(app: Any, method: str, path: str, body: bytes) -> tuple[int, dict[str, Any]]:  # noqa: ANN401
-    """One request to the service itself, without a network: its status and JSON."""
-    sent: list[dict[str, Any]] = []
-
-    async def receive() -> dict[str, Any]:
-        return {"type": "http.request", "body": body, "more_body": False}
-
-    async def send(message: dict[str, Any]) -> None:
-        sent.append(message)
-
-    scope = {
-        "type": "http",
-        "asgi": {"version": "3.0"},
-        "http_version": "1.1",
-        "method": method,
-        "path": path,
-        "raw_path": path.encode(),
-        "root_path": "",
-        "scheme": "http",
-        "query_string": b"",
-        "headers": [(b"content-type", b"application/json")],
-    }
-    asyncio.run(app(scope, receive, send))
-    content = b"".join(message.get("body", b"") for message in sent)
-    return sent[0]["status"], json.loads(content)
+        whole = f"/v1/missions/own{path}"
+        scope = {
+            "type": "http",
+            "asgi": {"version": "3.0"},
+            "http_version": "1.1",
+            "method": method,
+            "path": whole,
+            "raw_path": whole.encode(),
+            "root_path": "",
+            "scheme": "http",
+            "query_string": b"",
+            "headers": [(b"content-type", b"application/json")],
+        }
+        asyncio.run(self._app(scope, receive, send))
+        content = b"".join(message.get("body", b"") for message in sent)
+        return sent[0]["status"], json.loads(content)
 
 
 edges = st.sampled_from(
@@ -121,15 +119,22 @@ lists = st.one_of(
     st.lists(sane, min_size=1, max_size=3, unique_by=lambda place: str(place["id"])),
 )
 bodies = st.fixed_dictionaries(
-    {"waypoints": lists},
+    {"waypoints": lists, "robot": st.just("drone")},
     optional={"ordered": st.booleans(), "index": st.none() | edges | st.integers(0, 5)},
 )
+
+
+def order(name: str) -> bytes:
+    """A command to the drone."""
+    return json.dumps({"robot": "drone", "command": name}).encode()
+
+
 posts = st.tuples(
-    st.just("/waypoints"),
+    st.just("/navigation"),
     bodies.map(lambda body: json.dumps(body).encode()) | st.binary(max_size=40),
 )
-orders = st.sampled_from(["pause", "resume", "clear", "return-home", "abort"]).map(
-    lambda name: (f"/{name}", b"")
+orders = st.sampled_from(["pause", "resume", "clear", "return-home", "land"]).map(
+    lambda name: ("/commands", order(name))
 )
 finite = st.floats(-1e9, 1e9)
 velocities = st.builds(
@@ -161,21 +166,15 @@ def within_limits(one: Flight) -> None:
     one.records.clear()
 
 
-def in_flight() -> Flight:
-    """A drone on its way."""
-    one = flight(add(Waypoint("far", 25, 0, 2)), live(STREAM), limits=LIMITS)
-    one.run_to(MissionState.ENROUTE)
-    return one
-
-
 @pytest.mark.slow
 @given(asked=requests, pause=st.integers(1, 60))
 @settings(max_examples=60)
 @example(
     asked=[
         (
-            "/waypoints",
-            b'{"waypoints": [{"id": "a", "x": 1, "y": 1, "z": 2}], "index": 1%s}' % (b"0" * 19),
+            "/navigation",
+            b'{"robot": "drone", "waypoints": [{"id": "a", "x": 1, "y": 1, "z": 2}], "index": 1%s}'
+            % (b"0" * 19),
         ),
     ],
     pause=20,
@@ -183,28 +182,27 @@ def in_flight() -> Flight:
 @example(asked=[VelocityCommand(1.0, valid_for=1e9), VelocityCommand(1e9, 1e9)], pause=10)
 def test_no_sequence_of_requests_stops_the_loop(asked: list[Any], pause: int) -> None:
     """Each is taken or refused in words; setpoints stay finite and inside the limits."""
-    one = in_flight()
-    app = build_app(Link(one), lambda: None)
+    api = Api()
+    one = api.flown
     for request in asked:
         if isinstance(request, VelocityCommand):
             item = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [request])
             one.tell(StreamItem(STREAM, item))
         else:
             path, body = request
-            code, answer = ask(app, "POST", path, body)
-            assert code in {200, 400, 409, 422}, answer
-            assert answer["accepted"] == (code == 200)
-            assert answer["accepted"] or answer["text"] or answer["refused"]
+            code, answer = api.post(path, body)
+            assert code in {200, 400, 422}, answer
+            assert answer.get("accepted") or answer["text"] or answer["refused"]
         for _ in range(pause):
             one.turn()
         within_limits(one)
-        code, said = ask(app, "GET", "/status", b"")
-        assert code == 200
-        assert said["state"] == one.mission.state.value
+        said = api.status()
+        assert said["state"] in {state.value for state in one.states}
         assert all(len(text) < 500 for text in said["faults"])
     kinds = {alert.kind for alert in one.mission.alerts}
     assert not kinds & {"command_failed", "motors_stopped", "geofence"}
-    ask(app, "POST", "/abort", b"")
+    api.post("/commands", order("land"))
+    api.close()
     one.run(120.0)
     assert one.mission.state is MissionState.LANDED
     within_limits(one)
@@ -215,11 +213,12 @@ def test_an_index_beyond_the_queue_is_its_end_and_one_beyond_any_queue_is_refuse
     index: int, code: int
 ) -> None:
     """The waypoint is flown after the rest of its priority, or refused with the field's name."""
-    one = in_flight()
-    app = build_app(Link(one), lambda: None)
-    body = {"waypoints": [{"id": "last", "x": 1, "y": 1, "z": 2}], "index": index}
-    answered, answer = ask(app, "POST", "/waypoints", json.dumps(body).encode())
-    assert (answered, answer["accepted"]) == (code, code == 200)
-    assert answer["accepted"] or "index" in answer["text"]
+    api = Api()
+    one = api.flown
+    body = {"robot": "drone", "waypoints": [{"id": "last", "x": 1, "y": 1, "z": 2}], "index": index}
+    answered, answer = api.post("/navigation", json.dumps(body).encode())
+    assert answered == code
+    assert code == 200 or "index" in answer["text"]
+    api.close()
     one.run()
-    assert one.status.visited == (("far", "last") if answer["accepted"] else ("far",))
+    assert one.status.visited == (("far", "last") if code == 200 else ("far",))

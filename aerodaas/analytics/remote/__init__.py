@@ -1,1 +1,0 @@
-"""Remote control: an analysis that serves HTTP and WebSocket, and its client."""
