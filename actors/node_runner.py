@@ -12,12 +12,11 @@ from aerodaas.cameras.base import most_memory
 from aerodaas.clock import Clock
 from aerodaas.errors import AeroDaaSError, as_project_error
 from aerodaas.messages.envelope import Message
-from aerodaas.runtime.alerts import AlertLog
 from aerodaas.runtime.analysis import AnalysisNode
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.memory_limit import limit_memory
 from aerodaas.runtime.node import NEVER, Host, Node
-from aerodaas.runtime.reports import StreamCount
+from aerodaas.runtime.reports import AlertLog, StreamCount
 from aerodaas.runtime.session import Session
 
 __all__ = ["NodeRunner", "RunnerActor"]

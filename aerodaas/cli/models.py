@@ -102,7 +102,7 @@ def check(
         aerodaas models check yolox-nano
     """
     from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - slow to load
-    from aerodaas.analytics.detection.keypoint_heads import keypoint_head  # noqa: PLC0415
+    from aerodaas.analytics.detection.keypoints import keypoint_head  # noqa: PLC0415
     from aerodaas.analytics.detection.model_file import read_model  # noqa: PLC0415
 
     head = keypoint_head(read_model(model))

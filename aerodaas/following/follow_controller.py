@@ -20,15 +20,17 @@ from numpy.typing import NDArray
 from simple_pid import PID
 
 from aerodaas.clock import seconds
-from aerodaas.following.approach import ApproachLimit
-from aerodaas.following.clearance import Clearance
-from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy
-from aerodaas.following.observation import Observation
-from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.following.target_motion import TargetMotion, place_of, seen_from
-from aerodaas.following.upright import Upright
+from aerodaas.following.steering import ApproachLimit, Clearance, CommandShaper
+from aerodaas.following.target import (
+    Observation,
+    RelativeTarget,
+    TargetMotion,
+    Upright,
+    place_of,
+    seen_from,
+)
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY, VelocityCommand
 

@@ -16,12 +16,9 @@ import numpy as np
 
 from aerodaas.clock import seconds
 from aerodaas.errors import ConfigError
-from aerodaas.following.clearance import Clearance
-from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.observation import Observation
-from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.following.target_motion import TargetMotion
+from aerodaas.following.steering import Clearance, CommandShaper
+from aerodaas.following.target import Observation, RelativeTarget, TargetMotion
 from aerodaas.geometry.braking import braking_speed
 from aerodaas.geometry.frames import wrap_angle
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY, VelocityCommand

@@ -26,7 +26,7 @@ from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.actuation import Actuation
-from aerodaas.mission.command_handler import DONE, CommandHandler
+from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
     Actuate,
     AddNavigation,
@@ -54,7 +54,6 @@ from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.handover.handover import HANDED_OVER, Handover
 from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable, velocity_setpoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.photographer import Photographer
 from aerodaas.mission.planner import Planner

@@ -19,9 +19,15 @@ from typing import Any
 from aerodaas.clock import SimulatedClock, seconds
 from aerodaas.errors import AeroDaaSError, as_project_error, failure_line
 from aerodaas.messages.envelope import Message
-from aerodaas.runtime.alerts import AlertHandler, AlertLog
 from aerodaas.runtime.node import NEVER, Host, Node
-from aerodaas.runtime.reports import ActorReport, Phase, merged_values, sent_counts
+from aerodaas.runtime.reports import (
+    ActorReport,
+    AlertHandler,
+    AlertLog,
+    Phase,
+    merged_values,
+    sent_counts,
+)
 
 __all__ = ["InlineExecutor", "Part", "Tap"]
 

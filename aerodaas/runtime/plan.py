@@ -26,7 +26,6 @@ from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.checks import check_graph, check_places, check_plugins, check_tasks
 from aerodaas.runtime.controller import RobotSpec, VehicleController
 from aerodaas.runtime.dispatch.dispatcher import Managed
-from aerodaas.runtime.dispatch.executions import Executions
 from aerodaas.runtime.dispatch.offload import (
     CloudProcess,
     allowed,
@@ -34,6 +33,7 @@ from aerodaas.runtime.dispatch.offload import (
     priced,
     short_name,
 )
+from aerodaas.runtime.dispatch.simulated import Executions
 from aerodaas.runtime.hosting import by_actor
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session

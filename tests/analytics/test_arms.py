@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from aerodaas.analytics.people.arms import raised_arm
+from aerodaas.analytics.people.body_pose import raised_arm
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
 
 WRISTS, ELBOWS = [9, 10], [7, 8]

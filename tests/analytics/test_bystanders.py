@@ -14,7 +14,7 @@ from aerodaas.analytics.boxes import shipped_detector
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.follow.analytics import FollowAnalytics, _is_near
 from aerodaas.clock import NANOSECONDS
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.target import RelativeTarget
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.odometry import Odometry

@@ -15,7 +15,7 @@ from aerodaas.analytics.monitoring.distance import DistanceAnalytics
 from aerodaas.analytics.people.crowd_density import CrowdDensityAnalytics
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import ConfigError
-from aerodaas.following.ground import GroundView
+from aerodaas.following.ground_point import GroundView
 from aerodaas.geometry.frames import CameraModel, Vector, rotation_from_rpy
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header

@@ -23,7 +23,7 @@ from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, GraphError
-from aerodaas.following.relative_target import sight
+from aerodaas.following.target import sight
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame

@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aerodaas import Environment
-from aerodaas.analytics.monitoring.gps_logger import GpsLoggerAnalytics
-from aerodaas.analytics.monitoring.gps_rows import parse_track
+from aerodaas.analytics.monitoring.gps_logger import GpsLoggerAnalytics, parse_track
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.odometry import GpsFix

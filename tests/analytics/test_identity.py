@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerodaas.analytics.detection.box_filter import BoxFilter
-from aerodaas.analytics.detection.tracking import Track
+from aerodaas.analytics.detection.tracking import BoxFilter, Track
 from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import Box

@@ -13,7 +13,7 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
-from aerodaas.analytics.people.crop import GREY, cut_region, square_around
+from aerodaas.analytics.people.joints import GREY, cut_region, square_around
 from aerodaas.analytics.people.pose import PoseAnalytics, body_around
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.errors import ConfigError, GraphError, ModelError

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.following.approach import ApproachLimit, closing_speed
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.steering import ApproachLimit, closing_speed
+from aerodaas.following.target import RelativeTarget
 from aerodaas.messages.odometry import Odometry
 
 LIMITS = FollowLimits()

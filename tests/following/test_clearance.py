@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.following.clearance import Clearance, surfaces
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.steering import Clearance, surfaces
+from aerodaas.following.target import RelativeTarget
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Header

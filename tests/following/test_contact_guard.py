@@ -14,7 +14,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.following import contact_guard
 from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.target_motion import seen_from
+from aerodaas.following.target import seen_from
 from aerodaas.geometry.frames import Vector, body_to_enu, enu_to_body
 from aerodaas.messages.odometry import Odometry
 

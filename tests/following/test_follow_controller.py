@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.following import follow_controller
-from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_controller import FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
-from aerodaas.following.observation import Observation
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.steering import CommandShaper
+from aerodaas.following.target import Observation, RelativeTarget
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import VelocityCommand
 

@@ -7,8 +7,7 @@ import pytest
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.following.inspection import InspectionController, InspectionPlan
-from aerodaas.following.observation import Observation
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.target import Observation, RelativeTarget
 from aerodaas.messages.odometry import Odometry
 
 TOWER, WALL = 30.0, 12.0

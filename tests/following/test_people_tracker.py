@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.following.people_tracker import PeopleTracker, Prediction
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.contact_guard import PeopleTracker, Prediction
+from aerodaas.following.target import RelativeTarget
 from aerodaas.messages.odometry import Odometry
 
 POSE = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.following.relative_target import TargetSize, sight
+from aerodaas.following.target import TargetSize, sight
 from aerodaas.geometry.frames import Box, CameraModel, rotation_from_rpy
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.following.target_motion import TargetMotion, seen_from
+from aerodaas.following.target import RelativeTarget, TargetMotion, seen_from
 from aerodaas.messages.odometry import Odometry
 
 STOP = 25

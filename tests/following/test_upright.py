@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.following.upright import Upright
+from aerodaas.following.target import Upright
 
 
 def looks(heights: list[float], rate: float, distance: float = 2.0) -> list[bool]:

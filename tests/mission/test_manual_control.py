@@ -10,6 +10,7 @@ from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 from aerodaas.messages.waypoints import VelocityCommand, Waypoint
+from aerodaas.mission.command_handler import MANUAL_SECONDS
 from aerodaas.mission.commands import (
     End,
     Pause,
@@ -19,7 +20,6 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.mission.manual import MANUAL_SECONDS
 
 ASHA = TakeControls("asha", 7)
 BINA = TakeControls("bina", 8)

@@ -21,7 +21,7 @@ from aerodaas.messages.payload import Photo
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
-from aerodaas.mission.shutter import Shutter
+from aerodaas.mission.photographer import Shutter
 
 TURN = NANOSECONDS // 20
 

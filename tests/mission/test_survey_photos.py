@@ -12,8 +12,13 @@ from surveyors import simulated, surveying
 
 from aerodaas.errors import ConfigError, SchedulerError
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.survey import SurveySettings, plan_survey
-from aerodaas.mission.survey_photos import SurveyPhotos, planned_photos, survey_camera
+from aerodaas.mission.survey import (
+    SurveyPhotos,
+    SurveySettings,
+    plan_survey,
+    planned_photos,
+    survey_camera,
+)
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
 
 FIELD = [(0.0, 0.0), (50.0, 0.0), (60.0, 30.0), (0.0, 30.0)]

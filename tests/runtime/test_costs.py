@@ -6,8 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.runtime.dispatch.costs import ExecutionEstimates, LinkEstimate, Uplink, quantile
-from aerodaas.runtime.dispatch.estimates import Estimates
+from aerodaas.runtime.dispatch.costs import (
+    Estimates,
+    ExecutionEstimates,
+    LinkEstimate,
+    Uplink,
+    quantile,
+)
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 
 TIMES = frozenset({"edge_time", "cloud_time"})

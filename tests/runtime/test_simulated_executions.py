@@ -31,8 +31,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.runtime.dispatch.dispatcher import Managed
-from aerodaas.runtime.dispatch.executions import Executions
-from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
+from aerodaas.runtime.dispatch.simulated import Executions, SimulatedDispatcher
 from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import done_stream, task_stream

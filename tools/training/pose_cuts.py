@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.people.crop import GREY, MARGIN
-from aerodaas.analytics.people.joints import MIRRORED
+from aerodaas.analytics.people.joints import GREY, MARGIN, MIRRORED
 from tools.training.augment import spoiled
 from tools.training.dataset import Pictures
 from tools.training.surroundings import surrounded

@@ -10,6 +10,7 @@ differs from this only in crowds, and would need scipy.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
@@ -18,13 +19,129 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.analytics.detection.box_filter import BoxFilter
-from aerodaas.analytics.detection.looks import Looks, touches
 from aerodaas.clock import seconds
-from aerodaas.geometry.frames import rotation_from_rpy
+from aerodaas.geometry.frames import Box, rotation_from_rpy
+from aerodaas.messages.appearance import unlikeness
 from aerodaas.messages.detections import Detection, Detections
 
-__all__ = ["Track", "Tracker", "TrackingAnalytics"]
+__all__ = ["BoxFilter", "Looks", "Track", "Tracker", "TrackingAnalytics", "touches"]
+
+Array = NDArray[np.float64]
+_MEASUREMENT = 0.08
+"""Standard deviation of a detected box, in box heights."""
+_FIRST_VELOCITY = 1.0
+"""Standard deviation of an unknown velocity, in box heights a second."""
+_ACCELERATION = 1.5
+"""Standard deviation of the acceleration, in box heights a second squared."""
+_SMALLEST = 1.0
+
+
+class BoxFilter:
+    """Estimate of one box, with its covariance."""
+
+    def __init__(self, box: Box) -> None:
+        """Initialise at a detected `box` (left, top, right, bottom in pixels), at rest."""
+        self.value: Array = _measurement(box)
+        self.velocity: Array = np.zeros(4)
+        scale = self._scale
+        self._variance: Array = np.full(4, (_MEASUREMENT * scale) ** 2)
+        self._covariance: Array = np.zeros(4)
+        self._velocity_variance: Array = np.full(4, (_FIRST_VELOCITY * scale) ** 2)
+
+    @property
+    def box(self) -> Box:
+        """Left, top, right, bottom, in pixels."""
+        u, v, width, height = self.value.tolist()
+        width, height = max(width, _SMALLEST), max(height, _SMALLEST)
+        return u - width / 2, v - height / 2, u + width / 2, v + height / 2
+
+    def predict(self, dt: float) -> None:
+        """Advance by `dt` seconds, with white noise of acceleration."""
+        noise = (_ACCELERATION * self._scale) ** 2
+        self.value = self.value + dt * self.velocity
+        self._variance = (
+            self._variance
+            + 2 * dt * self._covariance
+            + dt**2 * self._velocity_variance
+            + noise * dt**4 / 4
+        )
+        self._covariance = self._covariance + dt * self._velocity_variance + noise * dt**3 / 2
+        self._velocity_variance = self._velocity_variance + noise * dt**2
+
+    def shift(self, u: float, v: float) -> None:
+        """Move the estimate by pixels, as the camera has turned."""
+        self.value = self.value + np.array([u, v, 0.0, 0.0])
+
+    def distance(self, box: Box) -> tuple[float, float]:
+        """Squared Mahalanobis distance of a detected `box`, and log determinant of the covariance.
+
+        The covariance is that of the innovation.
+        """
+        spread = self._variance + (_MEASUREMENT * self._scale) ** 2
+        innovation = _measurement(box) - self.value
+        return float(np.sum(innovation**2 / spread)), float(np.sum(np.log(spread)))
+
+    def update(self, box: Box) -> None:
+        """Correct the estimate by a detected `box`."""
+        spread = self._variance + (_MEASUREMENT * self._scale) ** 2
+        innovation = _measurement(box) - self.value
+        gain, velocity_gain = self._variance / spread, self._covariance / spread
+        self.value = self.value + gain * innovation
+        self.velocity = self.velocity + velocity_gain * innovation
+        self._velocity_variance = self._velocity_variance - velocity_gain * self._covariance
+        self._covariance = (1 - gain) * self._covariance
+        self._variance = (1 - gain) * self._variance
+
+    @property
+    def _scale(self) -> float:
+        return max(float(self.value[3]), _SMALLEST)
+
+
+def _measurement(box: Box) -> Array:
+    left, top, right, bottom = box
+    return np.array([(left + right) / 2, (top + bottom) / 2, right - left, bottom - top])
+
+
+_REMEMBERED = 12
+"""Appearances that are kept."""
+_BESIDE = 0.25
+"""Part of a box's width on each side that counts as touched: an arm reaches that far."""
+_ABOVE = 0.5
+"""The same of its height, as the picture tilts with the drone."""
+
+
+def touches(one: Box, other: Box) -> bool:
+    """Whether two boxes overlap, or nearly do."""
+    beside = _BESIDE * min(one[2] - one[0], other[2] - other[0])
+    above = _ABOVE * min(one[3] - one[1], other[3] - other[1])
+    across = min(one[2], other[2]) - max(one[0], other[0])
+    down = min(one[3], other[3]) - max(one[1], other[1])
+    return across > -beside and down > -above
+
+
+class Looks:
+    """The newest appearances, oldest first."""
+
+    def __init__(self) -> None:
+        """Start without any."""
+        self._seen: deque[tuple[int, bytes]] = deque(maxlen=_REMEMBERED)
+
+    def __len__(self) -> int:
+        """Count the appearances."""
+        return len(self._seen)
+
+    def add(self, stamp: int, appearance: bytes) -> None:
+        """Remember an appearance at mission time `stamp`, nanoseconds."""
+        self._seen.append((stamp, appearance))
+
+    def since(self, stamp: int = 0) -> tuple[bytes, ...]:
+        """Appearances later than `stamp`."""
+        return tuple(appearance for when, appearance in self._seen if when > stamp)
+
+    def unlike(self, appearance: bytes | None) -> float | None:
+        """Difference of an appearance from these, as `unlikeness`; None if not comparable."""
+        return None if appearance is None else unlikeness(self.since(), (appearance,))
+
 
 _NEWEST = 0.2
 """Weight of the newest detection in the score of a track, a mean over about five detections."""

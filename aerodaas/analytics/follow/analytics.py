@@ -13,7 +13,7 @@ from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
-from aerodaas.analytics.detection.overlap import one_for_each
+from aerodaas.analytics.detection.suppression import one_for_each
 from aerodaas.analytics.detection.tracking import Tracker
 from aerodaas.analytics.follow.identity import Certainty, TargetIdentity
 from aerodaas.analytics.follow.observation import observation
@@ -23,8 +23,14 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError
 from aerodaas.following.follow_controller import LYING, FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
-from aerodaas.following.relative_target import RelativeTarget, TargetSize, ends_in_picture, sight
-from aerodaas.following.target_motion import TargetMotion, place_of
+from aerodaas.following.target import (
+    RelativeTarget,
+    TargetMotion,
+    TargetSize,
+    ends_in_picture,
+    place_of,
+    sight,
+)
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.waypoints import (

@@ -9,8 +9,7 @@ from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.analytics import FollowAnalytics
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
-from aerodaas.following.relative_target import TargetSize
-from aerodaas.following.target_motion import TargetMotion
+from aerodaas.following.target import TargetMotion, TargetSize
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY
 
 __all__ = ["CarFollowAnalytics", "PersonFollowAnalytics", "VipFollowAnalytics"]

@@ -12,8 +12,7 @@ import enum
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from aerodaas.analytics.detection.looks import touches
-from aerodaas.analytics.detection.tracking import Track
+from aerodaas.analytics.detection.tracking import Track, touches
 from aerodaas.clock import seconds
 from aerodaas.messages.appearance import unlikeness
 

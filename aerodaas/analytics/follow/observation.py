@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from aerodaas.analytics.base import Context
-from aerodaas.following.clearance import surfaces
-from aerodaas.following.observation import Observation
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.steering import surfaces
+from aerodaas.following.target import Observation, RelativeTarget
 from aerodaas.messages.detections import Detections
 
 __all__ = ["observation"]

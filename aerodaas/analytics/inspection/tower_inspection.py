@@ -18,9 +18,9 @@ from aerodaas.dataflow.graph import AeroStreamData, Trigger
 from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, GraphError
-from aerodaas.following.ground import GroundView
+from aerodaas.following.ground_point import GroundView
 from aerodaas.following.inspection import InspectionController, InspectionPhase, InspectionPlan
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.target import RelativeTarget
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.readings import Alert

@@ -10,7 +10,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
 from aerodaas.errors import ConfigError
-from aerodaas.following.relative_target import RelativeTarget, TargetSize, sight
+from aerodaas.following.target import RelativeTarget, TargetSize, sight
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.readings import Alert, Readings
 

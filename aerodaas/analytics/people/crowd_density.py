@@ -13,7 +13,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.people.debounce import Debounce
 from aerodaas.errors import ConfigError
-from aerodaas.following.ground import GroundView
+from aerodaas.following.ground_point import GroundView
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.readings import Alert, Readings
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.people.lying import feet_below
 from aerodaas.clock import seconds
-from aerodaas.following.ground import GroundView
+from aerodaas.following.ground_point import GroundView
 from aerodaas.geometry.frames import body_to_enu, enu_to_body
 from aerodaas.messages.detections import Detection, Detections
 

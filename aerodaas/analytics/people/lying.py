@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.people.joints import ANKLES, HIPS, KNEES, UPPER, visible
-from aerodaas.following.ground import GroundView
+from aerodaas.following.ground_point import GroundView
 from aerodaas.messages.detections import Detections
 
 __all__ = ["feet_below", "lies"]

@@ -33,7 +33,7 @@ _CLASSES = {
     "LostPolicy": "aerodaas.following.follow_settings:LostPolicy",
     "Near": "aerodaas.analytics.conditions:Near",
     "TargetChoice": "aerodaas.following.follow_settings:TargetChoice",
-    "TargetSize": "aerodaas.following.relative_target:TargetSize",
+    "TargetSize": "aerodaas.following.target:TargetSize",
 }
 """Dataclasses that a document may hold."""
 _CONDITIONS = {

@@ -12,8 +12,7 @@ import numpy as np
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.errors import MissionError
-from aerodaas.mission.survey import SurveySettings, plan_survey
-from aerodaas.mission.survey_photos import SurveyPhotos, survey_camera
+from aerodaas.mission.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
 from aerodaas.protocol.schemas import StatusOut
 from aerodaas.schedulers.trajectory.coverage import footprint

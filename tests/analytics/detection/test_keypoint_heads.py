@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from synthetic_models import constant_model, simcc_model
 
-from aerodaas.analytics.detection.keypoint_heads import SimccHead
-from aerodaas.analytics.detection.keypoints import KeypointModel
+from aerodaas.analytics.detection.keypoints import KeypointModel, SimccHead
 from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.errors import ModelError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.analytics.detection.overlap import one_for_each
+from aerodaas.analytics.detection.suppression import one_for_each
 from aerodaas.messages.detections import Detection
 
 CORNER, LENGTH = st.floats(0, 300), st.floats(0, 200)

@@ -6,7 +6,7 @@ from datetime import datetime, timezone
 
 import pytest
 
-from aerodaas.mission.safety.sun import sun_elevation
+from aerodaas.mission.safety.checklist import sun_elevation
 
 
 def at(latitude: float, longitude: float, when: str) -> float:

@@ -13,8 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.detection.keypoints import KeypointModel
-from aerodaas.analytics.people.crop import MARGIN
-from aerodaas.analytics.people.joints import BONES
+from aerodaas.analytics.people.joints import BONES, MARGIN
 from tools.training.dataset import Pictures, Sample, save_shard
 from tools.training.pose_cuts import CUT, People
 from tools.training.pose_evaluate import PARTS, placing
