@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 from synthetic_models import constant_model, patchwork_model
 
+from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.detection.recognition import COCO_NAMES
 from aerodaas.errors import ModelError
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Frame, Header
