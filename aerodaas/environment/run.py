@@ -465,7 +465,7 @@ class Run:
         """Timetables of a replay's sources; empty in any other flight."""
         if self.options.replay is None:
             return {}
-        from aerodaas.recording.replay.timetables import (  # noqa: PLC0415 - loads decoders
+        from aerodaas.recording.replay.environment import (  # noqa: PLC0415 - loads decoders
             read_timetables,
         )
 

@@ -1,8 +1,9 @@
-"""Images and detections of a recording, decoded to the types of the streams."""
+"""Images, cameras and detections of a recording, decoded to the types of the streams."""
 
 from __future__ import annotations
 
 import logging
+import math
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -23,6 +24,7 @@ from aerodaas.cameras.images import (
     picture_field,
 )
 from aerodaas.errors import SourceError
+from aerodaas.geometry.frames import CameraModel, angles_of_rotation
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
@@ -30,11 +32,14 @@ from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.messages import FrameInfo
 from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.reference_frames import OPTICAL, Rotation, compose
 
 __all__ = [
+    "CALIBRATION_SCHEMA",
     "DETECTIONS_SCHEMA",
-    "PictureFile",
+    "MOUNT_SCHEMA",
     "Shot",
+    "camera_of",
     "decoded_ahead",
     "detections",
     "detections_by_frame",
@@ -43,6 +48,12 @@ __all__ = [
     "shots",
 ]
 
+CALIBRATION_SCHEMA = "foxglove.CameraCalibration"
+MOUNT_SCHEMA = "foxglove.FrameTransform"
+_MATRIX = 9
+_UNIT = 1e-3
+"""How far a quaternion's length may be from one."""
+_MOST_PIXELS = 1 << 16
 _log = logging.getLogger(__name__)
 _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 DETECTIONS_SCHEMA = "aerodaas.Detections"
@@ -55,6 +66,42 @@ _STILL = frozenset({"jpeg", "png", "webp"})
 """Formats whose pictures are files as recorded."""
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
 """Of the files of all others."""
+
+
+def camera_of(calibration: Any, mount: Any) -> CameraModel | None:  # noqa: ANN401 - protobuf
+    """The camera of a `foxglove.CameraCalibration` and a `foxglove.FrameTransform` on its body.
+
+    None for what is no camera: figures that are not finite, no pixels, or no rotation.
+    """
+    matrix = [float(one) for one in calibration.K]
+    place = tuple(float(getattr(mount.translation, axis)) for axis in "xyz")
+    x, y, z, w = (float(getattr(mount.rotation, axis)) for axis in "xyzw")
+    if len(matrix) != _MATRIX or not all(map(math.isfinite, (*matrix, *place, x, y, z, w))):
+        return None
+    fx, fy, cx, cy = matrix[0], matrix[4], matrix[2], matrix[5]
+    pixels = int(calibration.width), int(calibration.height)
+    size = math.hypot(x, y, z, w)
+    if not (min(fx, fy) > 0.0 and min(pixels) > 0 and max(pixels) <= _MOST_PIXELS):
+        return None
+    if not abs(size - 1.0) <= _UNIT:
+        return None
+    ox, oy, oz, ow = OPTICAL
+    unit = (x / size, y / size, z / size, w / size)
+    roll, pitch, yaw = angles_of_rotation(_matrix(compose(unit, (-ox, -oy, -oz, ow))))
+    first, second, third = place
+    return CameraModel(*pixels, fx, fy, cx, cy, (first, second, third), pitch, yaw, roll)
+
+
+def _matrix(rotation: Rotation) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Rotation matrix (3, 3) of a unit quaternion."""
+    x, y, z, w = rotation
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 class PictureFile(NamedTuple):

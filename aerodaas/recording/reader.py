@@ -17,6 +17,7 @@ from typing_extensions import Self
 
 from aerodaas.clock import seconds
 from aerodaas.errors import RecordingError
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.decoding.index import (
     BROKEN,
     Block,
@@ -29,7 +30,7 @@ from aerodaas.recording.decoding.limits import MAX_ATTACHMENT, MAX_HELD
 from aerodaas.recording.decoding.messages import BrokenMessageError, MessageDecoder
 from aerodaas.recording.messages import NO_LABELS, Labels
 
-__all__ = ["Record", "Recording", "Topic"]
+__all__ = ["Record", "Recording", "Topic", "vehicle_states"]
 
 _RECORD_HEAD = 9
 _STAMP = 8
@@ -371,6 +372,21 @@ class Recording:
             self._loaded[block.offset] = messages
             while len(self._loaded) > _KEPT_BLOCKS:
                 self._loaded.popitem(last=False)
+
+
+def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, VehicleState]]:
+    """Iterate over a robot's states in the order of recording.
+
+    Args:
+        recording: An open recording.
+        robot: Id of the robot.
+
+    Yields:
+        Mission time of publishing, nanoseconds, and the state.
+    """
+    for record in recording.records(schemas=("aerodaas.VehicleState",)):
+        if record.labels.robot == robot:
+            yield record.stamp, record.value
 
 
 def _recordings_in(folder: Path) -> str:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from aerodaas.clock import seconds
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
-from aerodaas.recording.states import vehicle_states
 from aerodaas.simulation.scenario import Car, Gesture
 from aerodaas.simulation.world import CAR_SIZE, World
 

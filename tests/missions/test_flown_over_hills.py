@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.states import vehicle_states
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.terrain.ground import Ground
 from aerodaas.terrain.terrain import Terrain
 

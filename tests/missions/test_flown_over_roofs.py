@@ -13,9 +13,8 @@ from flying import FLAT, Flyer, recorded, robot
 from aerodaas import AeroNavigation, Environment, SchedulingType, Waypoint
 from aerodaas.environment.run import Run
 from aerodaas.errors import IncompleteError
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.states import vehicle_states
 
 _HALL = {
     "kind": "building",

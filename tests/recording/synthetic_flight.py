@@ -28,7 +28,7 @@ from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
-from aerodaas.recording.outcome import RecordingSummary
+from aerodaas.recording.output import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 

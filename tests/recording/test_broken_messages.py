@@ -19,13 +19,12 @@ from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.export.track import write_gpx, write_kml
 from aerodaas.recording.pictures import detections_by_frame, frames
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.replay.timetables import read_timetables
+from aerodaas.recording.reader import Recording, vehicle_states
+from aerodaas.recording.replay.environment import read_timetables
 from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
-from aerodaas.recording.states import vehicle_states
 
 BROKEN: dict[str, bytes] = {
     "no JSON": b"\xff\x00",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from aerodaas.recording.playback.depth_picture import depth_picture
+from aerodaas.recording.playback.page_items import depth_picture
 
 
 def grey_of(depth: NDArray[np.uint16]) -> tuple[NDArray[np.int64], float]:

@@ -16,8 +16,7 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import Decision
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report.detection_diff import box_shift
-from aerodaas.recording.report.difference import difference
+from aerodaas.recording.report.difference import box_shift, difference
 
 
 def write(path: Path, messages: list[Message[Any]]) -> Path:

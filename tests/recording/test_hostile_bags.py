@@ -15,11 +15,11 @@ from ros_bags import EPOCH, SECOND, TYPES, Sent, odometry, write
 from aerodaas.errors import RecordingError
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
-from aerodaas.recording.ros import sqlite_part
+from aerodaas.recording.ros import bag as bag_reader
 from aerodaas.recording.ros.bag import RosBag
+from aerodaas.recording.ros.beginning import BagTopics
 from aerodaas.recording.ros.importing import ImportedBag, import_bag
 from aerodaas.recording.ros.outgoing import MessageBuilder
-from aerodaas.recording.ros.topics import BagTopics
 from aerodaas.recording.ros.typestore import DETECTIONS, ODOMETRY, ros_decoder
 
 TOPICS = BagTopics(odometry={"odometry": "/odom"})
@@ -94,8 +94,8 @@ def test_a_table_that_is_none_is_refused(tmp_path: Path, statement: str) -> None
 
 def test_work_without_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a file makes SQLite do, it is in proportion to the file's size."""
-    monkeypatch.setattr(sqlite_part, "_STEPS_A_BYTE", 0)
-    monkeypatch.setattr(sqlite_part, "_STEPS_AT_LEAST", 50_000)
+    monkeypatch.setattr(bag_reader, "_STEPS_A_BYTE", 0)
+    monkeypatch.setattr(bag_reader, "_STEPS_AT_LEAST", 50_000)
     bag = write(tmp_path / "bag", [odometry(index) for index in range(5000)], "SQLITE3")
     with pytest.raises(RecordingError, match="interrupted"):
         RosBag.open(bag)

@@ -33,9 +33,8 @@ from aerodaas.messages.vehicle import (
 )
 from aerodaas.recording.export.lerobot import ACTION, STATE, write_lerobot
 from aerodaas.recording.pictures import frames
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.states import vehicle_states
 
 TASK = "survey the field"
 CAMERA = "observation.images.camera"

@@ -17,7 +17,7 @@ from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.replay.timetables import read_timetables
+from aerodaas.recording.replay.environment import read_timetables
 from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.report import read_report, write_report

@@ -27,8 +27,7 @@ from aerodaas.recording.messages import CHANNELS
 from aerodaas.recording.pictures import detections, frames
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.replay.environment import replay_environment
-from aerodaas.recording.replay.timetables import read_timetables
+from aerodaas.recording.replay.environment import read_timetables, replay_environment
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.report import read_report
 

@@ -18,11 +18,10 @@ from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import RecordedOut
 from aerodaas.protocol.scenery import ShapeOut
 from aerodaas.recording.pictures import shots
-from aerodaas.recording.playback import decisions, track
-from aerodaas.recording.playback.decisions import DecisionSums
-from aerodaas.recording.playback.flight import read_flight
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.states import vehicle_states
+from aerodaas.recording.playback import flight as playback
+from aerodaas.recording.playback import track
+from aerodaas.recording.playback.flight import DecisionSums, read_flight
+from aerodaas.recording.reader import Recording, vehicle_states
 
 FLIGHT = SyntheticFlight(frames=2.0)
 FLIGHT_END = [step.status for step in FLIGHT.steps()][-1]
@@ -310,7 +309,7 @@ def test_decisions_are_summed_up_as_a_dispatcher_does() -> None:
 
 def test_many_decisions_are_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """To rows that grow, the last of which has everything."""
-    monkeypatch.setattr(decisions, "_MOST_ROWS", 20)
+    monkeypatch.setattr(playback, "_MOST_ROWS", 20)
     sums = DecisionSums()
     for number in range(1000):
         sums.take(outcome(number, "done", "edge"))

@@ -35,9 +35,8 @@ from aerodaas.recording.messages import (
     json_entry,
     labels_and_message,
 )
-from aerodaas.recording.pictures import detections, shots
+from aerodaas.recording.pictures import camera_of, detections, shots
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
 
 HEADER = Header(4, 5, "drone/cam")

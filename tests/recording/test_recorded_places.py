@@ -16,11 +16,11 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
+from aerodaas.recording.pictures import camera_of
 from aerodaas.recording.playback.flight import read_flight
 from aerodaas.recording.playback.page_items import packed_places
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.recorded_camera import camera_of
 from aerodaas.recording.recorder import FlightRecorder
 
 SOURCE, FOUND = "drone/cam", "drone/people"

@@ -22,11 +22,10 @@ from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
-from aerodaas.recording.states import vehicle_states
 
 ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
 TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)

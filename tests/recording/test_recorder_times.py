@@ -17,7 +17,7 @@ from aerodaas.messages.odometry import Battery
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.messages import Drops, Hop, Latency
-from aerodaas.recording.outcome import RecordingSummary
+from aerodaas.recording.output import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorder import FlightRecorder

@@ -21,7 +21,7 @@ from pydantic import BaseModel
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import plain, stream_of, topic
-from aerodaas.recording.rotation import OPTICAL, Rotation, compose, from_rpy
+from aerodaas.recording.reference_frames import OPTICAL, Rotation, compose, from_rpy
 
 ANGLES = st.floats(-math.pi, math.pi)
 ANYTHING = st.recursive(

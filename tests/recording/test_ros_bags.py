@@ -24,14 +24,13 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.pictures import detections, frames, shots
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros.bag import RosBag
 from aerodaas.recording.ros.bag_writer import write_bag
+from aerodaas.recording.ros.beginning import BagTopics
 from aerodaas.recording.ros.importing import import_bag
 from aerodaas.recording.ros.outgoing import MessageBuilder
-from aerodaas.recording.ros.topics import BagTopics
-from aerodaas.recording.states import vehicle_states
 from aerodaas.ros.incoming import odometry_of
 
 STORAGES = ("mcap", "sqlite3")

@@ -14,10 +14,11 @@ from aerodaas.recording.reader import Recording
 from aerodaas.recording.vehicle_log.alignment import (
     RecordedClock,
     align,
+    fit_clock_line,
     recorded_clocks,
     robot_of,
+    starts_of,
 )
-from aerodaas.recording.vehicle_log.clock_line import fit_clock_line, starts_of
 from aerodaas.recording.vehicle_log.dataflash import read_dataflash
 from aerodaas.recording.vehicle_log.log import VehicleLog
 

@@ -12,8 +12,8 @@ from aerodaas.analytics.base import Context
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.ros.bag import RosBag
 from aerodaas.recording.ros.bag_writer import write_bag
+from aerodaas.recording.ros.beginning import BagTopics
 from aerodaas.recording.ros.importing import import_bag
-from aerodaas.recording.ros.topics import BagTopics
 
 pytestmark = pytest.mark.slow
 

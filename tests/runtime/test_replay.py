@@ -35,7 +35,7 @@ from aerodaas.errors import RecordingError
 from aerodaas.messages.detections import Detection
 from aerodaas.recording.pictures import detections, frames, picture_topics
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.replay.timetables import read_timetables
+from aerodaas.recording.replay.environment import read_timetables
 from aerodaas.recording.report.difference import difference
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 7, "settings": {"width": 64, "height": 36}}

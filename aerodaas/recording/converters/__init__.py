@@ -7,7 +7,7 @@ fallback for its own type of item::
     def _(item: MyResult, message: Message[Any], session: Session) -> Iterator[Entry]: ...
 """
 
-from aerodaas.recording.converters import images, mission, notes, vehicle
+from aerodaas.recording.converters import images, mission, vehicle
 from aerodaas.recording.converters.base import Session, convert
 
-__all__ = ["Session", "convert", "images", "mission", "notes", "vehicle"]
+__all__ = ["Session", "convert", "images", "mission", "vehicle"]

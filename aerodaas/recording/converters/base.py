@@ -17,7 +17,7 @@ from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.recording.encoding import Entry, plain
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.messages import ItemRecord, json_entry
-from aerodaas.recording.rotation import Rotation
+from aerodaas.recording.reference_frames import Rotation
 
 __all__ = ["Session", "convert", "quaternion", "robot_of", "vector"]
 

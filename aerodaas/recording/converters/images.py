@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -27,17 +28,16 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
+from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame
-from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.messages import FrameInfo, json_entry
-from aerodaas.recording.report.overlay import VISIBLE
-from aerodaas.recording.report.palette import label_colour, rgb
-from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
+from aerodaas.recording.reference_frames import OPTICAL, compose, from_rpy
+from aerodaas.recording.report.overlay import VISIBLE, label_colour, rgb
 
-__all__: list[str] = []
+__all__ = ["EncodedFrame"]
 
 IMAGE = CompressedImage.get_schema()
 VIDEO = CompressedVideo.get_schema()
@@ -47,6 +47,22 @@ TRANSFORM = FrameTransform.get_schema()
 ANNOTATIONS = ImageAnnotations.get_schema()
 
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedFrame:
+    """What a `Frame` is, with its picture encoded."""
+
+    header: Header
+    data: bytes
+    format: str
+    """`jpeg`, `png` or `webp`."""
+    width: int
+    """Pixels across."""
+    height: int
+    """Pixels down."""
+    camera: CameraModel | None = None
+    odometry: Odometry | None = None
 
 
 @convert.register

@@ -29,9 +29,8 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.messages import MissionPlan, json_entry
-from aerodaas.recording.reference_frames import MAP_FRAME
-from aerodaas.recording.report.palette import OKABE_ITO, rgb
-from aerodaas.recording.rotation import from_rpy
+from aerodaas.recording.reference_frames import MAP_FRAME, from_rpy
+from aerodaas.recording.report.overlay import OKABE_ITO, rgb
 
 __all__ = ["fence_entries", "plan_entries"]
 

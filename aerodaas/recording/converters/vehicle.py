@@ -21,8 +21,7 @@ from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.converters.base import Session, convert, quaternion, robot_of, vector
 from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.messages import json_entry
-from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
-from aerodaas.recording.rotation import from_rpy
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist, from_rpy
 
 __all__ = ["body_frame"]
 

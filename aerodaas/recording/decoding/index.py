@@ -15,6 +15,7 @@ from io import BytesIO
 from typing import BinaryIO, cast
 
 import zstandard
+from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -23,8 +24,13 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import read_magic
 from mcap.summary import Summary
 
-from aerodaas.recording.decoding.limits import MAX_CHANNELS, MAX_METADATA, MAX_RATIO, MAX_UNPACKED
-from aerodaas.recording.decoding.unpacking import TooLargeError, unpacked
+from aerodaas.recording.decoding.limits import (
+    MAX_CHANNELS,
+    MAX_CHUNK,
+    MAX_METADATA,
+    MAX_RATIO,
+    MAX_UNPACKED,
+)
 
 __all__ = ["BROKEN", "Block", "FileIndex", "TooLargeError", "load", "read_index"]
 
@@ -56,6 +62,48 @@ _LONGEST_NAME = 4096
 """Bytes of an attachment's name that are read."""
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
+
+
+class TooLargeError(ValueError):
+    """A recording exceeds one of the bounds in `limits`."""
+
+
+def unpacked(chunk: Chunk) -> bytes:
+    """The records of a chunk.
+
+    Args:
+        chunk: The chunk as it is in the file.
+
+    Returns:
+        Its contents; `chunk.uncompressed_size` bytes.
+
+    Raises:
+        TooLargeError: If it has more than `MAX_CHUNK` bytes, or more than it says.
+        ValueError: If it is damaged, or packed in a way unknown.
+    """
+    size = chunk.uncompressed_size
+    if size > MAX_CHUNK:
+        raise TooLargeError(f"has a chunk of {size} bytes, more than {MAX_CHUNK}")
+    # One byte more than it says shows a lie without unpacking all of it.
+    if chunk.compression == "zstd":
+        reader = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK).stream_reader(
+            BytesIO(chunk.data), read_across_frames=True
+        )
+        data = reader.read(size + 1)
+    elif chunk.compression == "lz4":
+        try:
+            data = LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        except RuntimeError as error:
+            raise ValueError(f"LZ4: {error}") from None
+    elif not chunk.compression:
+        data = chunk.data
+    else:
+        raise ValueError(f"chunks packed by {chunk.compression!r} cannot be read")
+    if len(data) > size:
+        raise TooLargeError(f"has a chunk with more than the {size} bytes that it claims")
+    if len(data) < size:
+        raise ValueError(f"a chunk has {len(data)} of {size} bytes")
+    return data
 
 
 @dataclass(slots=True)

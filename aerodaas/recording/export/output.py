@@ -1,4 +1,4 @@
-"""Output files of exports; existing files are never overwritten."""
+"""Output files of exports: existing ones are never overwritten, and no cell is a formula."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from pathlib import Path
 
 from aerodaas.errors import RecordingError
 
-__all__ = ["file_name", "new_file"]
+__all__ = ["file_name", "harmless", "new_file"]
 
-
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+"""Beginnings of formulas, by OWASP's "CSV Injection"."""
 _LONGEST = 100
 """Most characters of a name from a recording, which may have any; systems take 255 bytes."""
+
+
+def harmless(cell: object) -> object:
+    """A cell; a text that a spreadsheet would compute is led by an apostrophe (OWASP)."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULAS) else cell
 
 
 def file_name(topic: str) -> str:

@@ -14,8 +14,7 @@ from google.protobuf.message import Message
 from aerodaas.clock import seconds
 from aerodaas.errors import RecordingError
 from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
-from aerodaas.recording.export.cells import harmless
-from aerodaas.recording.export.output import file_name, new_file
+from aerodaas.recording.export.output import file_name, harmless, new_file
 from aerodaas.recording.reader import Recording
 
 __all__ = ["table_of", "write_csv", "write_parquet"]

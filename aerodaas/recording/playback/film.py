@@ -17,7 +17,7 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.schema import MessageError
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.messages import NavigationRecord
-from aerodaas.recording.pictures import Shot, detections, shots
+from aerodaas.recording.pictures import Shot, camera_of, detections, shots
 from aerodaas.recording.playback.page_items import (
     packed_depth,
     packed_picture,
@@ -25,7 +25,6 @@ from aerodaas.recording.playback.page_items import (
     packed_target,
 )
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.recorded_camera import camera_of
 
 __all__ = ["NAVIGATION_SCHEMA", "Captures", "Film", "Packed"]
 

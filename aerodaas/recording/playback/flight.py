@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -14,25 +15,79 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import AlertOut, RecordedOut
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.messages import MissionPlan
-from aerodaas.recording.pictures import DETECTIONS_SCHEMA, picture_topics
-from aerodaas.recording.playback.decisions import DecisionSums
+from aerodaas.recording.pictures import (
+    CALIBRATION_SCHEMA,
+    DETECTIONS_SCHEMA,
+    MOUNT_SCHEMA,
+    picture_topics,
+)
 from aerodaas.recording.playback.film import NAVIGATION_SCHEMA, Captures, Film
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
-from aerodaas.recording.recorded_camera import CALIBRATION_SCHEMA, MOUNT_SCHEMA
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
 from aerodaas.simulation.scenario import scenario_names
 
-__all__ = ["read_flight"]
+__all__ = ["DecisionSums", "read_flight"]
 
+_ROW_SECONDS = 0.5
+_MOST_ROWS = 12_000
+"""Sums that are kept; beyond, every second one is left out."""
+_OUTCOMES = frozenset({"done", "late", "timeout", "failed", "dropped"})
+"""Names of `TaskOutcome`."""
 _SCHEMAS = frozenset(
     f"aerodaas.{name}" for name in ("VehicleState", "MissionStatus", "Plan", "Alert", "Decision")
 )
 _EACH = 1000
 """Messages between two words on the progress."""
+
+
+class DecisionSums:
+    """Sums over the decisions up to each time, as a dispatcher reports them in flight."""
+
+    def __init__(self) -> None:
+        self._rows: list[AnalyticsOut] = []
+        self._interval = _ROW_SECONDS
+        self._outcomes: Counter[str] = Counter()
+        self._places: Counter[str] = Counter()
+        self._totals = {"qos_total": 0.0, "qoe_total": 0.0}
+        self._last: float | None = None
+
+    @property
+    def rows(self) -> list[AnalyticsOut]:
+        """The sums so far, the newest last."""
+        if self._last is None or (self._rows and self._rows[-1].time >= self._last):
+            return self._rows
+        return [*self._rows, *self._row(self._last)]
+
+    def take(self, decision: Decision) -> None:
+        """Take one decision or outcome."""
+        now, action = seconds(decision.stamp), decision.action
+        if action == "drop":
+            # A task that its scheduler gives up ends by that.
+            self._outcomes["dropped"] += 1
+        elif action in _OUTCOMES:
+            self._outcomes[action] += 1
+            # An outcome's reason begins with where the task ran.
+            self._places[decision.reason.partition(":")[0]] += 1
+        else:
+            return
+        figures = decision.values
+        self._totals |= {name: figures[name] for name in self._totals if name in figures}
+        if self._last is None or now >= self._last:
+            self._last = now
+        if not self._rows or now >= self._rows[-1].time + self._interval:
+            self._rows += self._row(now)
+        if len(self._rows) > _MOST_ROWS:
+            self._interval *= 2
+            del self._rows[1::2]
+
+    def _row(self, time: float) -> list[AnalyticsOut]:
+        values = {"outcomes": self._outcomes, "places": self._places, **self._totals}
+        row = AnalyticsOut.of(time, values)
+        return [] if row is None else [row]
 
 
 def read_flight(

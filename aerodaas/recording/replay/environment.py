@@ -1,16 +1,19 @@
-"""Environment for the replay of a recording, with its hardware played from the file."""
+"""What the replay of a recording needs: an environment with players, and each source's times."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, validated
-from aerodaas.recording.encoding import topic
-from aerodaas.recording.reader import Recording
+from aerodaas.messages.frames import Header
+from aerodaas.recording.encoding import stream_of, topic
+from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_environment import allowed_content, merged, recorded_content
 
-__all__ = ["replay_environment"]
+__all__ = ["read_timetables", "replay_environment"]
 
 _FINITE = frozenset({"folder", "recorded", "video", "mcap"})
 """Camera drivers that may run out of images, which ends a mission that depends on them."""
@@ -64,3 +67,64 @@ def _play(sensor: dict[str, Any], stream: str, path: Path) -> None:
     played = {"path": str(path), "topic": topic(stream, "image"), "loop": endless}
     sensor["settings"] = lens | played
     sensor["driver"] = "replayed"
+
+
+class _Reading:
+    """Collects timestamps by stream, message by message."""
+
+    def __init__(self) -> None:
+        self.stamps: dict[str, set[int]] = defaultdict(set)
+
+    def frame(self, record: Record) -> None:
+        self._add(record.value.header)
+
+    def reading(self, record: Record) -> None:
+        """Add a sensor's reading; its stream is the topic without the kind of data."""
+        name = record.topic.strip("/")
+        # The topic of a stream that is named after its kind of data does not repeat the kind.
+        for stream in (name, name.rpartition("/")[0]):
+            self.stamps[stream_of(stream)].add(record.stamp)
+
+    def result(self, record: Record) -> None:
+        """Add an analysis's result if the analysis has no inputs and measures itself."""
+        header: Header = record.value.header
+        if header.source == stream_of(record.topic.strip("/").rpartition("/")[0]):
+            self._add(header)
+
+    def latency(self, record: Record) -> None:
+        """Add a message that passed through one actor only and is thus a measurement."""
+        if len(record.value.hops) == 1:
+            self.stamps[record.value.stream].add(record.captured)
+
+    def _add(self, header: Header) -> None:
+        self.stamps[header.source].add(header.stamp)
+
+
+def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
+    """Read the measurement times of each source.
+
+    Args:
+        path: The MCAP file.
+
+    Returns:
+        Sorted timestamps (mission time, nanoseconds) by stream.
+
+    Raises:
+        RecordingError: If the recording cannot be read.
+    """
+    with Recording.open(path) as recording:
+        found = _Reading()
+        readers: dict[str, Callable[[Record], None]] = {
+            "aerodaas.Frame": found.frame,
+            "foxglove.Odometry": found.reading,
+            "foxglove.LocationFix": found.reading,
+            "aerodaas.Battery": found.reading,
+            "aerodaas.MissionStatus": found.reading,
+            "aerodaas.Detections": found.result,
+            "aerodaas.Navigation": found.result,
+            "aerodaas.Value": found.result,
+            "aerodaas.Latency": found.latency,
+        }
+        for record in recording.records(schemas=readers):
+            readers[record.schema](record)
+    return {stream: tuple(sorted(stamps)) for stream, stamps in found.stamps.items()}

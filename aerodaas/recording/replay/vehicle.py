@@ -12,8 +12,7 @@ from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.states import vehicle_states
+from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.simulation.actuators import SimulatedActuators
 
 __all__ = ["ReplayedVehicle"]

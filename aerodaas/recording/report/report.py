@@ -13,10 +13,14 @@ from aerodaas.config.extras import has_extra
 from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
+from aerodaas.recording.report.moments import (
+    MomentPicture,
+    contact_sheet,
+    key_moments,
+    picture_moments,
+)
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.plot import Plot
-from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.vehicle_log.attachment import AttachedLog, attached_logs
 

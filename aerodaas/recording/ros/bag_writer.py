@@ -16,10 +16,9 @@ from aerodaas.geometry.frames import is_finite
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, shots
 from aerodaas.recording.reader import Record, Recording
-from aerodaas.recording.reference_frames import MAP_FRAME, base_link
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link, from_rpy
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.outgoing import MessageBuilder
-from aerodaas.recording.rotation import from_rpy
 from aerodaas.ros.names import permitted_topic
 
 if TYPE_CHECKING:

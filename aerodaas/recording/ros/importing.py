@@ -31,14 +31,13 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
-from aerodaas.recording.encoded_frame import EncodedFrame
-from aerodaas.recording.outcome import RecordingSummary
+from aerodaas.recording.converters.images import EncodedFrame
+from aerodaas.recording.output import RecordingSummary
 from aerodaas.recording.provenance import Provenance, package_versions
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
-from aerodaas.recording.ros.beginning import Beginning
-from aerodaas.recording.ros.topics import BagTopics
+from aerodaas.recording.ros.beginning import BagTopics, Beginning
 from aerodaas.ros.incoming import battery_of, detection_items, fix_of, odometry_of
 
 __all__ = ["ImportedBag", "import_bag"]

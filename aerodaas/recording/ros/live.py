@@ -13,11 +13,10 @@ from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.vehicle import VehicleState
-from aerodaas.recording.encoded_frame import EncodedFrame
-from aerodaas.recording.reference_frames import MAP_FRAME, base_link
+from aerodaas.recording.converters.images import EncodedFrame
+from aerodaas.recording.reference_frames import MAP_FRAME, OPTICAL, base_link, compose, from_rpy
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.outgoing import MessageBuilder
-from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
 from aerodaas.ros.link import RosLink, RosPublisher
 from aerodaas.ros.names import permitted_topic, ros_type
 

@@ -18,9 +18,8 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
+from aerodaas.recording.reference_frames import MAP_FRAME, Rotation, base_link, body_twist, from_rpy
 from aerodaas.recording.ros import typestore
-from aerodaas.recording.rotation import Rotation, from_rpy
 
 __all__ = ["MessageBuilder"]
 

@@ -14,8 +14,8 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.overlay import OKABE_ITO
 from aerodaas.recording.report.page.figures import png_of
-from aerodaas.recording.report.palette import OKABE_ITO
 from aerodaas.recording.report.plots.style import mark
 from aerodaas.recording.report.plots.trajectory import trajectory_figure
 from aerodaas.service.limits import Outline

@@ -45,18 +45,16 @@ from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorded_environment import left_out, recorded_content
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.replay.environment import replay_environment
+from aerodaas.recording.replay.environment import read_timetables, replay_environment
 from aerodaas.recording.replay.mcap_camera import McapCamera, ReplayedCamera
-from aerodaas.recording.replay.timetables import read_timetables
 from aerodaas.recording.replay.vehicle import ReplayedVehicle
 from aerodaas.recording.report.comparison import comparison_page
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.report.moments import key_moments, picture_moments
+from aerodaas.recording.report.moments import contact_sheet, key_moments, picture_moments
 from aerodaas.recording.report.page.figures import log_plots, plots_of
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
-from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.vehicle_log.attachment import attached_logs
 

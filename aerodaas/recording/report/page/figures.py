@@ -13,11 +13,16 @@ from matplotlib.figure import Figure
 
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.plot import Plot
-from aerodaas.recording.report.plots.latency import latency_figure
-from aerodaas.recording.report.plots.loads import loads_figure
-from aerodaas.recording.report.plots.outcomes import outcomes_figure
-from aerodaas.recording.report.plots.timeline import timeline_figure
-from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
+from aerodaas.recording.report.plots.performance import (
+    latency_figure,
+    loads_figure,
+    outcomes_figure,
+)
+from aerodaas.recording.report.plots.trajectory import (
+    profile_figure,
+    timeline_figure,
+    trajectory_figure,
+)
 from aerodaas.recording.report.plots.vehicle_log import log_figures
 from aerodaas.recording.vehicle_log.attachment import AttachedLog
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from aerodaas.recording.report.flight import RobotFlight
-from aerodaas.recording.report.palette import OKABE_ITO, STATE_COLOURS
+from aerodaas.recording.report.overlay import OKABE_ITO, STATE_COLOURS
 
 __all__ = [
     "CYCLE",

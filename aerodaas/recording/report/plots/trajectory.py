@@ -1,4 +1,4 @@
-"""Plots of the flight from above and from the side."""
+"""Plots of the flight from above, from the side, and over mission time."""
 
 from __future__ import annotations
 
@@ -13,10 +13,19 @@ from numpy.typing import NDArray
 
 from aerodaas.clock import seconds
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
-from aerodaas.recording.report.palette import STATE_COLOURS, label_colour
-from aerodaas.recording.report.plots.style import colours_of, grid, legend, mark, new_figure
+from aerodaas.recording.report.overlay import OKABE_ITO, STATE_COLOURS, label_colour
+from aerodaas.recording.report.plots.style import (
+    colours_of,
+    grid,
+    legend,
+    mark,
+    name_states,
+    new_figure,
+    shade_states,
+    words,
+)
 
-__all__ = ["profile_figure", "trajectory_figure"]
+__all__ = ["profile_figure", "timeline_figure", "trajectory_figure"]
 
 _STAYING = 0.6
 """Metres within which a drone counts as stationary …"""
@@ -31,6 +40,47 @@ _APART = 1.0
 """Metres between the marks of one label: an object seen 15 times a second is marked once."""
 
 Floats = NDArray[np.float64]
+
+
+def timeline_figure(flight: RecordedFlight) -> Figure:
+    """Height and battery over mission time, shaded by mission state; two rows per robot."""
+    robots = {name: robot for name, robot in flight.robots.items() if robot.states}
+    rows = max(1, len(robots))
+    figure = new_figure(1.0 + 3.0 * rows)
+    both = figure.subplots(2 * rows, 1, sharex=True, squeeze=False)[:, 0]
+    handles: dict[str, Artist] = {}
+    for (name, robot), height, charge in zip(robots.items(), both[::2], both[1::2], strict=False):
+        suffix = f" of {name}" if rows > 1 else ""
+        height.plot(robot.time, robot.position[:, 2], color=OKABE_ITO["blue"], linewidth=1.8)
+        height.set_ylabel(f"Height{suffix}\nabove home (m)")
+        charge.plot(robot.time, 100 * robot.battery, color=OKABE_ITO["vermilion"], linewidth=1.8)
+        charge.set_ylabel(f"Battery{suffix} (%)")
+        charge.set_ylim(0, 103)
+        height.margins(x=0, y=0.15)
+        for axes in (height, charge):
+            grid(axes, "y")
+            handles |= {str(one.get_label()): one for one in shade_states(axes, robot)}
+        name_states(height, robot)
+        _mark_alerts(height, flight)
+    both[-1].set_xlabel("Mission time (s)")
+    legend(figure, list(handles.values()))
+    return figure
+
+
+def _mark_alerts(axes: Axes, flight: RecordedFlight) -> None:
+    """Mark the first alert of each kind; a monitor may repeat itself hundreds of times."""
+    first: dict[str, float] = {}
+    for time, kind, _ in flight.alerts:
+        first.setdefault(kind, time)
+    for row, (kind, time) in enumerate(first.items()):
+        axes.axvline(time, color="black", linestyle=":", linewidth=1)
+        axes.text(
+            time,
+            0.5 - 0.1 * (row % 4),
+            f" {words(kind)}",
+            transform=axes.get_xaxis_transform(),
+            fontsize=9,
+        )
 
 
 def trajectory_figure(
