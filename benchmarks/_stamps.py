@@ -83,7 +83,7 @@ def _work(original: Any, self: Any, message: Any) -> None:  # noqa: ANN401
     original(self, message)
 
 
-def _take(original: Any, self: Any, message: Any, now: int) -> None:  # noqa: ANN401
+def _receive(original: Any, self: Any, message: Any, now: int) -> None:  # noqa: ANN401
     if message.stream in self.spec.navigation:
         _note("work", message)
     original(self, message, now)
@@ -101,7 +101,7 @@ def install() -> None:
     _wrap(local_subscriber.LocalSubscriber, "_ready", _ready)
     _wrap(subscriber, "decode", _decode)
     _wrap(AnalysisNode, "_process_input", _work)
-    _wrap(VehicleController, "take", _take)
+    _wrap(VehicleController, "receive", _receive)
 
 
 def dump() -> None:
