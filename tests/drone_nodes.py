@@ -59,7 +59,6 @@ def robot_spec(
     *initial: Command,
     navigation: tuple[str, ...] = (),
     commands: tuple[str, ...] = (),
-    requesters: tuple[str, ...] = (),
 ) -> RobotSpec:
     """A robot without sensors, whose plans need no process of their own."""
     return RobotSpec(
@@ -67,7 +66,6 @@ def robot_spec(
         sensors=(),
         navigation=navigation,
         commands=commands,
-        requesters=requesters,
         initial=tuple(initial),
         scheduler=_InThisProcess(),
     )
@@ -82,7 +80,6 @@ class DroneFlight:
         robots: Sequence[dict[str, Any]],
         initial: Mapping[str, Sequence[Command]],
         navigation: tuple[str, ...] = (),
-        requesters: tuple[str, ...] = (),
     ) -> None:
         """Start the nodes.
 
@@ -91,7 +88,6 @@ class DroneFlight:
             robots: Robots of the environment.
             initial: Commands before the start, by robot.
             navigation: Streams of navigation of each robot.
-            requesters: Analyses that command each robot.
         """
         content = {"name": "nodes", "robots": robots, "simulation": {"world": "empty"}}
         environment = EnvironmentConfig.model_validate(content)
@@ -102,9 +98,7 @@ class DroneFlight:
         self._outlets: dict[str, Outlet] = {}
         for name in names:
             specs = tuple(
-                robot_spec(
-                    configs[one], *initial[one], navigation=navigation, requesters=requesters
-                )
+                robot_spec(configs[one], *initial[one], navigation=navigation)
                 for one in name.split("+")
             )
             node = DroneNode(

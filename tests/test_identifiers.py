@@ -30,8 +30,6 @@ NAMERS = [
     _names.status_stream,
     _names.setpoint_stream,
     _names.end_stream,
-    _names.request_stream,
-    _names.reply_stream,
     _names.task_stream,
     _names.done_stream,
 ]

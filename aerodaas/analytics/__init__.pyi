@@ -1,7 +1,5 @@
 from .base import Analytics as Analytics
 from .base import NavigableAnalytics as NavigableAnalytics
-from .commanding import CommandingAnalytics as CommandingAnalytics
-from .commanding import MissionLink as MissionLink
 from .conditions import Above as Above
 from .conditions import Below as Below
 from .conditions import Near as Near

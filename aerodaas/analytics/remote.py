@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 
 from pydantic import ValidationError
 
-from aerodaas.analytics.base import Context, ResourceUse
-from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
+from aerodaas.analytics.base import Context, NavigableAnalytics, ResourceUse
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError
@@ -21,7 +20,7 @@ TOKEN_VARIABLE = "AERODAAS_REMOTE_TOKEN"  # noqa: S105 - a name, not a secret
 """Environment variable of the token, for the application and its clients."""
 
 
-class RemoteAnalytics(CommandingAnalytics):
+class RemoteAnalytics(NavigableAnalytics):
     """Opens the flight's API on the network: waypoints in, commands in, state and pictures out.
 
     The application's own process serves the API while it flies. Analyse any stream of the robot, or
@@ -70,9 +69,6 @@ class RemoteAnalytics(CommandingAnalytics):
                 f"remote control does not listen on {self.settings.host} without a token: set "
                 f"{TOKEN_VARIABLE}, or remote.token in the environment file"
             )
-
-    def begin(self, mission: MissionLink) -> None:
-        """Do nothing: the application's process serves."""
 
     def process(self, item: object, context: Context) -> None:
         """Do nothing: waypoints arrive by the API."""

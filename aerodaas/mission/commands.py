@@ -26,8 +26,6 @@ __all__ = [
     "RearrangeNavigation",
     "ReleaseControls",
     "ReleaseParachute",
-    "Reply",
-    "Request",
     "Resume",
     "ReturnHome",
     "Start",
@@ -239,22 +237,6 @@ class Answer:
     """One sentence for the operator."""
     refused: Mapping[str, str] = field(default_factory=dict)
     """Reason by waypoint id, for refused waypoints."""
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """A command whose sender waits for a `Reply` with the same number."""
-
-    number: int
-    command: Command
-
-
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """The mission's answer to a `Request`."""
-
-    number: int
-    answer: Answer
 
 
 def initial_commands(edges: Iterable[NavigationEdge]) -> list[Command]:

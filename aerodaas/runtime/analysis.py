@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-import queue
-import secrets
-import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from itertools import count
 from typing import Any
 
 from aerodaas.analytics.base import Analytics, ComputeKind
-from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.clock import Clock, host_time_ns
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import failure_line
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.mission import MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
-from aerodaas.mission.commands import Answer, Command, Reply, Request, StreamItem
-from aerodaas.mission.state_machine import TERMINAL
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.session import FRAME_DEPTH, Session
-from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.runtime.triggers import TriggerSpec, fire
 
 __all__ = ["AnalysisNode", "AnalysisSpec", "Wake"]
 
 _WAKE_DEPTH = 8
-_REPLY_DEPTH = 64
 
 
 @dataclass(frozen=True)
@@ -50,7 +38,7 @@ class AnalysisSpec:
     inputs: dict[str, int]
     """Input streams and their queue depths."""
     robot: str
-    """Robot that its data belongs to, or that it commands."""
+    """Robot that its data belongs to."""
     state: str
     """Stream of the vehicle states of that robot."""
     external: bool
@@ -85,10 +73,6 @@ class AnalysisNode(Node):
             **dict.fromkeys(spec.wakes, _WAKE_DEPTH),
             spec.state: 1,
         }
-        self._link: _StreamLink | None = None
-        if isinstance(spec.work, CommandingAnalytics):
-            self._link = _StreamLink(self, spec)
-            reads.update(self._link.reads)
         super().__init__(spec.stream, reads)
         self.spec = spec
         self.busy = 0.0
@@ -102,8 +86,6 @@ class AnalysisNode(Node):
         self._results = self.outlet(spec.stream)
         for trigger in spec.triggers:
             self.outlet(trigger.stream)
-        if self._link is not None:
-            self.outlet(request_stream(spec.stream))
         self._woken: int | None = None if spec.dormant else -1
         """Timestamp of the measurement that woke it; None while dormant."""
         self._vehicle: VehicleState | None = None
@@ -119,14 +101,9 @@ class AnalysisNode(Node):
         self._opened = True
 
     def start(self, clock: Clock) -> Sequence[Message[Any]]:
-        """Begin: an analysis that commands is given its link to the mission."""
+        """Begin: an external source knows when it measures first."""
         if self.spec.external:
             self._due = self._next_due(clock.now() - 1)
-        if self._link is not None and isinstance(self.spec.work, CommandingAnalytics):
-            try:
-                self.spec.work.begin(self._link)
-            except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
-                self._report(error)
         return ()
 
     @property
@@ -144,8 +121,6 @@ class AnalysisNode(Node):
         if now >= self._due:
             self._due = self._next_due(now)
             self._measure(now)
-        if self._link is not None:
-            self._out += self._link.requests()
         published, self._out = self._out, []
         return published
 
@@ -154,8 +129,6 @@ class AnalysisNode(Node):
 
     def _receive(self, message: Message[Any]) -> None:
         self._frames.note(message)
-        if self._link is not None:
-            self._link.receive(message)
         if message.stream == self.spec.state:
             self._vehicle = message.item or self._vehicle
         elif isinstance(message.item, Wake):
@@ -254,74 +227,3 @@ class AnalysisNode(Node):
     def alert(self, alert: Alert) -> None:
         """Publish an alert."""
         self.host.alert(alert.kind, alert.text, alert.header.stamp, alert.values)
-
-
-class _StreamLink:
-    """A `MissionLink` by the request and reply streams of one analysis; thread-safe."""
-
-    def __init__(self, node: AnalysisNode, spec: AnalysisSpec) -> None:
-        self.reads = {status_stream(spec.robot): 1, reply_stream(spec.stream): _REPLY_DEPTH}
-        self._node = node
-        self._name = spec.stream
-        # A node that was set up again must not accept replies to its predecessor as its own.
-        self._numbers = count(secrets.randbits(48))
-        self._pending: dict[int, Future[Answer]] = {}
-        self._requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
-        self._lock = threading.Lock()
-        self._status: MissionStatus | None = None
-        self._vehicle: VehicleState | None = None
-
-    def receive(self, message: Message[Any]) -> None:
-        """Handle a message that the node has received."""
-        item = message.item
-        if isinstance(item, MissionStatus):
-            self._status = item
-        elif isinstance(item, VehicleState):
-            self._vehicle = item
-        elif isinstance(item, Reply):
-            with self._lock:
-                future = self._pending.pop(item.number, None)
-            if future is not None and future.set_running_or_notify_cancel():
-                future.set_result(item.answer)
-
-    def requests(self) -> list[Message[Any]]:
-        """The requests made since the last call, to be published."""
-        outlet = self._node.outlet(request_stream(self._name))
-        messages = []
-        while not self._requests.empty():
-            request = self._requests.get()
-            header = Header(request.number, self._node.host.now(), self._name)
-            messages.append(outlet.measure(request, header, host_time_ns()))
-        return messages
-
-    def status(self) -> MissionStatus | None:
-        """The newest status of the mission; None before the first."""
-        return self._status
-
-    def vehicle(self) -> VehicleState | None:
-        """The newest state of the vehicle; None before the first."""
-        return self._vehicle
-
-    def command(self, command: Command) -> Future[Answer]:
-        """Send a command as a request; the node completes the future."""
-        future: Future[Answer] = Future()
-        status = self._status
-        if status is not None and status.state in TERMINAL:
-            text = f"the mission is over: {status.state.value}"
-            future.set_result(Answer(accepted=False, text=text))
-            return future
-        with self._lock:
-            number = next(self._numbers)
-            self._pending[number] = future
-            self._requests.put(Request(number, command))
-        future.add_done_callback(lambda _: self._pending.pop(number, None))
-        self._node.host.wake()
-        return future
-
-    def fly(self, navigation: AeroNavigation, index: int | None = None) -> Future[Answer]:
-        """Add navigation as an item of the analysis' own stream."""
-        return self.command(StreamItem(self._name, navigation, index=index, replaces=False))
-
-    def alert(self, alert: Alert) -> None:
-        """Publish an alert."""
-        self._node.host.alert(alert.kind, alert.text, values=alert.values)

@@ -29,8 +29,6 @@ from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
     Command,
-    Reply,
-    Request,
     Start,
     StreamItem,
 )
@@ -45,8 +43,6 @@ from aerodaas.runtime.reports import Latencies
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import (
     photo_stream,
-    reply_stream,
-    request_stream,
     setpoint_stream,
     state_stream,
     status_stream,
@@ -82,8 +78,6 @@ class RobotSpec:
     """Streams of navigation for its mission."""
     commands: tuple[str, ...]
     """Streams that carry commands from triggers and cameras."""
-    requesters: tuple[str, ...]
-    """Analyses that command its mission and wait for an answer."""
     initial: tuple[Command, ...]
     """Navigation known before take-off."""
     scheduler: TrajectoryScheduler
@@ -122,7 +116,6 @@ class VehicleController:
         """How many of the mission's pictures have been published."""
         self._turned = -1
         self._outlets: Mapping[str, Outlet] = {}
-        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
         self._failures = 0
         """Loop cycles in a row that raised."""
@@ -200,7 +193,6 @@ class VehicleController:
     def grow(self, spec: RobotSpec) -> None:
         """Accept the further streams of `spec`."""
         self.spec = spec
-        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
 
     def use_planner(self, planner: Planner) -> None:
         """Use `planner` from now on, starting with the current queue."""
@@ -226,7 +218,7 @@ class VehicleController:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def receive(self, message: Message[Any], now: int) -> None:
-        """Handle a received message: navigation, a trigger's command, or a request."""
+        """Handle a received message: navigation, or a trigger's command."""
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
@@ -234,10 +226,6 @@ class VehicleController:
             self.mission.handle(StreamItem(message.stream, message.item, message.header), now)
         elif message.stream in self.spec.commands:
             self.mission.handle(message.item, now)
-        elif message.stream in self._replies and isinstance(message.item, Request):
-            answer = self.mission.handle(message.item.command, now)
-            reply = Reply(message.item.number, answer)
-            self._publish(self._replies[message.stream], reply, now)
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """Execute one cycle of the setpoint loop and publish setpoint and status.

@@ -18,7 +18,7 @@ from aerodaas.runtime.controller import MakePlanner, RobotSpec, VehicleControlle
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.reports import RobotReport
 from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, Session, next_due
-from aerodaas.runtime.stream_names import reply_stream, request_stream, whereabouts_stream
+from aerodaas.runtime.stream_names import whereabouts_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["DroneNode", "failure_of"]
@@ -81,7 +81,7 @@ class DroneNode(Node):
             _at_once(VehicleController.disconnect, controllers)
             raise
         for spec, controller in zip(self._specs, controllers, strict=True):
-            for stream in (*VehicleController.streams(spec), *map(reply_stream, spec.requesters)):
+            for stream in VehicleController.streams(spec):
                 self.outlet(stream)
             controller.open(self.outlets)
             self._controllers[controller.id] = controller
@@ -224,8 +224,6 @@ class DroneNode(Node):
             now: Mission time, nanoseconds.
         """
         for spec in robots:
-            for stream in map(reply_stream, spec.requesters):
-                self.outlet(stream)
             self._controllers[spec.robot.id].grow(spec)
         self.reads.update(dict.fromkeys(_streams(robots), MESSAGE_DEPTH))
         self._specs, self._observed = robots, observed
@@ -304,9 +302,7 @@ def _at_once(
 
 def _streams(robots: Iterable[RobotSpec]) -> list[str]:
     """Streams that the node of these robots reads."""
-    robots = tuple(robots)
-    streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
-    return streams + [request_stream(node) for robot in robots for node in robot.requesters]
+    return [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
 
 
 def _silent(robot: str) -> str:

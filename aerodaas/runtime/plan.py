@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.analytics.base import Analytics
-from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config.model import (
     ComputeConfig,
     RobotConfig,
@@ -391,11 +390,6 @@ class _Planner:
             sensors=tuple(node.work for node in mine if node.work.type != "camera"),
             navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
             commands=tuple(commanding),
-            requesters=tuple(
-                node.id
-                for node in self.analyses()
-                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
-            ),
             initial=tuple(initial_commands(edges)),
             scheduler=self.scheduler,
         )

@@ -10,8 +10,6 @@ __all__ = [
     "done_stream",
     "end_stream",
     "photo_stream",
-    "reply_stream",
-    "request_stream",
     "setpoint_stream",
     "state_stream",
     "status_stream",
@@ -33,16 +31,6 @@ def state_stream(robot: str) -> str:
 def status_stream(robot: str) -> str:
     """Name of the stream of a robot's mission status."""
     return internal(robot, "status")
-
-
-def request_stream(node: str) -> str:
-    """Name of the stream of an analysis' requests to the mission."""
-    return internal(node, "requests")
-
-
-def reply_stream(node: str) -> str:
-    """Name of the stream of the mission's replies to an analysis."""
-    return internal(node, "replies")
 
 
 def setpoint_stream(robot: str) -> str:

@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.config.plugins import load_plugin
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
@@ -181,7 +181,7 @@ def _require_senses_only(document: MissionDocument) -> None:
     for entry in document.analyses:
         commands = [one.command for one in entry.triggers if one.command is not None]
         kind = None if entry.analysis is None else load_plugin("analytics", entry.analysis)
-        if commands or (isinstance(kind, type) and issubclass(kind, CommandingAnalytics)):
+        if commands or (isinstance(kind, type) and issubclass(kind, RemoteAnalytics)):
             what = commands[0] if commands else f"its {entry.analysis}"
             raise RefusedError(
                 _UNPROCESSABLE,

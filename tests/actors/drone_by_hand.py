@@ -36,7 +36,6 @@ def drone_by_hand(
     *initial: Command,
     speed: float,
     navigation: tuple[str, ...] = (),
-    requesters: tuple[str, ...] = (),
     locks: Path | None = None,
     **settings: Any,  # noqa: ANN401
 ) -> DroneByHand:
@@ -48,7 +47,7 @@ def drone_by_hand(
     }
     environment = EnvironmentConfig.model_validate(content)
     (only,) = environment.robots
-    spec = robot_spec(only, *initial, navigation=navigation, requesters=requesters)
+    spec = robot_spec(only, *initial, navigation=navigation)
     session, name = Session(environment, speed, locks=locks), "drone/drone"
     actor = DroneByHand(session, name, (spec,))
     actor.open_here()

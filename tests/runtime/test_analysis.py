@@ -11,21 +11,17 @@ from hosts import Hand, published
 
 from aerodaas import Analytics, Frame
 from aerodaas.analytics.base import Context
-from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
-from aerodaas.mission.commands import Answer, End, Reply, Request
 from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec, Wake
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame
 from aerodaas.runtime.node import NEVER
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.stream_names import reply_stream, request_stream, status_stream
 from aerodaas.runtime.triggers import TriggerSpec
 
 _NODE, _INPUT, _STATE, _WAKE = "drone/double", "drone/number", "drone/@state", "drone/@wake"
@@ -70,24 +66,6 @@ class Count(Analytics[int]):
             header = Header(0, context.now(), "count")
             context.alert(Alert(header, "third", "three calls", {"calls": 3}))
         return None if self.calls == 2 else self.calls
-
-
-class Pilot(CommandingAnalytics):
-    """Commands the mission by the link that it is given."""
-
-    link: MissionLink
-
-    def begin(self, mission: MissionLink) -> None:
-        """Keep the link."""
-        self.link = mission
-
-
-class Grounded(CommandingAnalytics):
-    """Cannot begin."""
-
-    def begin(self, mission: MissionLink) -> None:  # noqa: ARG002
-        """Raise."""
-        raise OSError("no radio")
 
 
 def spec_of(work: Analytics[Any], **changes: Any) -> AnalysisSpec:  # noqa: ANN401
@@ -264,48 +242,6 @@ def test_a_task_refers_to_a_frame_that_the_node_has_received() -> None:
     unknown = FrameReference("drone/cam", 9)
     assert items(node.step(7, [published(_INPUT, unknown, 5)])) == [(_NODE, MissingFrame(unknown))]
     assert items(node.step(8, [published(_INPUT, frame, 5)])) == [(_NODE, 7.0)]
-
-
-def test_a_command_is_a_request_that_a_reply_answers() -> None:
-    """It wakes the node, is published at its next step, and its future holds the answer."""
-    work, host = Pilot(), Hand()
-    node = node_of(work, host)
-    answer = work.link.command(End())
-    assert host.wakes == 1
-    ((stream, request),) = items(node.step(10, []))
-    assert stream == request_stream(_NODE)
-    assert isinstance(request, Request)
-    assert request.command == End()
-    other = Reply(request.number + 1, Answer(accepted=True))
-    node.step(20, [published(reply_stream(_NODE), other, 20)])
-    assert not answer.done()
-    said = Answer(accepted=False, text="not now")
-    node.step(30, [published(reply_stream(_NODE), Reply(request.number, said), 30)])
-    assert answer.result(0.0) == said
-
-
-def test_a_command_after_the_mission_is_refused_at_once() -> None:
-    """By what the node has heard of it."""
-    work, host = Pilot(), Hand()
-    node = node_of(work, host)
-    assert work.link.status() is None
-    over = MissionStatus(10, MissionState.LANDED)
-    node.step(10, [published(status_stream("drone"), over, 10), published(_STATE, state(10), 10)])
-    assert work.link.status() == over
-    vehicle = work.link.vehicle()
-    assert vehicle is not None
-    assert vehicle.stamp == 10
-    answer = work.link.command(End()).result(0.0)
-    assert (answer.accepted, answer.text) == (False, "the mission is over: landed")
-    assert node.step(20, []) == []
-
-
-def test_an_analysis_that_cannot_begin_is_told_of() -> None:
-    """The mission flies without it."""
-    host = Hand()
-    node_of(Grounded(), host)
-    assert [alert.kind for alert in host.alerts] == ["analysis_failed"]
-    assert "no radio" in host.alerts[0].text
 
 
 def test_what_open_raises_is_the_callers() -> None:

@@ -19,13 +19,11 @@ from aerodaas.mission.commands import (
     ClearNavigation,
     End,
     OpenStream,
-    Request,
     StreamItem,
 )
-from aerodaas.runtime.stream_names import reply_stream, request_stream, setpoint_stream
+from aerodaas.runtime.stream_names import setpoint_stream
 
 _STREAM = "drone/evil"
-_ANALYSIS = "drone/analysis"
 _HOLD = {"on_complete": "hold"}
 
 
@@ -86,13 +84,12 @@ def vehicle() -> Iterator[type[UnreadableVehicle]]:
 
 
 def _loitering(**settings: Any) -> DroneFlight:  # noqa: ANN401
-    """A drone in the air that stays at its waypoint, and listens to an analysis."""
+    """A drone in the air that stays at its waypoint."""
     flight = DroneFlight(
         "drone",
         robots=[robot(sensors=[], **settings)],
         initial={"drone": [AddNavigation(hop((2, 0), hover=900)), OpenStream(_STREAM)]},
         navigation=(_STREAM,),
-        requesters=(_ANALYSIS,),
     )
     flight.until(lambda: flight.is_in(MissionState.LOITERING))
     return flight
@@ -138,12 +135,6 @@ def test_a_command_that_raises_is_refused() -> None:
     answer = flight.command(nonsense)
     assert not answer.accepted
     assert "Malicious is no command" in answer.text
-    replies = flight.tap(reply_stream(_ANALYSIS))
-    flight.send(request_stream(_ANALYSIS), Request(7, nonsense))
-    flight.fly(0.1)
-    (reply,) = (item_of(message) for message in replies())
-    assert reply.number == 7
-    assert not reply.answer.accepted
     _land(flight)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from aerodaas.analytics.base import Analytics
-from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.config.checked import explained
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import current_options
@@ -136,7 +136,7 @@ class _Compiler:
         return by_default and registered_name("analytics", type(work)) is None
 
     def _at_users_side(self, node: Node) -> Iterator[dict[str, Any]]:
-        if isinstance(node.work, CommandingAnalytics):
+        if isinstance(node.work, RemoteAnalytics):
             raise GraphError(
                 f"{node.id} commands the drone, and cannot stay at the user's side: deploy it on "
                 "a compute resource of the environment"

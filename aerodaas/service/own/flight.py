@@ -102,6 +102,8 @@ class OwnFlight:
         self._version = 0
         self._text: tuple[int, str] = (-1, "")
         self._asked = 0.0
+        self._commanded = False
+        """Whether a drone has obeyed a command since the last look."""
         self._closed = threading.Event()
         self._commands = ThreadPoolExecutor(_MOST_ASKED, "commands")
         threading.Thread(target=self._look, name="console", daemon=True).start()
@@ -194,6 +196,7 @@ class OwnFlight:
             text = f"the drone did not answer within {_PATIENCE:g} s"
             self._tell(asked, text)
             raise SilentError(text) from None
+        self._commanded = True
         word = "accepted" if answer.accepted else "refused"
         self._tell(asked, f"{word}{': ' if answer.text else ''}{answer.text}")
         return AnswerOut.of(answer)
@@ -289,9 +292,12 @@ class OwnFlight:
         )
 
     def _refresh(self) -> None:
-        """Look at the drones, unless that is done anyway because somebody watches."""
+        """Look at the drones, unless somebody watches, so that it is done anyway.
+
+        Who commands and then reads sees its own command's effect.
+        """
         watched, self._asked = self._watched, time.monotonic()
-        if not watched:
+        if self._commanded or not watched:
             self._look_once()
 
     @property
@@ -306,6 +312,7 @@ class OwnFlight:
     def _look_once(self) -> None:
         if self.over or self._run.over:
             return
+        self._commanded = False
         # The thread that waits for the run meets the same error and handles it.
         with contextlib.suppress(AeroDaaSError):
             self._take(self._run.look(0))
