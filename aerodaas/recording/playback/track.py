@@ -8,7 +8,7 @@ from typing import Any
 
 from aerodaas.clock import seconds
 from aerodaas.geometry.frames import Vector, is_finite
-from aerodaas.messages.mission import BatteryOutlook, MissionStatus
+from aerodaas.messages.mission import MissionStatus
 from aerodaas.messages.odometry import GpsFix
 from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.protocol.playback import GpsOut, HeardOut, PlaceOut, TrackOut
@@ -23,6 +23,8 @@ _MOST_ROWS = 12_000
 """Rows of a robot; beyond, every second one is left out: an hour has one each 0.4 s."""
 _MOST_NAMES = 1_000_000
 """Names in all statuses and places of a recording."""
+_SHOWN = ("state", "reason", "pilot", "target", "faults")
+"""Fields of a status that a page shows as they are."""
 _MOST_BEHIND = 64
 """Visited and refused waypoints that a status names, as `StatusOut` has it."""
 _HEARD_SECONDS = 1.0
@@ -120,23 +122,16 @@ class TrackBuilder:
 
     def mission(self, status: MissionStatus, ahead: int) -> None:
         """Take a mission's status, and how many waypoints follow its target."""
-        self._flown = status.distance
-        self._outlook = _outlook(status.outlook)
+        told = StatusOut.of(status, None)
+        self._flown, self._outlook = told.distance, told.outlook
         self._pending = max(0, ahead)
-        self._change(
-            seconds(status.stamp),
-            {
-                "state": status.state.value,
-                "reason": status.reason,
-                "pilot": status.pilot,
-                "target": None if status.target is None else status.target.id,
-                "visited": list(status.visited[-_MOST_BEHIND:]),
-                "given_up": list(status.given_up[-_MOST_BEHIND:]),
-                "waypoints_visited": status.visits,
-                **self._ahead(),
-                "faults": list(status.faults),
-            },
-        )
+        behind = {
+            "visited": told.visited[-_MOST_BEHIND:],
+            "given_up": told.given_up[-_MOST_BEHIND:],
+            "waypoints_visited": status.visits,
+        }
+        same = {name: getattr(told, name) for name in _SHOWN}
+        self._change(told.time, {**same, **behind, **self._ahead()})
 
     def plan(self, plan: MissionPlan) -> None:
         """Take a new plan: the waypoints ahead."""
@@ -169,14 +164,6 @@ class TrackBuilder:
         if self._room.take(1 + sum(map(len, names))):
             self._now = new
             self._track.statuses.append(new)
-
-
-def _outlook(outlook: BatteryOutlook | None) -> OutlookOut | None:
-    """A recorded outlook, if all of it is known."""
-    if outlook is None:
-        return None
-    figures = {"plan": outlook.plan, "returns_at": outlook.returns_at, "hover": outlook.hover}
-    return OutlookOut(**figures) if all(map(math.isfinite, figures.values())) else None
 
 
 def _is_placed(aircraft: Traffic) -> bool:
