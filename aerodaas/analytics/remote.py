@@ -6,9 +6,8 @@ import os
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from pydantic import ValidationError
-
 from aerodaas.analytics.base import Context, NavigableAnalytics, ResourceUse
+from aerodaas.config.checked import checked
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError
@@ -58,12 +57,7 @@ class RemoteAnalytics(NavigableAnalytics):
         asked |= {"host": host} if host is not None else {}
         asked |= {"port": port} if port is not None else {}
         asked |= {"token": value} if (value := os.environ.get(TOKEN_VARIABLE)) else {}
-        try:
-            self.settings = RemoteConfig.model_validate(asked)
-        except ValidationError as error:
-            # The error's own text repeats its input, which may hold the token.
-            said = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-            raise ConfigError(f"remote: {said}") from None
+        self.settings = checked(RemoteConfig, asked, "remote")
         if self.settings.token is None and not is_loopback(self.settings.host):
             raise ConfigError(
                 f"remote control does not listen on {self.settings.host} without a token: set "

@@ -14,6 +14,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.http_server.addresses import HostGuard, listen
 from aerodaas.http_server.server import web_server
 from aerodaas.protocol.schemas import Role
+from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.app import build_app
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.gate import Bounds
@@ -30,6 +31,8 @@ _MOST_CONNECTIONS = 640
 """A page has two that stay, and a few that come and go."""
 _MOST_WATCHERS = 320
 """Live views by the token of who watches only, which many may share."""
+_RATE, _BURST = 500.0, 2000.0
+"""Requests a second by one token, which many may share, on average and at once."""
 _MOST_BYTES_SENT = 4096
 """Bytes of a WebSocket message; watchers have nothing to say."""
 _PING_SECONDS = 5.0
@@ -86,7 +89,9 @@ class ApiServer:
         """Serve what `build` makes, in a thread; `tell` tells people of many wrong tokens."""
         self._tokens.tell = tell
         self._server = web_server(
-            self._guard(build(Admission(self._tokens)), self._host),
+            self._guard(
+                build(Admission(self._tokens, rates=RateLimiter(_RATE, _BURST))), self._host
+            ),
             most_connections=_MOST_CONNECTIONS,
             timeout_graceful_shutdown=1,
             ws_max_size=_MOST_BYTES_SENT,
