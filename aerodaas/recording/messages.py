@@ -50,6 +50,7 @@ __all__ = [
     "Latency",
     "MissionPlan",
     "NavigationRecord",
+    "channel_of",
     "json_entry",
     "labels_and_message",
 ]
@@ -241,7 +242,13 @@ _TABLE = (
 )
 CHANNELS: Mapping[str, Channel] = {f"aerodaas.{one.name}": one for one in _TABLE}
 """The table, by the name of the schema."""
-_BY_CLASS = {one.kind: one for one in _TABLE}
+
+
+@lru_cache(maxsize=1024)
+def channel_of(kind: type) -> Channel | None:
+    """The channel of messages of a class or of the nearest one above it; None without."""
+    known = {one.kind: one for one in _TABLE}
+    return next((known[one] for one in kind.__mro__ if one in known), None)
 
 
 def json_entry(
@@ -254,7 +261,7 @@ def json_entry(
     """A message for its channel.
 
     Args:
-        message: Of a class of the table.
+        message: Of a class of the table, or of one derived from it.
         stream: The stream that it came on; of no use where the table has the whole topic.
         stamp: Mission time of the described measurement, nanoseconds, if it differs from the
             envelope's header.
@@ -264,9 +271,11 @@ def json_entry(
         The entry.
 
     Raises:
-        MessageError: If a field holds what JSON cannot.
+        MessageError: If it is of another class, or a field holds what JSON cannot.
     """
-    channel = _BY_CLASS[type(message)]
+    channel = channel_of(type(message))
+    if channel is None:
+        raise MessageError(f"{type(message).__name__} is of no class that has a schema here")
     name = channel.end if channel.end.startswith("/") else topic(stream, channel.end)
     data = json_text(
         message, without_none=channel.without_none, without=channel.elsewhere, **labels

@@ -145,3 +145,15 @@ def test_a_body_of_which_no_joint_is_told_is_read_back() -> None:
     _, (back,) = labels_and_message(entry.schema.name, entry.data)
     assert back.keypoints is not None
     assert back.keypoints.size == 0
+
+
+class Charge(Battery):
+    """A plug-in's own reading."""
+
+
+def test_a_derived_class_is_recorded_as_the_one_above_it() -> None:
+    """And not as an item of a class that has no schema."""
+    message = Message("drone/charge", 1, 6, HEADER, 0, (), Charge(0.25))
+    (entry,) = convert(message.item, message, Session(RecordingConfig(), 0))
+    assert (entry.schema.name, entry.topic) == ("aerodaas.Battery", "/drone/charge/battery")
+    assert labels_and_message(entry.schema.name, entry.data)[1] == Battery(0.25)

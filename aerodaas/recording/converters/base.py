@@ -16,7 +16,7 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.recording.encoding import Entry, plain
 from aerodaas.recording.h264 import H264Encoder
-from aerodaas.recording.messages import ItemRecord, json_entry
+from aerodaas.recording.messages import ItemRecord, channel_of, json_entry
 from aerodaas.recording.reference_frames import Rotation
 
 __all__ = ["Session", "convert", "quaternion", "robot_of", "vector"]
@@ -51,12 +51,22 @@ class Session:
 
 @singledispatch
 def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Yield the entries of `item`; generic JSON for an unregistered type."""
+    """Yield the entries of `item`: by default its JSON, for a class of the table or any other."""
     del session
-    opaque = isinstance(item, OpaqueItem)
-    kind = item.kind if opaque else type(item).__name__
-    value = plain(item.value if opaque else item)
-    yield json_entry(ItemRecord(message.header, kind, value), message.stream)
+    channel, header = channel_of(type(item)), message.header
+    if channel is None:
+        opaque = isinstance(item, OpaqueItem)
+        kind = item.kind if opaque else type(item).__name__
+        value = plain(item.value if opaque else item)
+        yield json_entry(ItemRecord(header, kind, value), message.stream)
+        return
+    labels: dict[str, str | int] = {}
+    if "robot" in channel.labels:
+        labels["robot"] = robot_of(message)
+    stamp = getattr(item, "stamp", None)
+    if stamp is None:
+        labels |= {"stamp": header.stamp, "source": header.source}
+    yield json_entry(item, message.stream, stamp, **labels)
 
 
 def robot_of(message: Message[Any]) -> str:

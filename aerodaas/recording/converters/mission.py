@@ -12,7 +12,7 @@ from foxglove.messages import Log, LogLevel
 from aerodaas.clock import seconds
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.envelope import Message
-from aerodaas.messages.mission import Decision, MissionStatus
+from aerodaas.messages.mission import MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import Vitals
 from aerodaas.messages.waypoints import Waypoint
@@ -104,13 +104,6 @@ def navigation(item: AeroNavigation, message: Message[Any], session: Session) ->
     """Write the waypoints and commands of a navigation result."""
     del session
     yield json_entry(NavigationRecord.of(item, message.header), message.stream)
-
-
-@convert.register
-def decision(item: Decision, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a scheduler decision with its reason."""
-    del session
-    yield json_entry(item, message.stream, item.stamp)
 
 
 @convert.register

@@ -14,9 +14,7 @@ from foxglove.messages import (
 from foxglove.messages import Odometry as FoxgloveOdometry
 
 from aerodaas.messages.envelope import Message
-from aerodaas.messages.mission import SetpointRecord
-from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.messages.payload import Photo
+from aerodaas.messages.odometry import GpsFix, Odometry
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.converters.base import Session, convert, quaternion, robot_of, vector
 from aerodaas.recording.encoding import Entry, topic
@@ -58,28 +56,6 @@ def gps(item: GpsFix, message: Message[Any], session: Session) -> Iterator[Entry
     """Write the reading of a GPS sensor."""
     header = message.header
     yield _location(item, body_frame(header.source), message.stream, header.stamp, session)
-
-
-@convert.register
-def battery(item: Battery, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the reading of a battery sensor."""
-    del session
-    header = message.header
-    yield json_entry(item, message.stream, stamp=header.stamp, source=header.source)
-
-
-@convert.register
-def photo(item: Photo, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write what is known of a picture that the vehicle's own camera took."""
-    del session
-    yield json_entry(item, message.stream, item.stamp, robot=robot_of(message))
-
-
-@convert.register
-def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the requested and the sent setpoint, and the limits that changed it."""
-    del session
-    yield json_entry(item, message.stream, item.stamp, robot=robot_of(message))
 
 
 def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session) -> Iterator[Entry]:
