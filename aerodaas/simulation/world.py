@@ -1,21 +1,21 @@
 """Simulated world: the objects of a scenario, placed by a seed, at any time.
 
 There is no world server: the state of an object is a pure function of scenario, seed and time, so
-that every process computes the same world.
-"""
+that every process computes the same world."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+import numpy as np
+from numpy.typing import NDArray
 import itertools
 import math
 import random
 from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
-
 from aerodaas.config.model import SimulationConfig
-from aerodaas.simulation.boxes import Box
 from aerodaas.simulation.scenario import (
     Building,
     Car,
@@ -35,7 +35,42 @@ from aerodaas.simulation.scenario import (
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
 from aerodaas.simulation.track import Track
 
-__all__ = ["CAR_SIZE", "ROOF_RISE", "State", "Thing", "World"]
+__all__ = ["Box", "CAR_SIZE", "ROOF_RISE", "State", "Thing", "World"]
+
+_SIGNS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An upright box: centre in ENU metres, extents along its own axes, yaw in radians."""
+
+    id: str
+    """Id of the enclosed entity."""
+    label: str
+    """`person`, `vest`, `car`, `tower`, `tree`, `building`, `crop_rows`, `rubble` or
+    `fence`."""
+    centre: tuple[float, float, float]
+    size: tuple[float, float, float]
+    """Extents along its yaw, across it and up, metres."""
+    yaw: float = 0.0
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners as (8, 3) ENU metres."""
+        local = _SIGNS * np.array(self.size)
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray(local @ turn + np.array(self.centre))
+
+    def contains(self, point: tuple[float, float, float], margin: float = 0.0) -> bool:
+        """Whether an ENU point lies within the box, widened by `margin` metres."""
+        x, y, z = (here - there for here, there in zip(point, self.centre, strict=True))
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        own = (c * x + s * y, c * y - s * x, z)
+        return all(
+            abs(part) <= 0.5 * extent + margin for part, extent in zip(own, self.size, strict=True)
+        )
+
 
 CAR_SIZE = (4.2, 1.8, 1.45)
 """Length, width and height of a car, metres."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import Any
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
-
 from aerodaas.errors import SchedulerError, failure_line
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler
@@ -17,11 +21,46 @@ from aerodaas.schedulers.lab.metrics import Mean, Score, mean_of, score
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
-from aerodaas.schedulers.lab.spreading import Spread, over_processes
-from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.network import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
-__all__ = ["LabResult", "Wanted", "run_lab", "scheduler_label"]
+__all__ = ["LabResult", "Spread", "Wanted", "batch_size", "over_processes", "run_lab", "scheduler_label"]
+
+Spread = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""An ordered `map`, such as `Pool.imap` of multiprocessing, or
+`aerodaas.actors.cluster.ray_map.spread_over(address)` for a Ray cluster."""
+
+_BATCHES = 16
+"""Batches for each worker: enough that all end at about the same time."""
+
+
+def batch_size(parts: int, workers: int) -> int:
+    """How many of the parts go to a worker at once, so that few messages are sent."""
+    return max(1, parts // (_BATCHES * workers))
+
+
+@contextmanager
+def over_processes(jobs: int | None, parts: int | None = None) -> Iterator[Spread]:
+    """Give a map over `jobs` processes (None: one for each core), which end with the context.
+
+    Of 1 job, and of 1 part where their number is known, it is the ordinary `map`.
+    """
+    workers = jobs or os.cpu_count() or 1
+    if parts is not None:
+        workers = min(workers, parts)
+    if workers == 1:
+        yield map
+        return
+    pool = ProcessPoolExecutor(workers)
+
+    def spread(function: Callable[[Any], Any], parts: Sequence[Any]) -> Iterable[Any]:
+        return pool.map(function, parts, chunksize=batch_size(len(parts), workers))
+
+    try:
+        yield spread
+    finally:
+        pool.shutdown(cancel_futures=True)
+
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
 
