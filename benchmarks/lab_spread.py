@@ -24,7 +24,7 @@ from ray.cluster_utils import Cluster
 from aerodaas.actors.cluster.ray_map import spread_over
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.lab import LabResult, Workload, run_lab
-from aerodaas.schedulers.lab.spreading import Spread, over_processes
+from aerodaas.schedulers.lab.run import Spread, over_processes
 
 UNITS = {"time": "s", "speed-up": "times", "CPU": "s", "edges": ""}
 _STORE = 80 * 2**20

@@ -32,10 +32,9 @@ from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.metrics import Score, score
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 
 UNITS = {
     "completion": "%",

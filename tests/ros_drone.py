@@ -17,9 +17,8 @@ from typing_extensions import Self
 from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.ros import messages as ros
 from aerodaas.ros.link import RosLink
-from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.dynamics import STEP, KinematicState, Multirotor
-from aerodaas.simulation.wind import Wind
 
 __all__ = ["RosDrone", "odometry_message", "quaternion"]
 

@@ -17,7 +17,7 @@ from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits
 from aerodaas.simulation.dynamics import Multirotor
-from aerodaas.simulation.noise import SensorNoise
+from aerodaas.simulation.sensors import SensorNoise
 
 __all__ = ["LONGEST_LEAP", "EmulatedFlight", "EmulatedVehicle", "watch"]
 

@@ -14,7 +14,7 @@ from ray.exceptions import RayTaskError
 from aerodaas.actors.cluster import ray_cluster as cluster
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
-from aerodaas.schedulers.lab.spreading import Spread, batch_size
+from aerodaas.schedulers.lab.run import Spread, batch_size
 
 __all__ = ["shipped", "spread_over"]
 

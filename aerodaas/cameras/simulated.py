@@ -69,7 +69,7 @@ class SimulatedCamera:
         """Start the renderer; raises SourceError if that fails."""
         if self._renderer is None:
             # Imported late, because panda3d takes 0.2 s to import.
-            from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
+            from aerodaas.simulation.renderer import renderer_for  # noqa: PLC0415
 
             self._renderer = renderer_for(self._world, self._model, self._depth_range)
 

@@ -29,7 +29,7 @@ from aerodaas.schedulers.lab import (
 )
 from aerodaas.schedulers.lab.arrival_trace import TRACE
 from aerodaas.schedulers.lab.metrics import Score, score
-from aerodaas.schedulers.lab.spreading import Spread
+from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress

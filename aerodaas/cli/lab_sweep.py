@@ -15,7 +15,7 @@ from aerodaas.cli.lab_study import spread_of, workload_of
 from aerodaas.cli.rows import write_csv
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import ConfigError, UnknownIdError
-from aerodaas.schedulers.lab.significance import seeds_needed
+from aerodaas.schedulers.lab.metrics import seeds_needed
 from aerodaas.schedulers.lab.sweep import PARAMETERS, SweepResult, run_sweep
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress

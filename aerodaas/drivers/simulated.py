@@ -27,14 +27,11 @@ from aerodaas.messages.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.simulation.actuators import SimulatedActuators
-from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
-from aerodaas.simulation.noise import SensorNoise
-from aerodaas.simulation.payload import SimulatedGimbal, SimulatedPhotoCamera
-from aerodaas.simulation.rangefinder import SimulatedRangefinder, Surface
-from aerodaas.simulation.wind import Wind
+from aerodaas.simulation.payload import SimulatedActuators, SimulatedGimbal, SimulatedPhotoCamera
+from aerodaas.simulation.sensors import SensorNoise, SimulatedRangefinder, Surface
 from aerodaas.simulation.world import World
 from aerodaas.terrain.ground import Ground
 

@@ -1,18 +1,19 @@
 """Airframe of a simulated drone: the settings of the simulated driver.
 
 The defaults describe a 2 kg quadrotor with 10-inch rotors and a 4-cell 5 Ah battery, with about
-20 minutes of hover: the class of the Holybro X500, PX4's own default simulation model."""
+20 minutes of hover: the class of the Holybro X500, PX4's own default simulation model.
+"""
 
 from __future__ import annotations
 
 import math
+import random
 from typing import Annotated
+
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from typing_extensions import Self
-import math
-import random
 
-__all__ = ["AIR_DENSITY", "Airframe", "GRAVITY", "RangefinderSettings", "Wind"]
+__all__ = ["AIR_DENSITY", "GRAVITY", "Airframe", "RangefinderSettings", "Wind"]
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2."""

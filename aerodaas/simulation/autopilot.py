@@ -8,9 +8,14 @@ from dataclasses import dataclass
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.battery import FlightBattery, flight_power
-from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
-from aerodaas.simulation.guidance import velocity_towards, yaw_rate_towards
-from aerodaas.simulation.noise import SensorNoise
+from aerodaas.simulation.dynamics import (
+    STEP,
+    Multirotor,
+    Triple,
+    velocity_towards,
+    yaw_rate_towards,
+)
+from aerodaas.simulation.sensors import SensorNoise
 
 __all__ = ["Autopilot", "FlightLimits", "Goto", "Steer"]
 

@@ -9,7 +9,8 @@ Croon, Chu, "Cascaded incremental nonlinear dynamic inversion for MAV disturbanc
 Control Engineering Practice 73, 2018).
 
 It uses scalar arithmetic, because for vectors of three Python's floats are several times faster
-than numpy."""
+than numpy.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +18,20 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
-from aerodaas.simulation.airframe import GRAVITY, Airframe
-from aerodaas.simulation.airframe import Wind
-import math
 
-__all__ = ["KinematicState", "Multirotor", "STEP", "STEP_NS", "Triple", "approach_speed", "braking_distance", "velocity_towards", "yaw_rate_towards"]
+from aerodaas.simulation.airframe import GRAVITY, Airframe, Wind
+
+__all__ = [
+    "STEP",
+    "STEP_NS",
+    "KinematicState",
+    "Multirotor",
+    "Triple",
+    "approach_speed",
+    "braking_distance",
+    "velocity_towards",
+    "yaw_rate_towards",
+]
 
 Triple: TypeAlias = tuple[float, float, float]
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
 from aerodaas.clock import NANOSECONDS
+from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import CameraConfig, GimbalConfig
 from aerodaas.config.robot import SIMULATED_INTERVAL
 from aerodaas.errors import VehicleError
+from aerodaas.messages.actuators import MoveResult
 from aerodaas.messages.payload import (
     GimbalAttitude,
     GimbalTarget,
@@ -16,13 +21,9 @@ from aerodaas.messages.payload import (
     PhotoPlace,
 )
 from aerodaas.messages.vehicle import VehicleState
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config.actuators import ActuatorConfig
-from aerodaas.messages.actuators import MoveResult
 
 __all__ = ["SimulatedActuators", "SimulatedGimbal", "SimulatedPhotoCamera"]
+
 
 class SimulatedGimbal:
     """A gimbal that turns at a limited rate; implements `aerodaas.messages.payload.Gimbal`."""

@@ -1,4 +1,10 @@
-"""Images of a simulated world with their depth, by panda3d's software renderer."""
+"""Images of a simulated world with their depth, by panda3d's software renderer.
+
+It needs no GPU, display or system library. panda3d's axes agree with ENU (x right/east, y
+ahead/north, z up), and its cameras look along their own y axis. The software renderer provides
+no depth buffer. So the scene is rendered once more with a texture of two rulers along the optical
+axis, so that the colour of a pixel encodes its depth.
+"""
 
 from __future__ import annotations
 
@@ -7,34 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from panda3d.core import (
     Camera,
+    ColorAttrib,
+    ColorScaleAttrib,
     FrameBufferProperties,
     GraphicsEngine,
     GraphicsOutput,
     GraphicsPipe,
     GraphicsPipeSelection,
-    LMatrix4f,
-    NodePath,
-    PerspectiveLens,
-    Texture,
-    WindowProperties,
-    load_prc_file_data,
-)
-from aerodaas.errors import SourceError
-from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
-from aerodaas.messages.odometry import Odometry
-from aerodaas.simulation.scene.light import HAZE
-from aerodaas.simulation.scene.scene import Looks, Scene
-from aerodaas.simulation.world import World
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-from panda3d.core import (
-    Camera,
-    ColorAttrib,
-    ColorScaleAttrib,
     LightAttrib,
     LMatrix4f,
     NodePath,
+    PerspectiveLens,
     RenderState,
     SamplerState,
     TexGenAttrib,
@@ -44,9 +33,16 @@ from panda3d.core import (
     TextureStage,
     TransformState,
     TransparencyAttrib,
+    WindowProperties,
+    load_prc_file_data,
 )
+
+from aerodaas.errors import SourceError
 from aerodaas.geometry.depth import METRE
-from aerodaas.geometry.frames import CameraModel
+from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.odometry import Odometry
+from aerodaas.simulation.scene.light import HAZE
+from aerodaas.simulation.scene.scene import Looks, Scene
 from aerodaas.simulation.world import World
 
 __all__ = ["DepthRenderer", "Renderer", "renderer_for"]

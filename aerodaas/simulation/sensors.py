@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import dataclass
-import numpy as np
-from aerodaas.geometry.frames import GeodeticOrigin, wrap_angle
-from aerodaas.messages.odometry import GpsFix, Odometry
-from aerodaas.simulation.dynamics import STEP, KinematicState, Triple
-import math
-import random
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
+
 from aerodaas.clock import NANOSECONDS
-from aerodaas.geometry.frames import rotation_from_rpy
+from aerodaas.geometry.frames import GeodeticOrigin, rotation_from_rpy, wrap_angle
+from aerodaas.messages.odometry import GpsFix, Odometry
 from aerodaas.simulation.airframe import RangefinderSettings
-from aerodaas.simulation.dynamics import KinematicState
+from aerodaas.simulation.dynamics import STEP, KinematicState, Triple
 from aerodaas.simulation.scenario import Building
 from aerodaas.simulation.world import ROOF_RISE, Thing, World
 
 __all__ = ["NoiseLevels", "SensorNoise", "SimulatedRangefinder", "Surface"]
+
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevels:

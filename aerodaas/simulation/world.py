@@ -1,20 +1,19 @@
 """Simulated world: the objects of a scenario, placed by a seed, at any time.
 
 There is no world server: the state of an object is a pure function of scenario, seed and time, so
-that every process computes the same world."""
+that every process computes the same world.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-import numpy as np
-from numpy.typing import NDArray
 import itertools
 import math
 import random
 from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
+
 from aerodaas.config.model import SimulationConfig
 from aerodaas.simulation.scenario import (
     Building,
@@ -35,7 +34,7 @@ from aerodaas.simulation.scenario import (
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
 from aerodaas.simulation.track import Track
 
-__all__ = ["Box", "CAR_SIZE", "ROOF_RISE", "State", "Thing", "World"]
+__all__ = ["CAR_SIZE", "ROOF_RISE", "Box", "State", "Thing", "World"]
 
 _SIGNS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 

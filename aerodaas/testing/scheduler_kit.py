@@ -30,10 +30,9 @@ from aerodaas.schedulers.analytics.base import (
     Task,
 )
 from aerodaas.schedulers.analytics.registry import load_scheduler
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
 __all__ = ["End", "check_scheduler", "play"]

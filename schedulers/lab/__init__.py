@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from aerodaas.schedulers.lab.arrival_trace import read_arrivals
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.run import LabResult, run_lab
 from aerodaas.schedulers.lab.sweep import SweepResult, run_sweep
-from aerodaas.schedulers.lab.times import ExecutionTimes
-from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.schedulers.lab.workload_file import load_workload
+from aerodaas.schedulers.lab.workload import Workload, load_workload
 
 __all__ = [
     "ExecutionTimes",

@@ -4,7 +4,7 @@ Each case is a workload on a network with its execution times and cloud slots. O
 sample path a scheduler's utility is divided by the clairvoyant bound; its figure for a seed is the
 mean over the cases, so that each case counts alike, whatever its tasks are worth. Standings are
 means over the seeds with 95 % intervals (Student's t), and differences from the leader are tested
-seed by seed (`aerodaas.schedulers.lab.significance`).
+seed by seed (`aerodaas.schedulers.lab.metrics`).
 """
 
 from __future__ import annotations
@@ -19,12 +19,9 @@ from typing import Any
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import Resources
-from aerodaas.schedulers.lab.metrics import Mean, mean_of
-from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.run import LabResult, Wanted, run_lab, scheduler_label
-from aerodaas.schedulers.lab.significance import SIGNIFICANT, compare, holm
-from aerodaas.schedulers.lab.spreading import Spread
-from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.metrics import SIGNIFICANT, Mean, compare, holm, mean_of
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
+from aerodaas.schedulers.lab.run import LabResult, Spread, Wanted, run_lab, scheduler_label
 from aerodaas.schedulers.lab.workload import Workload
 
 __all__ = ["CASES", "FULL", "QUICK", "SET", "Case", "Extent", "Leaderboard", "run_leaderboard"]

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import dataclass
-from statistics import NormalDist
-from typing import Literal, cast
-from aerodaas.errors import SchedulerError
 from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from statistics import NormalDist
+from typing import Literal, cast
+
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab.network_trace import read_bandwidth
 
 __all__ = ["ExecutionTimes", "Network"]
+
 
 @dataclass(frozen=True, slots=True)
 class ExecutionTimes:

@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
-from typing import Any
-import gc
-from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
+
 from aerodaas.errors import SchedulerError, failure_line
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
 from aerodaas.schedulers.lab.metrics import Mean, Score, mean_of, score
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
-from aerodaas.schedulers.lab.network import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
-__all__ = ["LabResult", "Spread", "Wanted", "batch_size", "over_processes", "run_lab", "scheduler_label"]
+__all__ = [
+    "LabResult",
+    "Spread",
+    "Wanted",
+    "batch_size",
+    "over_processes",
+    "run_lab",
+    "scheduler_label",
+]
 
 Spread = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 """An ordered `map`, such as `Pool.imap` of multiprocessing, or

@@ -6,8 +6,7 @@ import random
 from dataclasses import dataclass
 
 from aerodaas.schedulers.analytics.base import Task
-from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.workload import Workload
 
 __all__ = ["SamplePath"]

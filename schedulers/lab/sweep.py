@@ -14,12 +14,16 @@ from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler
-from aerodaas.schedulers.lab.metrics import mean_of
-from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.run import LabResult, Wanted, run_lab, scheduler_label
-from aerodaas.schedulers.lab.significance import SIGNIFICANT, Comparison, compare, holm
-from aerodaas.schedulers.lab.spreading import Spread, over_processes
-from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.metrics import SIGNIFICANT, Comparison, compare, holm, mean_of
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
+from aerodaas.schedulers.lab.run import (
+    LabResult,
+    Spread,
+    Wanted,
+    over_processes,
+    run_lab,
+    scheduler_label,
+)
 from aerodaas.schedulers.lab.workload import Workload
 
 __all__ = ["PARAMETERS", "SweepResult", "run_sweep"]

@@ -1,4 +1,17 @@
-"""Workloads: which tasks arrive at which edge, and when; drawn, or read from a JSON file."""
+"""Workloads: which tasks arrive at which edge, and when.
+
+A JSON file has models of one's own, fleets, or tasks listed one by one:
+
+::
+
+    {"name": "patrol", "drones": 5, "edges": 2, "period_s": 0.5,
+     "models": {"HV": "published",
+                "fire": {"benefit": 80, "deadline_ms": 600, "edge_ms": 90, "cloud_ms": 210,
+                         "edge_cost": 1, "cloud_cost": 12, "qoe_bonus": 50}}}
+
+With `"tasks": [{"at_s": 0.2, "model": "fire", "source": "drone1", "edge": 0}, ...]` the listed
+tasks replace the drones; one taken from a recorded flight may carry `edge_ms` and `cloud_ms`.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +21,17 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
-from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import SchedulerError, UnknownIdError
-from aerodaas.schedulers.analytics.base import Profile, Task
-from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from pathlib import Path
 from typing import Annotated, Literal
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import SchedulerError
-from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
-from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 
-__all__ = ["Arrival", "SIX", "Segments", "Workload", "load_workload"]
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal, Task
+from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
+
+__all__ = ["SIX", "Arrival", "Segments", "Workload", "load_workload"]
 
 SIX: tuple[str, ...] = ("2D-P", "3D-P", "4D-P", "2D-A", "3D-A", "4D-A")
 """The published workloads: drones on one edge, with four (P) or six (A) models."""

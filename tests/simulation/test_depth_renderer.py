@@ -10,7 +10,7 @@ import pytest
 
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.odometry import Odometry
-from aerodaas.simulation.depth import renderer_for
+from aerodaas.simulation.renderer import renderer_for
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
 

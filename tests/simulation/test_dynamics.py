@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.simulation.airframe import GRAVITY, Airframe
+from aerodaas.simulation.airframe import GRAVITY, Airframe, Wind
 from aerodaas.simulation.dynamics import STEP, Multirotor
-from aerodaas.simulation.wind import Wind
 
 ACCELERATION, YAW_RATE = 3.0, math.radians(90)
 axis = st.floats(-5, 5)

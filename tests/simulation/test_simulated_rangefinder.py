@@ -16,8 +16,8 @@ from aerodaas.errors import ConfigError
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode
 from aerodaas.simulation.airframe import RangefinderSettings
 from aerodaas.simulation.dynamics import KinematicState
-from aerodaas.simulation.rangefinder import Floats, SimulatedRangefinder, Surface
 from aerodaas.simulation.scenario import Scenario
+from aerodaas.simulation.sensors import Floats, SimulatedRangefinder, Surface
 from aerodaas.simulation.world import World
 
 SECOND = 1_000_000_000

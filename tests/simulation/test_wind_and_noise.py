@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.simulation.airframe import Wind
 from aerodaas.simulation.dynamics import STEP, KinematicState
-from aerodaas.simulation.noise import SensorNoise
-from aerodaas.simulation.wind import Wind
+from aerodaas.simulation.sensors import SensorNoise
 
 MOTION = KinematicState((3.0, -2.0, 1.5), (0.5, 0.0, -0.1), 0.02, -0.01, 1.2, 0.1)
 

@@ -9,11 +9,10 @@ import numpy as np
 from aerodaas.geometry.frames import GeodeticOrigin, Vector, enu_to_ned, wrap_angle
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import FlightLimits, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
-from aerodaas.simulation.noise import SensorNoise
-from aerodaas.simulation.wind import Wind
+from aerodaas.simulation.sensors import SensorNoise
 from tools.emulated import EmulatedFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 

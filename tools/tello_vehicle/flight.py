@@ -8,10 +8,9 @@ import numpy as np
 
 from aerodaas.geometry.frames import enu_to_body, wrap_angle
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
-from aerodaas.simulation.wind import Wind
 from tools.emulated import EmulatedFlight
 from tools.tello_vehicle.options import TelloOptions
 

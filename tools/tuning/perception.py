@@ -150,7 +150,7 @@ class DetectorPerception:
     ) -> None:
         """Open the renderer and the detector; the camera measures depth up to `depth_range` m."""
         # panda3d takes its time to load.
-        from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
+        from aerodaas.simulation.renderer import renderer_for  # noqa: PLC0415
 
         self._renderer = renderer_for(world, camera, depth_range)
         self._camera = camera

@@ -25,8 +25,7 @@ from aerodaas.runtime.session import Session
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources, Task, TaskOutcome
 
 if TYPE_CHECKING:
-    from aerodaas.schedulers.lab.network import Network
-    from aerodaas.schedulers.lab.times import ExecutionTimes
+    from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 
 __all__ = ["Executions", "SimulatedDispatcher"]
 
@@ -52,8 +51,7 @@ class Executions:
         if simulation.execution_times is None:
             return None
         # Few flights simulate executions, and the laboratory takes long to load.
-        from aerodaas.schedulers.lab.network import Network  # noqa: PLC0415
-        from aerodaas.schedulers.lab.times import ExecutionTimes  # noqa: PLC0415
+        from aerodaas.schedulers.lab.network import ExecutionTimes, Network  # noqa: PLC0415
 
         period = round(simulation.network_period * NANOSECONDS)
         return cls(

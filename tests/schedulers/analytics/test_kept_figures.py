@@ -26,10 +26,9 @@ from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf, Edg
 from aerodaas.schedulers.analytics.published.gems import Gems
 from aerodaas.schedulers.analytics.sfq_dems import SfqDems, _Tenant, _TenantDems
 from aerodaas.schedulers.analytics.windows import QoeWindows
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
 MS = MILLISECOND

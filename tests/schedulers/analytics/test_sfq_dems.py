@@ -22,9 +22,9 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.published.dems import MARGIN, Dems
 from aerodaas.schedulers.analytics.sfq_dems import SfqDems
 from aerodaas.schedulers.lab import Network, Workload
+from aerodaas.schedulers.lab.network import ExecutionTimes
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 
 NO_CLOUD = Resources(cloud_slots=0)
 

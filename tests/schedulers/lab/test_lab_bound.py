@@ -13,10 +13,9 @@ from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
 from aerodaas.schedulers.lab.metrics import score
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
 _job = st.tuples(

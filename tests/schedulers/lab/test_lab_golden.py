@@ -11,10 +11,9 @@ import pytest
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace, simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
 GOLDEN = Path(__file__).with_name("lab_golden.json")

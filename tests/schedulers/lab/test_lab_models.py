@@ -15,11 +15,9 @@ from hypothesis import strategies as st
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.sample import SamplePath
-from aerodaas.schedulers.lab.times import ExecutionTimes
-from aerodaas.schedulers.lab.workload import SIX, Workload
-from aerodaas.schedulers.lab.workload_file import load_workload
+from aerodaas.schedulers.lab.workload import SIX, Workload, load_workload
 
 MINUTE = 60 * NANOSECONDS
 

@@ -22,12 +22,11 @@ from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.published.edge_only import Fifo
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.metrics import mean_of, score
-from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.network import ExecutionTimes, Network
 from aerodaas.schedulers.lab.plots import plot_bars, plot_observations, plot_timeline
 from aerodaas.schedulers.lab.run import run_lab
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Arrival, Workload
 
 SHORT = Workload.named("2D-A", 10 * NANOSECONDS)

@@ -22,8 +22,8 @@ from aerodaas.config import extras
 from aerodaas.errors import ConfigError, SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.published.edge_only import Edf, Fifo
 from aerodaas.schedulers.lab import Workload, run_lab, run_sweep
+from aerodaas.schedulers.lab.metrics import compare, holm, permutation_p, seeds_needed
 from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.significance import compare, holm, permutation_p, seeds_needed
 from aerodaas.schedulers.lab.sweep import SweepResult
 from aerodaas.schedulers.lab.sweep_plots import plot_sweep
 from aerodaas.schedulers.lab.workload import Arrival

@@ -11,7 +11,7 @@ from aerodaas.clock import seconds
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
-from aerodaas.simulation.depth import renderer_for
+from aerodaas.simulation.renderer import renderer_for
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
 from tools.tuning.chase import TELLO, Chase, ChaseResult
