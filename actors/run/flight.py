@@ -374,7 +374,9 @@ class Flight:
         return self._head.address if self._head is not None and self._head.lost else ""
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Execute a command on a robot's mission."""
+        """Execute a command on a robot's mission; raises MissionError if that does not fly."""
+        if robot not in self._drones:
+            raise MissionError(f"{robot} does not fly")
         handle = self._members[self._drones[robot]].handle
         method = handle.command.options(concurrency_group=COMMANDS)
         answer: Answer = ask(method.remote(robot, command))

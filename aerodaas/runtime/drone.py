@@ -8,7 +8,7 @@ from typing import Any
 
 from aerodaas.clock import Clock, host_time_ns
 from aerodaas.drivers.loading import link_of
-from aerodaas.errors import failure_line
+from aerodaas.errors import MissionError, failure_line
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 from aerodaas.mission.commands import Answer, Command, ReturnHome
@@ -197,9 +197,11 @@ class DroneNode(Node):
             controller.receive(message, now)
 
     def command(self, robot: str, command: Command, now: int) -> Answer:
-        """Execute a command on one robot's mission."""
+        """Execute a command on one robot's mission; raises MissionError if that does not fly."""
         if robot in self.failures:
             return Answer(accepted=False, text=failure_of(robot, self.failures[robot]))
+        if robot not in self._controllers:
+            raise MissionError(f"{robot} does not fly")
         return self._controllers[robot].handle(command, now)
 
     def return_home(self, reason: str, now: int) -> None:

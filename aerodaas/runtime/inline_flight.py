@@ -15,7 +15,7 @@ from typing import Protocol
 from typing_extensions import Self
 
 from aerodaas.config.options import LiveViews
-from aerodaas.errors import AeroDaaSError, failure_line
+from aerodaas.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.messages.frames import Header
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import read_vitals
@@ -275,9 +275,13 @@ class InlineFlight:
             self._changed.wait_for(lambda: self._over or self._look != before, timeout)
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Execute a command on a robot's mission, between two moments."""
+        """Execute a command on a robot's mission, between two moments.
+
+        Raises MissionError if the robot does not fly.
+        """
         drone = self._drone
-        assert drone is not None  # noqa: S101 - a robot flies
+        if drone is None:
+            raise MissionError(f"{robot} does not fly")
         try:
             return self._calls.ask(
                 lambda: drone.command(robot, command, self._executor.clock.now()), _ANSWER_TIMEOUT

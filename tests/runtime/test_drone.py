@@ -13,6 +13,7 @@ from hosts import item_of
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
 from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import (
     AddNavigation,
@@ -135,6 +136,15 @@ def test_a_command_that_raises_is_refused() -> None:
     answer = flight.command(nonsense)
     assert not answer.accepted
     assert "Malicious is no command" in answer.text
+    _land(flight)
+
+
+def test_a_command_to_a_robot_that_does_not_fly_is_refused() -> None:
+    """By its name, to whoever asked from afar, too."""
+    flight = _loitering()
+    (node,) = flight.nodes.values()
+    with pytest.raises(MissionError, match="ghost does not fly"):
+        node.command("ghost", End(), flight.executor.clock.now())
     _land(flight)
 
 
