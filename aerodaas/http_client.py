@@ -8,6 +8,7 @@ import ssl
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.errors import ConfigError
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["http_client", "http_errors", "read_at_most"]
 
 _KEPT_OPEN = 8
+_SOCKET_SECONDS = 3.0
+"""A connection with our own servers that was idle for longer is made anew: they close it soon."""
 # httpx logs the whole address of each request, which may hold a secret.
 logging.getLogger("httpx").setLevel(logging.WARNING)
 
@@ -28,6 +31,7 @@ def http_client(
     tls: ssl.SSLContext | None = None,
     connections: int | None = None,
     public: bool = False,
+    socket: Path | None = None,
 ) -> httpx.Client:
     """Create an HTTP client, whose threads share its connections.
 
@@ -36,24 +40,31 @@ def http_client(
         tls: Certificates to trust; None for a client that speaks `http` only.
         connections: Largest number of connections; None for any number.
         public: Follow redirects and use the environment's proxies, for requests without secrets.
+        socket: Unix socket of the one server that is asked, whatever host a request names.
 
     Raises:
         ConfigError: If the environment names a proxy of an unknown kind.
     """
     import httpx  # noqa: PLC0415 - slow to load
 
+    # A context without certificates trusts nobody, and takes no time to make.
+    verify = tls or ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    limits = httpx.Limits(
+        max_connections=connections,
+        max_keepalive_connections=connections or _KEPT_OPEN,
+        keepalive_expiry=None if socket is None else _SOCKET_SECONDS,
+    )
+    transport = None
+    if socket is not None:
+        transport = httpx.HTTPTransport(verify=verify, limits=limits, uds=str(socket))
     try:
         return httpx.Client(
             # A compressed answer could unpack to any size.
             headers={"Accept-Encoding": "identity"},
-            # A context without certificates trusts nobody, and takes no time to make.
-            verify=tls or ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT),
+            verify=verify,
             timeout=timeout,
-            limits=httpx.Limits(
-                max_connections=connections,
-                max_keepalive_connections=connections or _KEPT_OPEN,
-                keepalive_expiry=None,
-            ),
+            limits=limits,
+            transport=transport,
             follow_redirects=public,
             trust_env=public,
         )

@@ -45,7 +45,7 @@ _SHARE_SECONDS = 8.0
 """Seconds over which the processor's shares are measured."""
 _KINDS = {
     "service": r" aerodaas serve ",
-    "flight": r" aerodaas\.service\.flights ",
+    "flight": r" aerodaas\.flights ",
     "drones": r"^ray::DroneActor",
     "recorder": r"^ray::RecorderActor",
 }

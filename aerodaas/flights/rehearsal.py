@@ -11,7 +11,6 @@ from pathlib import Path
 
 import psutil
 
-from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.errors import AeroDaaSError
 from aerodaas.flights.process import Flying
@@ -39,7 +38,7 @@ def rehearse(path: Path) -> None:
         flying = Flying(folder, order)
         threading.Thread(target=_watch, args=(folder, order, flying), daemon=True).start()
         outcome = flying.outcome()
-        verdict = _verdict(folder, order, flying.config, outcome)
+        verdict = _verdict(folder, order, flying, outcome)
         # The verdict and its picture are all that is kept of it.
         folder.recording.unlink(missing_ok=True)
         folder.end(outcome.model_copy(update={"verdict": verdict}))
@@ -53,7 +52,7 @@ def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
         processor, memory = time.process_time(), process.memory_info()
         # A full disk ends a rehearsal elsewhere; its bounds hold all the same.
         with contextlib.suppress(OSError):
-            folder.advance(Progress(flown=flying.flown_seconds, processor=processor))
+            folder.advance(Progress(flown=flying.served.meter.time, processor=processor))
         reason = ""
         if processor > order.rehearsal_seconds:
             reason = (
@@ -75,10 +74,11 @@ def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
 
 
 def _verdict(
-    folder: FlightFolder, order: FlightOrder, config: EnvironmentConfig | None, outcome: Outcome
+    folder: FlightFolder, order: FlightOrder, flying: Flying, outcome: Outcome
 ) -> VerdictOut:
-    if config is None or not folder.recording.is_file():
+    if not folder.recording.is_file():
         return VerdictOut(approved=False, reasons=[outcome.reason])
+    config = flying.config
     try:
         verdict = judge(folder.recording, config, minutes=order.minutes, others=order.others)
         # The picture is for people; a flight is not refused for want of it.

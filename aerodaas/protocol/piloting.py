@@ -32,6 +32,7 @@ __all__ = [
     "SurveyIn",
     "SurveyOut",
     "SurveyPhotosOut",
+    "told_of_controls",
 ]
 
 _MOST_WAYPOINTS = 1000
@@ -206,3 +207,10 @@ class ControlsOut(AnswerModel):
     at: float = 0.0
     """Of the velocity that is answered."""
     text: str = ""
+
+
+def told_of_controls(command: TakeControls | Steer | ReleaseControls) -> str:
+    """What people are told that somebody asked for; empty for a velocity, of which many come."""
+    if isinstance(command, TakeControls):
+        return f"be flown by hand by {command.operator}"
+    return "be let go of" if isinstance(command, ReleaseControls) else ""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.config.plugins import load_plugin
 from aerodaas.errors import MissionError
+from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.bookings import Bookings
@@ -71,7 +72,8 @@ class Attachments:
         if self._most == 0 or host.phase is not MissionPhase.FLYING or host.attached_to:
             return []
         # Without a link of its own: requests ask for this in any thread.
-        streams = {} if host.link is None else host.link.news.streams
+        told = None if host.link is None else host.link.mission
+        streams = {} if told is None else told.streams
         running = [name for name, kind in streams.items() if kind is StreamKind.PICTURES]
         cameras = [name for name in running if name in self._cameras]
         return [name for name in cameras if _may_have(tenant, [name], host)]
@@ -86,10 +88,10 @@ class Attachments:
         wanted = one.document().sensors
         if not set(wanted) <= set(self.shared(host, one.row.tenant)):
             raise MissionError(f"{one.attached_to} does not share its cameras any more")
-        answer = host.follow().ask(do="share", mission=one.row.id, streams=wanted)
+        answer = host.follow().share(one.row.id, wanted)
         if not answer.accepted:
             raise MissionError(answer.text)
-        return Attached(mission=host.row.id, control=host.flight.socket, sensors=wanted)
+        return Attached(mission=host.row.id, socket=host.flight.socket, sensors=wanted)
 
     def watch(self, one: ActiveMission) -> None:
         """End an attached mission whose flight has ended, or that may sense no more."""
@@ -148,7 +150,7 @@ class Attachments:
     def _withdraw(self, host: ActiveMission, one: ActiveMission) -> None:
         # A flight that does not answer shares no more either once it is over.
         with contextlib.suppress(MissionError):
-            host.follow().ask(do="withdraw", mission=one.row.id)
+            host.follow().withdraw(one.row.id)
 
     def _end(self, one: ActiveMission, reason: str) -> None:
         """Tell an attached mission to end; one that does not is ended after a while."""
@@ -157,7 +159,7 @@ class Attachments:
             self._told[one.row.id] = now
             # Its cameras end in any case.
             with contextlib.suppress(MissionError):
-                one.follow().ask(do="end", reason=reason)
+                one.follow().change_lease(FlightLeaseIn(reason=reason))
         elif now - self._told[one.row.id] > _ENDING_SECONDS:
             one.end_flight()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import logging
 import secrets
@@ -16,17 +17,15 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
+from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AnswerOut,
-    CommandIn,
     LeaseState,
     LinkState,
     MissionIn,
     MissionOut,
     MissionPhase,
-    NavigationIn,
     PictureForm,
     Role,
     Scope,
@@ -226,17 +225,7 @@ class MissionDesk:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
         # Without the lock, which may be held for long: a drone that is to come home comes home.
         link = self._flown(principal, mission).follow()
-        operator = principal.role.reaches(Role.OPERATOR)
-        if isinstance(command, CommandIn):
-            return link.ask(operator=operator, do=command.command, robot=command.robot)
-        words: dict[type[PilotCommand], str] = {
-            NavigationIn: "fly",
-            RearrangeIn: "rearrange",
-            ActuateIn: "actuate",
-            ControlsIn: "controls",
-        }
-        content = command.model_dump(mode="json")
-        return link.ask(operator=operator, do=words[type(command)], content=content)
+        return link.fly(command, operator=principal.role.reaches(Role.OPERATOR))
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
         """Raise RefusedError unless a mission flies and this account may command it."""
@@ -368,6 +357,15 @@ class MissionDesk:
         """The folder of a mission's flight; None unless it is flying."""
         one = self._missions.get(mission)
         return one.flight if one is not None and one.phase is MissionPhase.FLYING else None
+
+    def preflight(self, robot: str) -> PreflightOut | None:
+        """The list before take-off that the flight of a robot has; None without a flight."""
+        one = next((one for one in self._flying() if robot in one.row.robots), None)
+        if one is None or one.link is None:
+            return None
+        with contextlib.suppress(MissionError):
+            return one.link.preflight(robot)
+        return None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
@@ -572,7 +570,8 @@ class MissionDesk:
         one.take_off()
         one.wait_for(one.flight.cancelled)
         link = one.follow()
-        self._garage.note(link.news.status, link.news.preflight)
+        if link.mission is not None:
+            self._garage.note(link.mission.status)
         if one.attached_to is not None:
             self._attachments.watch(one)
         elif one.row.lease is not None and not one.recalled:

@@ -19,7 +19,7 @@ from pathlib import Path
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.analytics.fair_queue import FairQueue
-from aerodaas.service.unix_server import UnixServer, fits_a_socket
+from aerodaas.unix_server import UnixServer, fits_a_socket
 
 __all__ = ["EdgeArbiter"]
 

@@ -49,7 +49,8 @@ class FleetView:
 
     def preflight(self, robot: str) -> PreflightOut:
         """A robot's health before take-off; raises RefusedError for an unknown robot."""
-        return self._garage.preflight(robot)
+        known = self._garage.preflight(robot)
+        return self._desk.preflight(robot) or known
 
     def fleet_scenery(self) -> SceneryOut:
         """What lies below the fleet on a map; raises ConfigError if its world cannot be read."""

@@ -79,7 +79,6 @@ class Garage:
     def note(
         self,
         status: Mapping[str, StatusOut],
-        preflight: Mapping[str, PreflightOut] | None = None,
         *,
         ended: float | None = None,
     ) -> None:
@@ -89,7 +88,6 @@ class Garage:
 
         Args:
             status: Newest status by robot.
-            preflight: The list before take-off by robot.
             ended: Unix seconds of the end of its flight, of which this is the last status, to be
                 written down at once; None while it goes on.
         """
@@ -104,7 +102,6 @@ class Garage:
             lost = silent or one.mode == VehicleMode.LOST.value
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.news(name)
-            health = (preflight or {}).get(name, PreflightOut(robot=name))
             faults = (f"its mission has told nothing since {_moment(told)}",)
             news = VehicleNews(
                 link=link,
@@ -114,8 +111,6 @@ class Garage:
                 position=_known(one.position),
                 mode=one.mode or "",
                 faults=faults if silent else tuple(one.faults),
-                health=tuple(health.items),
-                examined=None if health.age is None else told - health.age,
             )
             least = _WRITE_SECONDS if ended is None else 0.0
             self._take(name, news, heard=news.heard, least=least)

@@ -12,11 +12,11 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
+from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import LeaseState, MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -66,10 +66,10 @@ class ActiveMission:
         self._flying: subprocess.Popen[bytes] | None = None
         """Processes that this service has started; the flight's is never ended from here."""
         self._rehearsed_since = time.monotonic()
-        self._known_lease: dict[str, Any] | None = None
-        """The last word on its lease that its flight has heard."""
-        self._missed_lease: tuple[dict[str, Any], int] | None = None
-        """One that it has not, with the number of its news then."""
+        self._known_lease: FlightLeaseIn | None = None
+        """The last state of its lease that its flight was told."""
+        self._missed_lease: tuple[FlightLeaseIn, int] | None = None
+        """One that it was not, with the number of states that it had told then."""
 
     def write(self, document: MissionDocument) -> None:
         """Keep the document."""
@@ -168,7 +168,7 @@ class ActiveMission:
     def brief(self, order: FlightOrder, models: ModelShelf) -> None:
         """Write down the flight's order, before anything of it begins."""
         self._prepare(self.flight, order, models)
-        self._known_lease = {"do": "extend", "ends": order.ends}
+        self._known_lease = FlightLeaseIn(ends=order.ends)
 
     def take_off(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
@@ -187,7 +187,7 @@ class ActiveMission:
             self.flight.cancel(reason)
             kept = True
         try:
-            self.follow().ask(do="end", reason=reason)
+            self.follow().change_lease(FlightLeaseIn(reason=reason))
         except MissionError:
             if not kept:
                 raise
@@ -213,25 +213,25 @@ class ActiveMission:
     @property
     def recalled(self) -> bool:
         """Whether the flight knows that its lease has ended."""
-        return self._known_lease is not None and self._known_lease["do"] == "end"
+        return self._known_lease is not None and self._known_lease.ends is None
 
     def tell_lease(self, lease: Lease) -> None:
         """Tell the flight what has become of its lease, unless it knows.
 
-        A flight that is being launched, or hangs, is told again once it has news of its own.
+        A flight that is being launched, or hangs, is told again once it has told its state.
         """
-        word: dict[str, Any] = {"do": "extend", "ends": lease.ends}
+        state = FlightLeaseIn(ends=lease.ends)
         if lease.state is LeaseState.ENDED:
-            word = {"do": "end", "reason": f"the lease has ended: {lease.reason}"}
+            state = FlightLeaseIn(reason=f"the lease has ended: {lease.reason}")
         link = self.follow()
-        heard = link.news.number
-        if word == self._known_lease or (word, heard) == self._missed_lease:
+        number = link.number
+        if state == self._known_lease or (state, number) == self._missed_lease:
             return
         try:
-            link.ask(**word)
-            self._known_lease = word
+            link.change_lease(state)
+            self._known_lease = state
         except MissionError:
-            self._missed_lease = word, heard
+            self._missed_lease = state, number
 
     def flown(self) -> Outcome | None:
         """How the flight ended; None while it goes on.

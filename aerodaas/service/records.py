@@ -11,12 +11,11 @@ __all__ = ["shown"]
 
 def shown(one: ActiveMission) -> MissionOut:
     """A mission with its newest state: of its flight while it goes on, else as it ended."""
-    row, link = one.row, one.link
+    row = one.row
     outcome = one.flight.outcome() if one.over else None
-    news = link.news if link is not None else None
-    status, alerts = (news.status, news.alerts) if news is not None else ({}, [])
-    if outcome is not None:
-        status, alerts = outcome.status, outcome.alerts
+    told = None if one.link is None else one.link.mission
+    newest = outcome or told
+    flying = None if one.over else told
     verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
     if verdict is not None:
         reasons = [without_folders(reason) for reason in verdict.reasons]
@@ -39,10 +38,10 @@ def shown(one: ActiveMission) -> MissionOut:
         started=row.started,
         ended=row.ended,
         verdict=verdict,
-        status=status,
-        told=news.told if news is not None and not one.over else {},
-        alerts=alerts,
-        streams=news.streams if news is not None and not one.over else {},
-        analytics=news.analytics if news is not None and not one.over else None,
+        status={} if newest is None else newest.status,
+        told={} if flying is None else flying.told,
+        alerts=[] if newest is None else newest.alerts,
+        streams={} if flying is None else flying.streams,
+        analytics=None if flying is None else flying.analytics,
         recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
     )

@@ -12,6 +12,7 @@ import pytest
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import (
     AnswerOut,
     LinkState,
@@ -30,7 +31,6 @@ from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
-from aerodaas.service.flights.link import FlightNews
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
@@ -75,12 +75,33 @@ class Link:
 
     def __init__(self) -> None:
         streams = dict.fromkeys(("one/cam", "one/belly"), StreamKind.PICTURES)
-        self.news = FlightNews(1, streams={**streams, "one/found": StreamKind.DETECTIONS})
-        self.asked: list[dict[str, Any]] = []
+        self.mission = MissionOut(
+            id="own",
+            name="visits",
+            tenant="own",
+            account="own",
+            phase=MissionPhase.FLYING,
+            robots=["one"],
+            submitted=0.0,
+            streams={**streams, "one/found": StreamKind.DETECTIONS},
+        )
+        self.number = 1
+        self.asked: list[Any] = []
 
-    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
+    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
         """Accept."""
-        self.asked.append(request)
+        return self._accept(lease)
+
+    def share(self, mission: str, sensors: list[str]) -> AnswerOut:
+        """Accept."""
+        return self._accept(("share", mission, sensors))
+
+    def withdraw(self, mission: str) -> AnswerOut:
+        """Accept."""
+        return self._accept(("withdraw", mission))
+
+    def _accept(self, asked: object) -> AnswerOut:
+        self.asked.append(asked)
         return AnswerOut(accepted=True)
 
     def hear(self) -> None:

@@ -9,6 +9,7 @@ from typing import Any, cast
 import pytest
 from desks import PILOT, Link, Provider
 
+from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
@@ -47,7 +48,7 @@ def attached(provider: Provider, host: MissionOut, who: Principal = CITY) -> Mis
     return mission
 
 
-def asked(provider: Provider, mission: MissionOut) -> list[dict[str, Any]]:
+def asked(provider: Provider, mission: MissionOut) -> list[Any]:
     """What a mission's flight was asked."""
     return list(cast("Link", provider.desk._missions[mission.id].link).asked)
 
@@ -56,7 +57,7 @@ def test_who_is_granted_senses_beside_the_flight(provider: Provider) -> None:
     """In a process of its own, without a drone, by what was granted alone."""
     host = provider.flying(grants=GRANT)
     mission = attached(provider, host)
-    assert {"do": "share", "mission": mission.id, "streams": ["one/cam"]} in asked(provider, host)
+    assert ("share", mission.id, ["one/cam"]) in asked(provider, host)
     order = FlightOrder.read(provider.started[-1].order)
     assert order.robots == []
     assert order.attached is not None
@@ -166,7 +167,7 @@ def test_an_attached_mission_takes_no_command(provider: Provider) -> None:
         provider.desk.fly(CITY, host.id, CommandIn(robot="one", command="land"))
     with pytest.raises(RefusedError, match="senses only: attach to a mission in flight"):
         provider.desk.submit(CITY, watching(mission.id))
-    assert all(one["do"] in {"share", "withdraw"} for one in asked(provider, host))
+    assert all(one[0] in {"share", "withdraw"} for one in asked(provider, host))
 
 
 def test_a_withdrawn_grant_ends_what_was_attached(provider: Provider) -> None:
@@ -174,9 +175,8 @@ def test_a_withdrawn_grant_ends_what_was_attached(provider: Provider) -> None:
     host = provider.flying(grants=GRANT)
     mission, own = attached(provider, host), attached(provider, host, PILOT)
     provider.desk.grant(PILOT, host.id, "city", None)
-    assert {"do": "withdraw", "mission": mission.id} in asked(provider, host)
-    (told,) = [one for one in asked(provider, mission) if one["do"] == "end"]
-    assert told["reason"] == "farm has withdrawn its grant"
+    assert ("withdraw", mission.id) in asked(provider, host)
+    assert asked(provider, mission) == [FlightLeaseIn(reason="farm has withdrawn its grant")]
     assert asked(provider, own) == []
     with pytest.raises(RefusedError, match="there is no mission"):
         provider.desk.submit(CITY, watching(host.id))
@@ -190,7 +190,7 @@ def test_a_narrower_grant_ends_what_it_leaves_out(provider: Provider) -> None:
     provider.desk.grant(PILOT, host.id, "city", ["one/cam"])
     assert asked(provider, mission) == []
     provider.desk.grant(PILOT, host.id, "city", ["one/belly"])
-    assert {"do": "withdraw", "mission": mission.id} in asked(provider, host)
+    assert ("withdraw", mission.id) in asked(provider, host)
 
 
 def test_an_attached_mission_ends_with_its_flight(provider: Provider) -> None:
@@ -202,7 +202,8 @@ def test_an_attached_mission_ends_with_its_flight(provider: Provider) -> None:
     provider.land()
     provider.turns()
     assert provider.phase(host) is MissionPhase.LANDED
-    assert [one["do"] for one in asked(provider, mission)] == ["end"]
+    (told,) = asked(provider, mission)
+    assert told.ends is None
     with pytest.raises(RefusedError, match="there is no mission"):
         provider.desk.submit(CITY, watching(host.id))
     process.end(Outcome(landed=True, began=0.0, ended=1.0, reason="over"))

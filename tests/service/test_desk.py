@@ -34,7 +34,6 @@ from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.link import FlightNews
 from aerodaas.service.flights.order import Outcome, Progress
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
@@ -388,7 +387,8 @@ def test_a_flight_is_followed_once(one: Desk, monkeypatch: pytest.MonkeyPatch) -
     made: list[object] = []
 
     class Link:
-        news = FlightNews()
+        mission = None
+        number = 0
 
         def __init__(self, *_: object) -> None:
             time.sleep(0.05)

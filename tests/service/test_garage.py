@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from desks import PILOT, Provider
 
+from aerodaas.errors import MissionError
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role, StatusOut
@@ -176,15 +177,21 @@ def test_the_list_before_take_off_is_told_with_its_age(provider: Provider, clock
 
 
 def test_a_missions_drone_has_the_list_that_its_flight_went_through(
-    provider: Provider, clock: Clock
+    provider: Provider, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As old as the flight says, and older with each second in which it says nothing."""
+    """Which is asked for it; of one that does not answer there is none."""
+    mission = provider.flying()
     provider.monitor.see("one", health=(WINDY,), examined=T0)
     provider.garage.hand(["one"], LinkState.MISSION)
-    assert provider.garage.preflight("one").items == []
+    link = provider.desk._missions[mission.id].link
     well = HealthItem("wind", "2.0 m/s", "at most 10", Verdict.GOOD)
-    provider.garage.note(status(10.0), {"one": PreflightOut.of("one", [well], 4.0)})
-    clock.now = T0 + 1.0
-    told = provider.garage.preflight("one")
-    assert (told.verdict, told.age) == (Verdict.GOOD, 5.0)
+    told = PreflightOut.of("one", [well], 4.0)
+    monkeypatch.setattr(link, "preflight", lambda _: told, raising=False)
+    assert provider.fleet.preflight("one") == told
     assert seen(provider).preflight is None
+
+    def silent(_: str) -> PreflightOut:
+        raise MissionError("it does not answer")
+
+    monkeypatch.setattr(link, "preflight", silent)
+    assert provider.fleet.preflight("one").items == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,6 +11,7 @@ import pytest
 from desks import PILOT, Link, Monitor, Provider
 
 from aerodaas.errors import MissionError
+from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import AnswerOut, LeaseIn, LinkState, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
@@ -170,10 +170,10 @@ def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
 class Launching(Link):
     """A flight whose process does not listen yet."""
 
-    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
-        """Note what is asked; answer once there is news."""
-        super().ask(**request)
-        if not self.news.number:
+    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
+        """Note what is asked; answer once it has told its state."""
+        super().change_lease(lease)
+        if not self.number:
             raise MissionError("the flight's process does not answer")
         return AnswerOut(accepted=True)
 
@@ -183,7 +183,7 @@ def launching(provider: Provider) -> tuple[Launching, str]:
     """A flight that is being launched, and its lease."""
     mission = provider.flying()
     link = Launching()
-    link.news = replace(link.news, number=0)
+    link.number = 0
     provider.desk._missions[mission.id].link = cast("Any", link)
     lease = provider.desk.shown(mission.id).lease
     assert lease is not None
@@ -196,10 +196,10 @@ def test_a_lease_revoked_during_the_launch_brings_the_drone_home(
     """The flight is told once it listens, and once only; while it hangs nobody waits for it."""
     link, lease = launching
     provider.bookings.end(OPERATOR, lease)
-    told = {"do": "end", "reason": "the lease has ended: revoked by olga"}
+    told = FlightLeaseIn(reason="the lease has ended: revoked by olga")
     provider.turns()
     assert link.asked == [told]
-    link.news = replace(link.news, number=1)
+    link.number = 1
     provider.turns()
     assert link.asked == [told, told]
 
@@ -210,9 +210,9 @@ def test_a_lease_extended_during_the_launch_ends_later(
     """As its user was told."""
     link, lease = launching
     ends = provider.bookings.extend(PILOT, lease, 5.0).ends
-    link.news = replace(link.news, number=1)
+    link.number = 1
     provider.turns()
-    assert link.asked == [{"do": "extend", "ends": ends}] * 2
+    assert link.asked == [FlightLeaseIn(ends=ends)] * 2
 
 
 def test_what_became_of_a_lease_is_told_by_the_next_service(
@@ -226,4 +226,4 @@ def test_what_became_of_a_lease_is_told_by_the_next_service(
     link = again.link = cast("Any", Link())
     provider.desk._missions[mission.row.id] = again
     provider.turns()
-    assert link.asked == [{"do": "end", "reason": "the lease has ended: revoked by olga"}]
+    assert link.asked == [FlightLeaseIn(reason="the lease has ended: revoked by olga")]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import socket
 import threading
 import time
@@ -19,6 +18,7 @@ from typing import Any, TypeAlias
 
 from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.errors import ConfigError
+from aerodaas.unix_server import UnixServer
 
 __all__ = ["LARGEST_ANSWER", "HereRelay", "HereTimes", "HereUser", "Send", "oversize"]
 
@@ -105,21 +105,15 @@ class HereRelay:
         self._number = 0
         self._waiting: dict[int, _Question] = {}
         self._times: dict[str, HereTimes] = {}
-        self._open: set[socket.socket] = set()
-        self._closed = False
-        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._server: UnixServer | None = None
 
     def start(self) -> None:
         """Listen for nodes; raises ConfigError if there can be no socket at the path."""
         try:
-            with contextlib.suppress(FileNotFoundError):
-                self.path.unlink()
-            self._listener.bind(str(self.path))
-            os.chmod(self.path, 0o600)  # noqa: PTH101 - of a socket
-            self._listener.listen(_CONNECTIONS)
+            self._server = UnixServer(self.path, self._serve, name="here", most=_CONNECTIONS)
         except OSError as error:
             raise ConfigError(f"no socket at {self.path}: {error.strerror or error}") from None
-        threading.Thread(target=self._accept, name="here", daemon=True).start()
+        self._server.start()
 
     def attach(self, send: Send) -> HereUser:
         """Ask the user by `send` from now on; an earlier connection is asked no more.
@@ -177,19 +171,13 @@ class HereRelay:
 
     def close(self) -> None:
         """Close the socket and all connections, and remove the path."""
-        self._closed = True
         with self._lock:
             user, self._user = self._user, None
-            connections = list(self._open)
         if user is not None:
             self._drop(user, "the flight is over")
-        # A listener that is only closed keeps a thread in accept().
-        for one in (self._listener, *connections):
-            with contextlib.suppress(OSError):
-                one.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        with contextlib.suppress(OSError):
-            self.path.unlink()
+        if self._server is not None:
+            self._server.close()
+        self.path.unlink(missing_ok=True)
 
     def ask(self, request: dict[str, Any], blob: bytes) -> dict[str, Any]:
         """Ask the user; the answer, or why there is none, as `absent`."""
@@ -216,35 +204,12 @@ class HereRelay:
             user.slow[key] = number
             return self._missed(key, f"the user's side gave no answer in {self._seconds:g} s")
 
-    def _accept(self) -> None:
-        while not self._closed:
-            try:
-                connection, _ = self._listener.accept()
-            except OSError:
-                return
-            with self._lock:
-                welcome = len(self._open) < _CONNECTIONS and not self._closed
-                if welcome:
-                    self._open.add(connection)
-            if not welcome:
-                connection.close()
-                continue
-            threading.Thread(
-                target=self._serve, args=(connection,), name="here analysis", daemon=True
-            ).start()
-
     def _serve(self, connection: socket.socket) -> None:
         channel = Channel(connection)
-        try:
+        with contextlib.suppress(ChannelError):
             while True:
                 request, blob = channel.receive()
                 channel.send(self.ask(request, blob))
-        except ChannelError:
-            return
-        finally:
-            with self._lock:
-                self._open.discard(connection)
-            channel.close()
 
     def _drop(self, user: HereUser, reason: str) -> None:
         with self._lock:

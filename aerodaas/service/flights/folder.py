@@ -12,7 +12,6 @@ from aerodaas.config.file_lock import exclusive, is_locked
 from aerodaas.config.private_file import write_private
 from aerodaas.errors import MissionError
 from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
-from aerodaas.service.unix_server import fits_a_socket
 
 __all__ = ["FlightFolder"]
 
@@ -29,22 +28,13 @@ class FlightFolder:
         self.recording = self.path / "flight.mcap"
         self.picture = self.path / "rehearsal.png"
         self.log = self.path / "log"
+        self.socket = self.path / "api"
+        """Unix socket at which the flight's process serves the API."""
         self._begun = self.path / "begun"
         self._lock = self.path / "lock"
         self._cancelled = self.path / "cancelled"
         self._progress = self.path / "progress.json"
         self._outcome = self.path / "outcome.json"
-
-    @property
-    def socket(self) -> Path:
-        """Path of the control socket.
-
-        Raises MissionError where it would be longer than the system allows.
-        """
-        path = self.path / "control"
-        if not fits_a_socket(path):
-            raise MissionError(f"{path.parent} is too long a path for a socket: use a shorter one")
-        return path
 
     def make(self, order: FlightOrder, document: str) -> None:
         """Create the folder with an order and the text of a document, for this user alone."""

@@ -1,83 +1,121 @@
-"""Link of the service to a flight's process over its control socket."""
+"""Link of the service to a flight's process: a client of the API that it serves on its socket."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
-import socket
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, TypeVar
+from urllib.parse import urlencode
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import unix_connect
 
-from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.clock import host_time_ns, seconds
-from aerodaas.errors import ConfigError, MissionError
+from aerodaas.errors import MissionError, SilentError
+from aerodaas.http_client import http_client, http_errors
+from aerodaas.protocol.flights import FlightLeaseIn
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnalyticsOut, AnswerOut, PictureForm, StatusOut, StreamKind
+from aerodaas.protocol.schemas import (
+    AnswerOut,
+    CommandIn,
+    GrantIn,
+    MissionOut,
+    NavigationIn,
+    PictureForm,
+    RefusalOut,
+    Role,
+)
+from aerodaas.service.backend import PilotCommand
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.own.access import OWN
 from aerodaas.service.trouble import TroubleLog
 
-__all__ = ["FlightLink", "FlightNews"]
+__all__ = ["FlightLink", "flight_address"]
+
+M = TypeVar("M", bound=BaseModel)
 
 _log = logging.getLogger(__name__)
 _CONNECT_SECONDS = 2.0
+_CLOSE_SECONDS = 0.2
+"""For the flight to take leave of a view, which it may not do while frames of it wait here."""
 _ANSWER_SECONDS = 10.0
 _SILENT_SECONDS = 15.0
 _AGAIN_SECONDS = 0.2
+_ITEM_SECONDS = 0.5
 _HEARD_SECONDS = 1.0
 """Least seconds between two words to a flight that its user is there."""
+_RATE, _ITEMS_RATE = 10.0, 0.5
+"""States a second of the view that is followed, and at most of one that is opened for items."""
 _MOST_ASKED = 8
 """Requests of a mission's users at once, each of which has a thread that others' may need."""
+_MOST_WAITING = 4
+"""Frames of a view that wait here: pictures that nobody takes are left out by the flight."""
+_REFUSALS = frozenset({403, 404, 409, 422})
+"""Statuses of what the flight has refused, which is an answer."""
+_SILENT = 504
+_PATHS: dict[type[PilotCommand], str] = {
+    CommandIn: "commands",
+    NavigationIn: "navigation",
+    RearrangeIn: "plan",
+    ActuateIn: "actuators",
+    ControlsIn: "controls",
+}
 
 
-@dataclass(frozen=True)
-class FlightNews:
-    """What a flight has told last."""
+def flight_address(path: str, role: Role, **query: str | float) -> dict[str, Any]:
+    """Arguments of `unix_connect` for a WebSocket of a flight's mission, beside its socket.
 
-    number: int = 0
-    """Counts the news."""
-    status: dict[str, StatusOut] = field(default_factory=dict)
-    told: dict[str, float] = field(default_factory=dict)
-    """Host time in seconds when that status came, by robot."""
-    alerts: list[str] = field(default_factory=list)
-    analytics: AnalyticsOut | None = None
-    streams: dict[str, StreamKind] = field(default_factory=dict)
-    preflight: dict[str, PreflightOut] = field(default_factory=dict)
-    """The list before take-off by robot."""
+    The role is that as which the service asks: whoever can open the socket is the service.
+    """
+    more = f"?{urlencode(query)}" if query else ""
+    return {
+        "uri": f"ws://flight/v1/missions/{OWN}/{path}{more}",
+        "additional_headers": _as_role(role),
+        "open_timeout": _CONNECT_SECONDS,
+        "close_timeout": _CLOSE_SECONDS,
+        "compression": None,
+        "ping_interval": None,
+        "max_size": None,
+        "max_queue": _MOST_WAITING,
+        "proxy": None,
+    }
 
 
-class _Lane:
-    """A connection for requests, one at a time."""
+def _as_role(role: Role) -> dict[str, str]:
+    return {"Authorization": f"Bearer {role.value}"}
 
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.channel: Channel | None = None
 
-    def drop(self) -> None:
-        """Close the connection; with the lock held."""
-        if self.channel is not None:
-            self.channel.close()
-            self.channel = None
+class _State(BaseModel):
+    """Message of a live view with the mission's state."""
+
+    kind: Literal["mission"]
+    now: int
+    """Host time of the flight's process, nanoseconds."""
+    mission: MissionOut
 
 
 class FlightLink:
-    """Commands to one flight, its news, and its streams' items; safe in any thread."""
+    """Commands to one flight, its state, and its streams' items; safe in any thread."""
 
     def __init__(self, folder: FlightFolder, told: Callable[[], None] = lambda: None) -> None:
-        """Follow the flight in `folder`; `told` is called after each news, in another thread."""
+        """Follow the flight in `folder`; `told` is called after each state, in another thread."""
         self._folder = folder
         self._told = told
-        self._users, self._own, self._presence = _Lane(), _Lane(), _Lane()
+        # Of any number of connections: who waits for an answer keeps nobody else from one.
+        self._client = http_client(_ANSWER_SECONDS, socket=folder.socket)
         self._heard = threading.Event()
         """Set when the flight is to be told that its user is there."""
         self._places = threading.BoundedSemaphore(_MOST_ASKED)
         self._closed = threading.Event()
-        self.news = FlightNews()
-        self._ahead = 0.0
-        """Seconds by which this process' host time is ahead of the flight's."""
+        self.mission: MissionOut | None = None
+        """Newest state of the flight, as it tells it itself, by this process' host time."""
+        self.number = 0
+        """Counts the states."""
         threading.Thread(target=self._follow, name="flight", daemon=True).start()
         threading.Thread(target=self._tell_heard, name="presence", daemon=True).start()
 
@@ -85,123 +123,150 @@ class FlightLink:
         """Follow no more; the flight goes on."""
         self._closed.set()
         self._heard.set()
-        for lane in (self._users, self._own, self._presence):
-            with lane.lock:
-                lane.drop()
+        self._client.close()
 
-    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
-        """Send a request and return its answer.
+    def fly(self, command: PilotCommand, *, operator: bool) -> AnswerOut:
+        """Give a robot a command; returns its answer, or why the flight refuses it.
 
-        One of a user (`operator` is False) waits for those of users before it; an operator's and
-        the service's own wait for none of them, for what a flight does not answer takes long.
+        Those of users wait for none of an operator's and the service's own; these wait for none
+        of users', for what a drone does not answer takes long.
 
-        Raises MissionError if the flight cannot be reached, or has too many to answer; a request
+        Raises MissionError if the flight cannot be reached, or has too many to answer; a command
         that was sent is not sent again, for it may have been carried out.
         """
-        if request.get("operator", True):
-            return self._asked(self._own, request)
-        if not self._places.acquire(blocking=False):
-            raise MissionError(
-                f"the flight has {_MOST_ASKED} commands to answer: ask again in a moment"
-            )
-        try:
-            return self._asked(self._users, request)
-        finally:
-            self._places.release()
+        path = _PATHS[type(command)]
+        if operator:
+            return self._answered("POST", path, command)
+        with self._place():
+            return self._answered("POST", path, command, Role.PILOT)
+
+    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
+        """Tell the flight of its lease; raises MissionError as `fly`, also the others below."""
+        return self._answered("PUT", "lease", lease)
+
+    def share(self, mission: str, sensors: list[str]) -> AnswerOut:
+        """Have the flight share these cameras with an attached mission, and no others."""
+        return self._answered("PUT", f"shares/{mission}", GrantIn(sensors=sensors))
+
+    def withdraw(self, mission: str) -> AnswerOut:
+        """Have the flight share nothing with a mission any more."""
+        return self._answered("DELETE", f"shares/{mission}")
+
+    def preflight(self, robot: str) -> PreflightOut:
+        """The list before take-off of one of its robots."""
+        path = f"/v1/robots/{robot}/preflight"
+        with self._place():
+            return self._asked(PreflightOut, "GET", path, None, Role.VIEWER)
 
     def hear(self) -> None:
         """Have the flight told that its user is there; nobody waits for that, as it may hang."""
         self._heard.set()
 
+    @contextlib.contextmanager
+    def _place(self) -> Iterator[None]:
+        """Count a request of users; raises MissionError for too many at once."""
+        if not self._places.acquire(blocking=False):
+            raise MissionError(
+                f"the flight has {_MOST_ASKED} commands to answer: ask again in a moment"
+            )
+        try:
+            yield
+        finally:
+            self._places.release()
+
     def _tell_heard(self) -> None:
         while self._heard.wait() and not self._closed.is_set():
             self._heard.clear()
             with contextlib.suppress(MissionError):
-                self._asked(self._presence, {"do": "heard"})
+                self._answered("POST", "presence")
             self._closed.wait(_HEARD_SECONDS)
 
-    def _asked(self, lane: _Lane, request: dict[str, Any]) -> AnswerOut:
-        with lane.lock:
-            try:
-                if lane.channel is None:
-                    lane.channel = self._connected("command")
-                lane.channel.send(request, timeout=_ANSWER_SECONDS)
-                answer, _ = lane.channel.receive(_ANSWER_SECONDS)
-                return AnswerOut.model_validate(answer)
-            except (ChannelError, OSError, ValidationError) as error:
-                lane.drop()
-                raise MissionError(f"the flight's process does not answer: {error}") from None
+    def _answered(
+        self, method: str, path: str, content: BaseModel | None = None, role: Role = Role.OPERATOR
+    ) -> AnswerOut:
+        try:
+            return self._asked(AnswerOut, method, f"/v1/missions/{OWN}/{path}", content, role)
+        except _RefusalError as error:
+            return AnswerOut(accepted=False, text=str(error))
+
+    def _asked(
+        self, kind: type[M], method: str, path: str, content: BaseModel | None, role: Role
+    ) -> M:
+        if self._closed.is_set():
+            raise MissionError("the flight is not followed any more")
+        body = None if content is None else content.model_dump_json(exclude_unset=True)
+        headers = {**_as_role(role), "Content-Type": "application/json"}
+        with http_errors(_silent):
+            answer = self._client.request(
+                method, f"http://flight{path}", content=body, headers=headers
+            )
+        try:
+            if answer.is_success:
+                return kind.model_validate_json(answer.content)
+            text = RefusalOut.model_validate_json(answer.content).text
+        except ValidationError as error:
+            raise _silent(error) from None
+        if answer.status_code in _REFUSALS:
+            raise _RefusalError(text)
+        raise (SilentError if answer.status_code == _SILENT else MissionError)(text)
 
     def items(
         self, stream: str, form: PictureForm = PictureForm.WHOLE
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Yield a stream's items until the flight is over; an empty message a while without any.
 
-        Its pictures come in a form. Raises ConfigError if there is no such stream, MissionError
-        if the flight is lost.
+        Its pictures come in a form. Raises MissionError if the flight is lost.
         """
         try:
-            channel = self._connected("items", stream=stream, form=form.value)
-        except (ChannelError, OSError) as error:
-            raise MissionError(f"the flight's process does not answer: {error}") from None
-        with contextlib.closing(channel):
-            first, _ = self._received(channel)
-            if "refused" in first:
-                raise ConfigError(str(first["refused"]))
-            while not self._closed.is_set():
-                message, blob = self._received(channel)
-                yield message, blob
-
-    def _received(self, channel: Channel) -> tuple[dict[str, Any], bytes]:
-        try:
-            return channel.receive(_SILENT_SECONDS)
-        except ChannelError as error:
+            query = {"rate": _ITEMS_RATE, "streams": stream, "pictures": form.value}
+            address = flight_address("live", Role.VIEWER, **query)
+            with unix_connect(str(self._folder.socket), **address) as view:
+                while not self._closed.is_set():
+                    try:
+                        message = json.loads(view.recv(_ITEM_SECONDS))
+                    except TimeoutError:
+                        message = {}
+                    if message.get("kind") == "end":
+                        return
+                    if message.get("kind") == "mission":
+                        message = {}
+                    blob = view.recv(_SILENT_SECONDS) if message.get("blob") else b""
+                    yield message, blob if isinstance(blob, bytes) else b""
+        except (OSError, EOFError, WebSocketException) as error:
             raise MissionError(f"the flight's stream has ended: {error}") from None
-
-    def _connected(self, purpose: str, **more: str) -> Channel:
-        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        connection.settimeout(_CONNECT_SECONDS)
-        try:
-            connection.connect(str(self._folder.socket))
-        except OSError:
-            connection.close()
-            raise
-        channel = Channel(connection)
-        channel.send({"for": purpose, **more}, timeout=_CONNECT_SECONDS)
-        return channel
 
     def _follow(self) -> None:
         trouble = TroubleLog(_log)
         while not self._closed.is_set():
             try:
                 self._follow_once()
-            except (ChannelError, OSError):
+            except (OSError, EOFError, WebSocketException):
                 pass  # Before the process listens and after its end there is nobody to connect to.
-            except Exception as error:  # noqa: BLE001 - news that are not as agreed, of any kind
-                trouble.tell(f"{self._folder.path.name}: its news cannot be read", error)
+            except Exception as error:  # noqa: BLE001 - a state that is not as agreed, of any kind
+                trouble.tell(f"{self._folder.path.name}: its state cannot be read", error)
             self._closed.wait(_AGAIN_SECONDS)
 
     def _follow_once(self) -> None:
-        with contextlib.closing(self._connected("follow")) as channel:
-            message, _ = channel.receive(_SILENT_SECONDS)
-            # The flight's process may count host time from elsewhere.
-            self._ahead = seconds(host_time_ns()) - message.get("now", 0.0)
-            self._take(message)
+        address = flight_address("live", Role.OPERATOR, rate=_RATE)
+        with unix_connect(str(self._folder.socket), **address) as view:
+            ahead: float | None = None
             while not self._closed.is_set():
-                self._take(channel.receive(_SILENT_SECONDS)[0])
+                text = view.recv(_SILENT_SECONDS)
+                if text == '{"kind": "end"}':
+                    return
+                state = _State.model_validate_json(text)
+                if ahead is None:
+                    # The flight's process may count host time from elsewhere.
+                    ahead = seconds(host_time_ns() - state.now)
+                told = {name: moment + ahead for name, moment in state.mission.told.items()}
+                self.mission = state.mission.model_copy(update={"told": told})
+                self.number += 1
+                self._told()
 
-    def _take(self, message: dict[str, Any]) -> None:
-        robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
-        streams = {name: StreamKind(kind) for name, kind in message.get("streams", {}).items()}
-        lists = message.get("preflight", {})
-        sums = message.get("analytics")
-        self.news = FlightNews(
-            self.news.number + 1,
-            robots,
-            {name: moment + self._ahead for name, moment in message.get("told", {}).items()},
-            message["alerts"],
-            None if sums is None else AnalyticsOut(**sums),
-            streams,
-            {name: PreflightOut.model_validate(one) for name, one in lists.items()},
-        )
-        self._told()
+
+class _RefusalError(MissionError):
+    """The flight refuses what it was asked for."""
+
+
+def _silent(error: Exception) -> MissionError:
+    return MissionError(f"the flight's process does not answer: {error}")

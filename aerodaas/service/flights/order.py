@@ -31,8 +31,8 @@ class Attached(_Record):
     """The flight by whose cameras a mission senses."""
 
     mission: str
-    control: Path
-    """Its control socket."""
+    socket: Path
+    """At which its process serves the API."""
     sensors: list[str]
     """Cameras that are shared, by full id."""
 

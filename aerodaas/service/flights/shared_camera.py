@@ -1,15 +1,17 @@
-"""SharedCamera: a camera of another mission in flight, by that flight's control socket."""
+"""SharedCamera: a camera of another mission in flight, by the API of that flight's process."""
 
 from __future__ import annotations
 
-import socket
+import json
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
+from websockets.exceptions import InvalidStatus, WebSocketException
+from websockets.sync.client import ClientConnection, unix_connect
 
-from aerodaas.analytics.here.channel import Channel, ChannelError
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.cameras.base import Picture
 from aerodaas.config.checked import checked
@@ -19,11 +21,12 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.schema import MessageError
+from aerodaas.protocol.schemas import RefusalOut, Role
+from aerodaas.service.flights.link import flight_address
 from aerodaas.service.flights.order import Attached
 
 __all__ = ["SharedCamera", "SharedCameraSettings", "attached_config"]
 
-_CONNECT_SECONDS = 10.0
 _ANSWER_SECONDS = 5.0
 _DRIVER = "aerodaas.service.flights.shared_camera:SharedCamera"
 
@@ -33,8 +36,8 @@ class SharedCameraSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    control: Path
-    """Control socket of the flight."""
+    socket: Path
+    """Unix socket at which the flight's process serves the API."""
     mission: str
     """The attached mission, with which the camera is shared."""
     stream: str
@@ -55,7 +58,8 @@ class SharedCamera:
         """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = checked(SharedCameraSettings, sensor.settings, f"sensor {sensor.full_id}")
-        self._channel: Channel | None = None
+        self._connection: ClientConnection | None = None
+        self._stack = ExitStack()
         self.model: CameraModel | None = None
         self.finished = False
         self.skipped = 0
@@ -63,20 +67,19 @@ class SharedCamera:
     def open(self) -> None:
         """Ask for the camera; raises SourceError if it is not shared, or its flight is over."""
         settings = self._settings
-        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            connection.settimeout(_CONNECT_SECONDS)
-            connection.connect(str(settings.control))
-            self._channel = Channel(connection)
-            wanted = {"for": "share", "mission": settings.mission, "stream": settings.stream}
-            self._channel.send(wanted, timeout=_CONNECT_SECONDS)
-            answer, _ = self._channel.receive(_CONNECT_SECONDS)
-        except (OSError, ChannelError) as error:
-            connection.close()
+            path = f"shares/{settings.mission}"
+            address = flight_address(path, Role.VIEWER, stream=settings.stream)
+            connected = unix_connect(str(settings.socket), **address)
+            self._connection = self._stack.enter_context(connected)
+        except InvalidStatus as error:
+            try:
+                said = RefusalOut.model_validate_json(error.response.body or b"").text
+            except ValidationError:
+                said = f"{settings.stream}: its flight refuses it: {error}"
+            raise SourceError(said) from None
+        except (OSError, EOFError, WebSocketException) as error:
             raise SourceError(f"{settings.stream}: its flight does not answer: {error}") from None
-        if "refused" in answer:
-            self.close()
-            raise SourceError(str(answer["refused"]))
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Return the flight's newest picture; None if there is no new one."""
@@ -91,15 +94,16 @@ class SharedCamera:
 
     def _next_frame(self) -> tuple[Frame, int] | None:
         """The newest frame that was not returned, and its capture by `time.monotonic_ns`."""
-        if self._channel is None or self.finished:
+        if self._connection is None or self.finished:
             return None
         try:
-            self._channel.send({}, timeout=_ANSWER_SECONDS)
-            message, blob = self._channel.receive(_ANSWER_SECONDS)
+            self._connection.send("")
+            message = json.loads(self._connection.recv(_ANSWER_SECONDS))
             if not message:
                 return None
-            item = unpack(message.get("item"), blob)
-        except ChannelError:
+            blob = self._connection.recv(_ANSWER_SECONDS) if message.get("blob") else b""
+            item = unpack(message.get("item"), blob if isinstance(blob, bytes) else b"")
+        except (OSError, EOFError, WebSocketException):
             self.finished = True
             return None
         except MessageError:
@@ -112,9 +116,8 @@ class SharedCamera:
 
     def close(self) -> None:
         """Ask no more."""
-        if self._channel is not None:
-            self._channel.close()
-            self._channel = None
+        self._stack.close()
+        self._connection = None
 
 
 def attached_config(
@@ -127,9 +130,7 @@ def attached_config(
     content = config.model_dump(by_alias=True)
 
     def shared(sensor: SensorConfig) -> dict[str, Any]:
-        given = SharedCameraSettings(
-            control=attached.control, mission=mission, stream=sensor.full_id
-        )
+        given = SharedCameraSettings(socket=attached.socket, mission=mission, stream=sensor.full_id)
         settings = given.model_dump(mode="json")
         return {**sensor.model_dump(), "driver": _DRIVER, "settings": settings}
 

@@ -73,7 +73,8 @@ class Gate:
         try:
             most, large = _bound_of(connection)
             sender = await self._admission.admit(connection)
-            if scope["type"] == "http" and scope["method"] not in _READING:
+            writes = scope["type"] == "http" and scope["method"] not in _READING
+            if writes and not sender.role.reaches(Role.PILOT):
                 await asyncio.to_thread(self._admission.require, connection, Role.PILOT)
             bounds = self._bounds_of(sender, connection, large=large)
             for (kind, whose), limit in bounds.items():

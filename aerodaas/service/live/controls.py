@@ -24,7 +24,7 @@ from aerodaas.protocol.schemas import AnswerOut
 from aerodaas.service.http.bearer import SUBPROTOCOL
 from aerodaas.service.live.jobs import end_jobs
 
-__all__ = ["ControlCommand", "ControlSession", "Freshness", "told_of_controls"]
+__all__ = ["ControlCommand", "ControlSession", "Freshness"]
 
 ControlCommand: TypeAlias = TakeControls | Steer | ReleaseControls
 _SILENT_SECONDS = 1.0
@@ -160,10 +160,3 @@ class ControlSession:
         answer = ControlsOut(held=said.accepted, at=at, text=said.text)
         await self._socket.send_text(answer.model_dump_json())
         return said.accepted
-
-
-def told_of_controls(command: ControlCommand) -> str:
-    """What people are told that somebody asked for; empty for a velocity, of which many come."""
-    if isinstance(command, TakeControls):
-        return f"be flown by hand by {command.operator}"
-    return "be let go of" if isinstance(command, ReleaseControls) else ""

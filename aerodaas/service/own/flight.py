@@ -16,7 +16,7 @@ from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
 from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
 from aerodaas.protocol.commands import COMMANDS
-from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
+from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, told_of_controls
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
@@ -34,7 +34,6 @@ from aerodaas.protocol.schemas import (
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.live.controls import told_of_controls
 from aerodaas.service.live.meter import FlightMeter
 from aerodaas.service.live.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.service.own.access import OWN, REMOTE, account_of
@@ -65,10 +64,20 @@ _NAMED = 8
 class Flown(Protocol):
     """The flight, called from several threads."""
 
-    config: EnvironmentConfig
-    graph: Graph
-    state: FlightState | None
-    """What a look has found last."""
+    @property
+    def config(self) -> EnvironmentConfig:
+        """What is flown in."""
+        ...
+
+    @property
+    def graph(self) -> Graph:
+        """Its nodes and edges."""
+        ...
+
+    @property
+    def state(self) -> FlightState | None:
+        """What a look has found last."""
+        ...
 
     def look(self, newest: int = 200) -> FlightState:
         """Its present state; raises AeroDaaSError."""
@@ -95,7 +104,7 @@ class OwnFlight:
         """Show `run`, an application called `name`."""
         self._run = run
         self._name = name
-        self._meter = FlightMeter()
+        self.meter = FlightMeter()
         self._lock = threading.Lock()
         self._looking = threading.Lock()
         self._began = time.time()
@@ -108,11 +117,15 @@ class OwnFlight:
         self._commands = ThreadPoolExecutor(_MOST_ASKED, "commands")
         threading.Thread(target=self._look, name="console", daemon=True).start()
 
-    def close(self) -> None:
-        """Look no more, and tell whoever watches that the flight is over."""
+    def end(self) -> None:
+        """Look no more: the flight is over."""
         if self._run.state is not None:
             self._take(self._run.state)
         self._closed.set()
+
+    def close(self) -> None:
+        """End, and tell whoever watches that the flight is over."""
+        self.end()
         if self._watched:
             time.sleep(_FAREWELL)
 
@@ -162,7 +175,7 @@ class OwnFlight:
         if robot not in {one.id for one in self.config.robots}:
             raise RefusedError(404, f"there is no robot {robot}")
         self._refresh()
-        return self._meter.preflight.get(robot, PreflightOut(robot=robot))
+        return self.meter.preflight.get(robot, PreflightOut(robot=robot))
 
     def missions(self, principal: Principal) -> list[MissionOut]:
         """The one mission."""
@@ -238,12 +251,16 @@ class OwnFlight:
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Items of a stream; an empty one a while without any. Raises ConfigError if none is so."""
         del mission
-        graph = self._run.graph
-        if stream not in drawn_streams(graph) or graph.reader is None:
-            raise ConfigError(f"no stream that can be drawn is called {stream!r}")
-        reader = PackedReader(graph.reader(stream), stream, form, self._ground)
+        reader = self.reader(stream, form)
         while not self.over:
             yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
+
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> PackedReader:
+        """A reader of a stream, its pictures in a form; raises ConfigError if there is none."""
+        graph = self._run.graph
+        if stream not in graph.nodes or graph.reader is None:
+            raise ConfigError(f"no stream of this mission is called {stream!r}")
+        return PackedReader(graph.reader(stream), stream, form, self._ground)
 
     @cached_property
     def _ground(self) -> Ground | None:
@@ -273,7 +290,7 @@ class OwnFlight:
             self._run.note("console_command", f"{asked}: {answer}")
 
     def _shown(self) -> MissionOut:
-        states = {one.state for one in self._meter.status.values()}
+        states = {one.state for one in self.meter.status.values()}
         ended = MissionPhase.FAILED if "aborted" in states else MissionPhase.LANDED
         return MissionOut(
             id=OWN,
@@ -284,10 +301,10 @@ class OwnFlight:
             robots=[robot.id for robot in self.config.robots],
             submitted=self._began,
             started=self._began,
-            status=self._meter.status,
-            told={} if self.over else self._meter.told,
-            alerts=self._meter.alerts,
-            analytics=self._meter.analytics,
+            status=self.meter.status,
+            told={} if self.over else self.meter.told,
+            alerts=self.meter.alerts,
+            analytics=self.meter.analytics,
             streams={} if self.over else drawn_streams(self._run.graph),
         )
 
@@ -319,7 +336,7 @@ class OwnFlight:
 
     def _take(self, state: FlightState) -> None:
         with self._looking:
-            self._meter.note(state)
+            self.meter.note(state)
             self._version += 1
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from starlette.types import ASGIApp
 from typing_extensions import Self
 
@@ -33,6 +33,7 @@ _MOST_WATCHERS = 320
 """Live views by the token of who watches only, which many may share."""
 _RATE, _BURST = 500.0, 2000.0
 """Requests a second by one token, which many may share, on average and at once."""
+_BOUNDS = Bounds(reserved=Role.PILOT, lasting=_MOST_WATCHERS)
 _MOST_BYTES_SENT = 4096
 """Bytes of a WebSocket message; watchers have nothing to say."""
 _PING_SECONDS = 5.0
@@ -145,8 +146,15 @@ class FlightServer(ApiServer):
         )
 
 
-def flight_app(flight: OwnFlight, admission: Admission, *, framed: bool = False) -> FastAPI:
-    """Build the application of one flight; `framed` as of `build_app`."""
+def flight_app(
+    flight: OwnFlight,
+    admission: Admission,
+    further: Sequence[APIRouter] = (),
+    *,
+    bounds: Bounds = _BOUNDS,
+    framed: bool = False,
+) -> FastAPI:
+    """Build the application of one flight with `further` routes; the rest as of `build_app`."""
     routes = (
         FleetRoutes(flight, admission),
         MissionRoutes(flight, admission),
@@ -155,8 +163,8 @@ def flight_app(flight: OwnFlight, admission: Admission, *, framed: bool = False)
     )
     return build_app(
         admission,
-        [one.router() for one in routes],
-        bounds=Bounds(reserved=Role.PILOT, lasting=_MOST_WATCHERS),
+        [*further, *(one.router() for one in routes)],
+        bounds=bounds,
         tiles=flight.config.map_tiles,
         framed=framed,
     )

@@ -6,14 +6,15 @@ import asyncio
 import contextlib
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, unix_connect
+from websockets.exceptions import WebSocketException
 
-from aerodaas.analytics.here.channel import ChannelError
 from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
-from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.link import flight_address
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.refusals import refuse
 from aerodaas.service.live.jobs import end_jobs
@@ -78,31 +79,34 @@ class HereRoutes:
             folder = self._desk.flight(mission)
             if folder is not None:
                 # The flight may not have begun to listen, or have ended.
-                with contextlib.suppress(ChannelError):
+                with contextlib.suppress(OSError, EOFError, WebSocketException):
                     await user.be_asked(folder)
             await asyncio.sleep(_AGAIN_SECONDS)
 
 
 class _User:
-    """The user's side, connected with a flight or waiting for one."""
+    """The user's side, connected with a flight or waiting for one.
+
+    What is said is passed on as it is: who parses what a user has sent is the user's own flight.
+    """
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
-        self._channel: AsyncChannel | None = None
+        self._flight: ClientConnection | None = None
 
     async def be_asked(self, folder: FlightFolder) -> None:
-        """Carry questions to the user; raises ChannelError when the flight has ended."""
-        channel = self._channel = await AsyncChannel.connect(folder, "here")
-        try:
-            while True:
-                question, blob = await channel.receive()
-                more = b', "blob": true}' if blob else b', "blob": false}'
-                await self._socket.send_text((question[:-1] + more).decode())
-                if blob:
-                    await self._socket.send_bytes(blob)
-        finally:
-            self._channel = None
-            channel.close()
+        """Carry questions to the user until the flight has ended; raises what that raises."""
+        address = flight_address("here", Role.PILOT)
+        async with unix_connect(str(folder.socket), **address) as flight:
+            self._flight = flight
+            try:
+                async for part in flight:
+                    if isinstance(part, str):
+                        await self._socket.send_text(part)
+                    else:
+                        await self._socket.send_bytes(part)
+            finally:
+                self._flight = None
 
     async def answer(self) -> None:
         """Carry answers to the flight; ends with the user, or what no user's side would say.
@@ -110,7 +114,7 @@ class _User:
         It always listens: who has gone is noticed before the flight begins, too.
         """
         while True:
-            answer = (await self._socket.receive_text()).encode()
-            if self._channel is not None:
-                with contextlib.suppress(ChannelError):
-                    await self._channel.send(answer)
+            answer = await self._socket.receive_text()
+            if self._flight is not None:
+                with contextlib.suppress(WebSocketException):
+                    await self._flight.send(answer)

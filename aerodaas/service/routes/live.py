@@ -7,12 +7,12 @@ import asyncio
 from fastapi import APIRouter, WebSocket
 
 from aerodaas.errors import AeroDaaSError
-from aerodaas.protocol.piloting import ControlsIn
+from aerodaas.protocol.piloting import ControlsIn, told_of_controls
 from aerodaas.protocol.schemas import AnswerOut, PictureForm, Role, Scope, Word
 from aerodaas.service.backend import Missions
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.refusals import refuse
-from aerodaas.service.live.controls import ControlCommand, ControlSession, told_of_controls
+from aerodaas.service.live.controls import ControlCommand, ControlSession
 from aerodaas.service.live.hub import StreamHub
 from aerodaas.service.live.session import Form, LiveSession, Rate, StreamNames, wanted_streams
 

@@ -97,9 +97,6 @@ def test_a_malformed_order_is_refused_by_name(folder: FlightFolder) -> None:
         FlightOrder.read(folder.order)
 
 
-def test_a_socket_has_a_path_that_the_system_allows(tmp_path: Path) -> None:
-    """A longer one is refused before a flight begins."""
-    long = tmp_path / ("x" * 120)
-    with pytest.raises(MissionError, match="too long"):
-        _ = FlightFolder(long).socket
+def test_a_socket_has_a_path_that_the_system_allows() -> None:
+    """In the folders that a service makes."""
     assert len(os.fsencode(FlightFolder(Path("/tmp/s/m/0123456789ab/f")).socket)) < 100  # noqa: S108

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.service.unix_server import UnixServer, fits_a_socket
+from aerodaas.unix_server import UnixServer, fits_a_socket
 
 MOST = 2
 
@@ -115,8 +115,12 @@ def test_what_serves_and_raises_gives_its_place_back(path: Path) -> None:
 
 
 def test_a_closed_one_accepts_nobody(server: UnixServer, path: Path) -> None:
-    """And says so to what serves, which ends by itself."""
+    """And ends the connections that it has."""
+    open_one = connect(path)
+    assert answers(open_one)
     server.close()
+    assert open_one.recv(16) == b""
+    open_one.close()
     assert server.closed.is_set()
     with pytest.raises(OSError, match="refused"):
         connect(path)

@@ -1,4 +1,4 @@
-"""Listening Unix socket that is open to this user alone, each connection served in a thread."""
+"""Listening Unix sockets that are open to this user alone, and a server of one by threads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["UnixServer", "fits_a_socket"]
+__all__ = ["UnixServer", "fits_a_socket", "listen_unix"]
 
 _LONGEST_PATH = 100
 """Bytes that a Unix socket's path may have on Linux (108), less some."""
@@ -18,6 +18,20 @@ _LONGEST_PATH = 100
 def fits_a_socket(path: Path) -> bool:
     """Whether a path is short enough for a Unix socket."""
     return len(os.fsencode(path)) <= _LONGEST_PATH
+
+
+def listen_unix(path: Path) -> socket.socket:
+    """Listen at `path`, in the place of whatever was there; raises OSError."""
+    path.unlink(missing_ok=True)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        listener.bind(str(path))
+        path.chmod(0o600)
+        listener.listen()
+    except OSError:
+        listener.close()
+        raise
+    return listener
 
 
 class UnixServer:
@@ -35,26 +49,26 @@ class UnixServer:
             most: Connections at once; one more is closed at once.
         """
         self.closed = threading.Event()
-        """Set once no more are accepted: `serve` is to end its connection."""
+        """Set once no more are accepted."""
         self._serve = serve
         self._name = name
-        self._places = threading.BoundedSemaphore(most)
-        path.unlink(missing_ok=True)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.bind(str(path))
-        path.chmod(0o600)
-        self._socket.listen()
+        self._most = most
+        self._lock = threading.Lock()
+        self._open: set[socket.socket] = set()
+        self._socket = listen_unix(path)
 
     def start(self) -> None:
         """Accept connections, in a thread of its own."""
         threading.Thread(target=self._accept, name=self._name, daemon=True).start()
 
     def close(self) -> None:
-        """Accept no more; the threads of connections end by themselves."""
+        """Accept no more, and end all connections, whose threads notice it."""
         self.closed.set()
-        # A listener that is only closed keeps a thread in accept().
-        with contextlib.suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
+        with self._lock:
+            # A listener that is only closed keeps a thread in accept().
+            for one in (self._socket, *self._open):
+                with contextlib.suppress(OSError):
+                    one.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
     def _accept(self) -> None:
@@ -63,7 +77,11 @@ class UnixServer:
                 connection, _ = self._socket.accept()
             except OSError:
                 return
-            if not self._places.acquire(blocking=False):
+            with self._lock:
+                welcome = len(self._open) < self._most and not self.closed.is_set()
+                if welcome:
+                    self._open.add(connection)
+            if not welcome:
                 connection.close()
                 continue
             threading.Thread(target=self._served, args=(connection,), daemon=True).start()
@@ -73,4 +91,5 @@ class UnixServer:
             with connection:
                 self._serve(connection)
         finally:
-            self._places.release()
+            with self._lock:
+                self._open.discard(connection)

@@ -1,35 +1,40 @@
-"""Cameras shared by a flight's control socket: as long as it allows, and at the reader's pace."""
+"""The API of a flight's process for its service, and cameras that are shared by it."""
 
 from __future__ import annotations
 
 import contextlib
+import stat
 import tempfile
 import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
+from served_flight import Drones, ServedFlight
 
-from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.wire_items import pack
 from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import ConfigError, MissionError, SourceError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.flights import FlightLeaseIn
+from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import PictureForm, StatusOut
-from aerodaas.service.flights import link
-from aerodaas.service.flights.control import ControlServer
+from aerodaas.protocol.schemas import AnswerOut, CommandIn, PictureForm
+from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import Attached, FlightOrder
+from aerodaas.service.flights.server import LeasedFlight, ProcessServer
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.own import flight as own
 
 FLEET = {
     "name": "campus",
@@ -70,8 +75,22 @@ class Pictures:
         return {"item": item, "captured": host_time_ns(), "blob": True}, blob
 
 
+class Filming(LeasedFlight):
+    """A flight with one camera."""
+
+    pictures: Pictures
+    form: PictureForm | None = None
+
+    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> Any:  # noqa: ANN401
+        """The camera, of those that run."""
+        self.form = form
+        if stream != "one/cam":
+            raise ConfigError(f"no stream of this mission is called {stream!r}")
+        return self.pictures
+
+
 class Flight:
-    """A flight with a camera, behind its control socket."""
+    """A flight with a camera, and the service's link to its process."""
 
     def __init__(self, path: Path) -> None:
         self.folder = FlightFolder(path)
@@ -85,53 +104,24 @@ class Flight:
             minutes=1,
         )
         self.lease = LeaseWatch(order, lambda _: None)
-        self.over = False
-        self.form: PictureForm | None = None
-        self.pictures = Pictures()
-        self.commands: list[object] = []
-        self.server = ControlServer(self.folder, self, self.lease, HereRelay(path / "here"))
-        self.server.start()
+        self.drones = Drones(EnvironmentConfig.model_validate(FLEET))
+        self.served = ServedFlight(self.folder, self.drones, self.lease, Filming)
+        self.flight = cast("Filming", self.served.flight)
+        self.pictures = self.flight.pictures = Pictures()
         self.link = FlightLink(self.folder)
 
-    def command(self, robot: str, command: object) -> Any:  # noqa: ANN401
-        """Refuse, and note that it was asked."""
-        self.commands.append((robot, command))
-        raise MissionError("no command was to come")
-
-    def status(self) -> tuple[dict[str, Any], list[str]]:
-        """Nothing to tell."""
-        return {}, []
-
-    def analytics(self) -> None:
-        """None."""
-
-    def told(self) -> dict[str, float]:
-        """Never."""
-        return {}
-
-    def preflight(self) -> dict[str, PreflightOut]:
-        """A list that was gone through three seconds ago."""
-        return {"one": PreflightOut.of("one", [WINDY], 3.0)}
-
-    def streams(self) -> dict[str, Any]:
-        """None."""
-        return {}
-
-    def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> Pictures:
-        """The camera, of those that run."""
-        self.form = form
-        if stream != "one/cam":
-            raise ConfigError(f"no stream of this mission is called {stream!r}")
-        return self.pictures
+    def end(self) -> AnswerOut:
+        """End the lease as the service does."""
+        return self.link.change_lease(FlightLeaseIn(reason="revoked"))
 
     def close(self) -> None:
         """End."""
         self.link.close()
-        self.server.close()
+        self.served.close()
 
     def camera(self, mission: str, stream: str = "one/cam") -> SharedCamera:
         """The camera of an attached mission, from its environment."""
-        to = Attached(mission="m", control=self.folder.socket, sensors=[stream])
+        to = Attached(mission="m", socket=self.folder.socket, sensors=[stream])
         config = attached_config(EnvironmentConfig.model_validate(FLEET), to, mission)
         (sensor,) = config.all_sensors()
         return SharedCamera(sensor, config)
@@ -142,7 +132,7 @@ def flight() -> Iterator[Flight]:
     """A flight that shares its camera with the mission `crowd`."""
     with tempfile.TemporaryDirectory(prefix="share-", dir="/tmp") as folder:
         made = Flight(Path(folder))
-        made.link.ask(do="share", mission="crowd", streams=["one/cam"])
+        made.link.share("crowd", ["one/cam"])
         yield made
         made.close()
 
@@ -152,19 +142,17 @@ def test_a_live_views_pictures_are_made_in_the_form_that_it_asks_for(
     flight: Flight, form: PictureForm
 ) -> None:
     """By the flight's process, which has the pixels."""
-    message, blob = next(flight.link.items("one/cam", form))
+    message, blob = next(found for found in flight.link.items("one/cam", form) if found[0])
     assert message["item"]["is"] == "Frame"
     assert blob
-    assert flight.form is form
+    assert flight.flight.form is form
 
 
 def test_the_list_before_take_off_goes_to_the_service(flight: Flight) -> None:
     """Whole, with its age."""
-    until = time.monotonic() + 20.0
-    while not flight.link.news.preflight:
-        assert time.monotonic() < until
-        time.sleep(0.02)
-    assert flight.link.news.preflight == flight.preflight()
+    told = PreflightOut.of("one", [WINDY], 3.0)
+    flight.flight.meter.preflight = {"one": told}
+    assert flight.link.preflight("one") == told
 
 
 def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight) -> None:
@@ -186,7 +174,7 @@ def test_what_is_withdrawn_ends_with_the_next_picture(flight: Flight) -> None:
     camera = flight.camera("crowd")
     camera.open()
     assert camera.capture(0, None) is not None
-    assert flight.link.ask(do="withdraw", mission="crowd").accepted
+    assert flight.link.withdraw("crowd").accepted
     assert camera.capture(0, None) is None
     assert camera.finished
     with pytest.raises(SourceError, match="one/cam is not shared with crowd"):
@@ -215,19 +203,19 @@ def test_an_operators_word_waits_for_no_users(
     """Of whose commands the flight answers one after the other, or none while its drone hangs."""
     begun, free = threading.Event(), threading.Event()
 
-    def hang(robot: str, command: object) -> Any:  # noqa: ANN401
+    def hang(robot: str, command: object) -> Answer:
         del robot, command
         begun.set()
         assert free.wait(20)
-        raise MissionError("late")
+        return Answer(accepted=False, text="late")
 
-    monkeypatch.setattr(flight, "command", hang)
-    monkeypatch.setattr(link, "_ANSWER_SECONDS", 60.0)
-    words = {"do": "pause", "robot": "one", "operator": False}
+    flight.drones.obey = hang
+    monkeypatch.setattr(own, "_PATIENCE", 60.0)
+    pause = CommandIn(robot="one", command="pause")
     with ThreadPoolExecutor(40) as pool:
-        asked = [pool.submit(flight.link.ask, **words) for _ in range(40)]
+        asked = [pool.submit(flight.link.fly, pause, operator=False) for _ in range(40)]
         assert begun.wait(20)
-        assert flight.link.ask(do="end", reason="revoked").accepted
+        assert flight.end().accepted
         assert sum(one.done() for one in asked) <= 40 - link._MOST_ASKED
         until = time.monotonic() + 20
         while sum(one.done() for one in asked) < 40 - link._MOST_ASKED:
@@ -251,12 +239,11 @@ def test_nobody_waits_for_a_flight_to_note_that_its_user_is_there(
         heard.release()
 
     monkeypatch.setattr(flight.lease, "hear", hang)
-    monkeypatch.setattr(link, "_ANSWER_SECONDS", 60.0)
     monkeypatch.setattr(link, "_HEARD_SECONDS", 0.01)
     flight.link.hear()
     assert begun.wait(20)
     flight.link.hear()
-    assert flight.link.ask(do="end", reason="revoked").accepted
+    assert flight.end().accepted
     assert not heard.acquire(blocking=False)
     free.set()
     # Whoever was heard of meanwhile is told of, too, and later ones are.
@@ -275,21 +262,28 @@ class Still(Pictures):
         time.sleep(timeout / 20)
 
 
-def test_who_watches_much_keeps_nobody_from_commanding(flight: Flight) -> None:
-    """As many views as the control socket has places leave some to the service itself."""
-    flight.pictures = Still()
-    views = [flight.link.items("one/cam") for _ in range(64)]
-    shown = [view for view in views if _shows(view)]
-    assert 0 < len(shown) < len(views)
+def test_who_watches_much_keeps_nobody_from_commanding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many views as the flight has places leave some to the service itself."""
+    monkeypatch.setattr(server, "_MOST_WATCHING", 5)
+    flight = Flight(tmp_path)
+    flight.flight.pictures = Still()
+    views = [flight.link.items("one/cam") for _ in range(8)]
+    assert sum(_shows(view) for view in views) == 5
+    with pytest.raises(SourceError, match="5 live views"):
+        flight.camera("crowd").open()
     late = FlightLink(flight.folder)
-    assert late.ask(do="heard").accepted
+    assert late.change_lease(FlightLeaseIn(ends=time.time() + 60)).accepted
+    until = time.monotonic() + 20.0
+    while not late.number:
+        assert time.monotonic() < until
     late.close()
     # Each is closed with its generator.
     views.clear()
-    shown.clear()
-    until = time.monotonic() + 20.0
     while not _shows(flight.link.items("one/cam")):
         assert time.monotonic() < until
+    flight.close()
 
 
 def _shows(view: Any) -> bool:  # noqa: ANN401 - a generator
@@ -303,7 +297,7 @@ def test_a_camera_ends_with_its_flight(flight: Flight) -> None:
     """However that ends."""
     camera = flight.camera("crowd")
     camera.open()
-    flight.over = True
+    flight.flight.end()
     assert camera.capture(0, None) is None
     assert camera.finished
     late = flight.camera("crowd")
@@ -315,16 +309,16 @@ def test_a_camera_ends_with_its_flight(flight: Flight) -> None:
 def test_nothing_is_shared_once_the_drones_come_home(flight: Flight) -> None:
     """The owner's agreement ends with the lease; withdrawing goes on working."""
     flight.lease.end("the lease has ended")
-    answer = flight.link.ask(do="share", mission="late", streams=["one/cam"])
+    answer = flight.link.share("late", ["one/cam"])
     assert (answer.accepted, answer.text) == (False, "the drones come home: the lease has ended")
     with pytest.raises(SourceError, match="not shared with late"):
         flight.camera("late").open()
-    assert flight.link.ask(do="withdraw", mission="crowd").accepted
+    assert flight.link.withdraw("crowd").accepted
 
 
 def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
     """No address, driver or setting of a vehicle; no camera that is not shared."""
-    to = Attached(mission="m", control=Path("control"), sensors=["one/cam"])
+    to = Attached(mission="m", socket=Path("api"), sensors=["one/cam"])
     config = attached_config(EnvironmentConfig.model_validate(FLEET), to, "crowd")
     assert [robot.id for robot in config.robots] == ["one"]
     assert [one.full_id for one in config.all_sensors()] == ["one/cam"]
@@ -335,12 +329,12 @@ def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
 
 def test_readers_do_not_wait_for_each_other(flight: Flight) -> None:
     """One that has asked and does not take its picture holds up nobody."""
-    flight.link.ask(do="share", mission="slow", streams=["one/cam"])
+    flight.link.share("slow", ["one/cam"])
     slow, quick = flight.camera("slow"), flight.camera("crowd")
     slow.open()
     quick.open()
-    assert slow._channel is not None
-    slow._channel.send({})
+    assert slow._connection is not None
+    slow._connection.send("")
     done = threading.Event()
 
     def read() -> None:
@@ -350,34 +344,56 @@ def test_readers_do_not_wait_for_each_other(flight: Flight) -> None:
 
     threading.Thread(target=read, daemon=True).start()
     assert done.wait(10.0)
-    assert flight.commands == []
 
 
-class Garbled(StatusOut):
-    """A status of another version, which has other fields."""
-
-    def model_dump(self, **_: Any) -> dict[str, Any]:  # noqa: ANN401 - the base's
-        """Too few of them."""
-        return {"time": 1.0}
-
-
-def test_news_that_cannot_be_read_are_told_of(
+def test_a_state_that_cannot_be_read_is_told_of(
     flight: Flight, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Once: a page would show the flight as it was, without a word."""
-    monkeypatch.setattr(flight, "status", lambda: ({"one": Garbled.model_construct()}, []))
+    monkeypatch.setattr(flight.flight, "text", lambda _: ('{"id": "of another version"}', False))
     until = time.monotonic() + 20.0
     while not caplog.records:
         assert time.monotonic() < until
         time.sleep(0.01)
     monkeypatch.undo()
-    number = flight.link.news.number
-    while flight.link.news.number < number + 2:
+    number = flight.link.number
+    while flight.link.number < number + 2:
         assert time.monotonic() < until
         time.sleep(0.01)
     (record,) = caplog.records
-    assert "its news cannot be read" in record.getMessage()
-    assert "StatusOut" in record.getMessage()
+    assert "its state cannot be read" in record.getMessage()
+
+
+def test_a_flight_is_the_services_alone(flight: Flight) -> None:
+    """Nobody else may open its socket; a path that is too long is told of before take-off."""
+    assert stat.S_IMODE(flight.folder.socket.stat().st_mode) == 0o600
+    long = flight.folder.path / ("x" * 120)
+    with pytest.raises(MissionError, match="too long"):
+        ProcessServer(long, flight.flight, flight.lease, flight.served.relay)
+
+
+def test_an_operators_drone_obeys_also_once_the_lease_is_over(flight: Flight) -> None:
+    """A pilot's comes home, whatever the pilot asks for."""
+    land = CommandIn(robot="one", command="land")
+    assert flight.link.fly(land, operator=False).accepted
+    assert flight.end().accepted
+    refused = flight.link.fly(land, operator=False)
+    assert (refused.accepted, refused.text) == (False, "the drones come home: revoked")
+    assert flight.link.fly(land, operator=True).accepted
+    later = FlightLeaseIn(ends=time.time() + 60)
+    assert flight.link.change_lease(later) == AnswerOut(accepted=False, text="revoked")
+
+
+def test_a_command_that_is_refused_is_answered(flight: Flight) -> None:
+    """By the flight's reason; of a drone that does not answer it is told."""
+
+    def refuse(robot: str, _: object) -> Answer:
+        raise MissionError(f"{robot} does not fly in this mission")
+
+    flight.drones.obey = refuse
+    given = ControlsIn(robot="two", session=1, operator="olga")
+    answer = flight.link.fly(given, operator=True)
+    assert (answer.accepted, answer.text) == (False, "two does not fly in this mission")
 
 
 def test_what_fails_in_the_flight_is_told_of(
@@ -388,12 +404,12 @@ def test_what_fails_in_the_flight_is_told_of(
     def fail(_: float) -> None:
         raise KeyError("missing")
 
-    monkeypatch.setattr(flight.pictures, "next_packed", fail)
-    with pytest.raises(MissionError, match="ended"):
-        list(flight.link.items("one/cam"))
+    camera = flight.camera("crowd")
+    camera.open()
+    monkeypatch.setattr(flight.pictures, "latest_packed", fail)
+    assert camera.capture(0, None) is None
+    assert camera.finished
     until = time.monotonic() + 20.0
-    while not caplog.records:
+    while "KeyError: 'missing'" not in caplog.text:
         assert time.monotonic() < until
         time.sleep(0.01)
-    assert "control socket failed" in caplog.text
-    assert "KeyError: 'missing'" in caplog.text
