@@ -24,8 +24,7 @@ from rich.progress import track
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.flown_tasks import Flown
-from aerodaas.cli.flown_workload import flown_trace, flown_workload
+from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace

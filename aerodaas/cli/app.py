@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from aerodaas.cli.deferred import DeferredCommand
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 from aerodaas.environment.signals import heed_interrupts
 
 __all__ = ["COMMANDS", "app", "main", "run_typer"]
@@ -23,12 +23,12 @@ COMMANDS = (
     ),
     DeferredCommand(
         "new",
-        "aerodaas.cli.new:new",
+        "aerodaas.cli.shipped:new",
         "Begin an application: a folder with its file, an environment, a test, a README.",
     ),
     DeferredCommand(
         "examples",
-        "aerodaas.cli.examples:examples",
+        "aerodaas.cli.shipped:examples",
         "Copy the applications that ship, with their environments, to read and to change.",
     ),
     DeferredCommand("run", "aerodaas.cli.run:run", "Fly an application.", words=True),
@@ -52,13 +52,13 @@ COMMANDS = (
     ),
     DeferredCommand(
         "preflight",
-        "aerodaas.cli.preflight:preflight",
+        "aerodaas.cli.vehicle:preflight",
         "Print a robot's health before take-off as one list; nothing moves, and nothing is set "
         "there.",
     ),
     DeferredCommand(
         "logs",
-        "aerodaas.cli.logs:logs",
+        "aerodaas.cli.vehicle:logs",
         "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
     ),
     DeferredCommand(
@@ -72,7 +72,7 @@ COMMANDS = (
     ),
     DeferredCommand(
         "view",
-        "aerodaas.cli.view:view",
+        "aerodaas.cli.report:view",
         "Play a recording in a browser: map, video, state and charts, by one timeline.",
     ),
     DeferredCommand(
@@ -82,7 +82,7 @@ COMMANDS = (
     ),
     DeferredCommand(
         "attach",
-        "aerodaas.cli.attach:attach",
+        "aerodaas.cli.report:attach",
         "Attach an autopilot's own log to the recording of its flight, its clock laid over.",
     ),
     DeferredCommand(

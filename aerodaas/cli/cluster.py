@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 
 __all__ = ["app"]
 

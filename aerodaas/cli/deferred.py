@@ -10,7 +10,7 @@ import typer
 import typer.main
 from typer.core import TyperCommand, TyperGroup
 
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 
 __all__ = ["DeferredCommand"]
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.failure import failure_of, show_failure
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["app"]

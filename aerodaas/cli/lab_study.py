@@ -182,8 +182,11 @@ def _loads(
         wanted = SIX if names == "six" else names.split(",")
         return [workload_of(name.strip(), duration, edges) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
-    from aerodaas.cli.flown_tasks import Flown  # noqa: PLC0415
-    from aerodaas.cli.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
+    from aerodaas.cli.flown_workload import (  # noqa: PLC0415
+        Flown,
+        flown_trace,
+        flown_workload,
+    )
 
     flight = Flown.read(flown)
     workload = flown_workload(flight)

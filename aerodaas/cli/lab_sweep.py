@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Sequence
@@ -12,7 +13,6 @@ import typer
 from rich.console import Console
 
 from aerodaas.cli.lab_study import spread_of, workload_of
-from aerodaas.cli.rows import write_csv
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import ConfigError, UnknownIdError
 from aerodaas.schedulers.lab.metrics import seeds_needed
@@ -20,7 +20,16 @@ from aerodaas.schedulers.lab.sweep import PARAMETERS, SweepResult, run_sweep
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
 
-__all__ = ["parse_sweeps", "sweep"]
+__all__ = ["parse_sweeps", "sweep", "write_csv"]
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write at least one row as CSV; the columns are those of the first. Raises OSError."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
 
 _BETWEEN = re.compile(r",(?=\s*[A-Za-z])")
 """Commas between words; those within one stand before a number, as in `outage:30-45,80-81`."""

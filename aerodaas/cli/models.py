@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 from aerodaas.config.printable import printable
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from aerodaas.analytics.remote import TOKEN_VARIABLE
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 
 if TYPE_CHECKING:
     from aerodaas.environment.remote_client import RemoteClient

@@ -1,7 +1,9 @@
-"""`aerodaas report` and `aerodaas compare`."""
+"""`aerodaas report`, `compare`, `attach` and `view`: what a recording shows."""
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +11,7 @@ import typer
 
 from aerodaas.config.printable import printable
 
-__all__ = ["compare", "report"]
+__all__ = ["attach", "compare", "report", "view"]
 
 Recorded = Annotated[Path, typer.Argument(help="The .mcap file of a run.", show_default=False)]
 
@@ -45,3 +47,76 @@ def compare(
     from aerodaas.recording.report.comparison import write_comparison  # noqa: PLC0415 - as above
 
     typer.echo(write_comparison(first, second, out))
+
+
+def attach(
+    recording: Annotated[
+        Path, typer.Argument(help="The .mcap file of the run.", show_default=False)
+    ],
+    log: Annotated[
+        Path,
+        typer.Argument(help="The log: .bin of ArduPilot or .ulg of PX4.", show_default=False),
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Whose log it is. Default: the only robot with an autopilot."),
+    ] = None,
+) -> None:
+    """Attach an autopilot's own log to the recording of its flight, its clock laid over.
+
+    `aerodaas report` draws its main topics then. `aerodaas logs ROBOT --attach RECORDING` fetches
+    the log from the vehicle first.
+
+    aerodaas attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
+    """
+    from aerodaas.recording.vehicle_log.attachment import (  # noqa: PLC0415 - slow to load
+        attach_log,
+    )
+
+    typer.echo(printable(str(attach_log(recording, log, robot))))
+
+
+def view(
+    recording: Recorded,
+    beside: Annotated[
+        Path | None, typer.Argument(help="Another one, played beside it.", show_default=False)
+    ] = None,
+    *,
+    at: Annotated[
+        float | None, typer.Option(min=0, help="Mission seconds at which it opens.")
+    ] = None,
+    address: Annotated[
+        str,
+        typer.Option(
+            help="Where the page is served; beyond this machine its token goes unencrypted."
+        ),
+    ] = "127.0.0.1:8361",
+) -> None:
+    """Play a recording in a browser: map, video, state and charts, by one timeline.
+
+    Two of them side by side, at the same mission time. Ctrl-C ends it.
+
+        aerodaas view runs/farm_survey-20260101-120000/flight.mcap
+        aerodaas view flight.mcap --at 63.5
+        aerodaas view dems/flight.mcap edf/flight.mcap
+    """
+    from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only here
+
+    require_extra("remote", "aerodaas view")
+    from aerodaas.recording.reader import Recording  # noqa: PLC0415 - as above
+    from aerodaas.runtime.checks import check_served  # noqa: PLC0415 - slow to load
+    from aerodaas.service.own.recordings import RecordingServer  # noqa: PLC0415 - slow to load
+
+    check_served("--address", address)
+    with contextlib.ExitStack() as opened:
+        paths = [recording] if beside is None else [recording, beside]
+        recordings = [opened.enter_context(Recording.open(path)) for path in paths]
+        server = RecordingServer(address, recordings, typer.echo)
+        opened.pop_all()  # the server closes them
+    typer.echo(f"console: open {server.address_of(at)}")
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        typer.echo("closed")
+    finally:
+        server.close()

@@ -1,15 +1,29 @@
-"""What the package brings along for users: applications to fly, and templates to begin from."""
+"""`aerodaas examples` and `new`: what the package brings along, to fly or to begin from."""
 
 from __future__ import annotations
 
 import ast
 import difflib
+import importlib.util
+import keyword
+import shutil
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 import aerodaas
-from aerodaas.errors import ConfigError
+from aerodaas.errors import ConfigError, UnknownIdError
 
-__all__ = ["APPLICATIONS", "TEMPLATES", "find_application", "purpose", "shipped_applications"]
+__all__ = [
+    "APPLICATIONS",
+    "TEMPLATES",
+    "examples",
+    "find_application",
+    "new",
+    "purpose",
+    "shipped_applications",
+]
 
 _PACKAGE = Path(aerodaas.__file__).parent
 APPLICATIONS = _PACKAGE / "apps"
@@ -51,3 +65,127 @@ def _remedy(given: Path, shipped: list[str]) -> str:
         meant = folder / close[0] if close[0] in beside else close[0]
         return f" (did you mean {meant}?)"
     return "; `aerodaas examples` copies those that ship, `aerodaas new` begins one"
+
+
+_ENVIRONMENTS = "environments"
+
+
+def examples(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Some of them by name. Default: all.")
+    ] = None,
+    to: Annotated[Path, typer.Option(help="Folder, which is made.")] = Path("examples"),
+    only_list: Annotated[  # noqa: FBT002
+        bool, typer.Option("--list", help="List them and copy nothing.")
+    ] = False,
+) -> None:
+    """Copy the applications that ship, with their environments, to read and to change.
+
+    They fly without being copied, too, by name.
+
+        aerodaas examples --list
+        aerodaas examples farm_survey vehicle_tracking --to surveys
+        aerodaas run farm_survey
+    """
+    shipped = shipped_applications()
+    for name in names or ():
+        if name not in shipped:
+            raise UnknownIdError("example", name, list(shipped))
+    chosen = {name: shipped[name] for name in names or shipped}
+    if not only_list:
+        _copy([*chosen.values(), *(APPLICATIONS / _ENVIRONMENTS).iterdir()], to)
+    width = max(map(len, chosen))
+    for name, path in chosen.items():
+        typer.echo(f"{name:{width}}  {purpose(path)}")
+    if not only_list:
+        typer.echo(f"copied to {to}; fly one: aerodaas run {to / next(iter(chosen))}.py")
+
+
+def _copy(files: list[Path], folder: Path) -> None:
+    """Copy files of the applications' folder, keeping those that are there and the same."""
+    targets = {folder / path.relative_to(APPLICATIONS): path for path in files if path.is_file()}
+    changed = [
+        target
+        for target, path in targets.items()
+        if target.exists() and target.read_bytes() != path.read_bytes()
+    ]
+    if changed:
+        raise ConfigError(f"{changed[0]} is there and differs: copy to another folder by --to")
+    try:
+        for target, path in targets.items():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+    except OSError as error:
+        raise ConfigError(f"cannot copy to {folder}: {error.strerror}") from None
+
+
+_NAME = "my_app"
+"""Name of the application in the templates."""
+_TEST = "flight_test.py"
+_SCHEMA = "environment.schema.json"
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="Of the application, its file and its folder.")],
+    template: Annotated[
+        str,
+        typer.Option(
+            "--template",
+            "-t",
+            help="`survey`: visit places; `follow`: follow a person; a class of your own: "
+            "`detector`, `scheduler`, `camera` or `driver`.",
+        ),
+    ] = "survey",
+) -> None:
+    """Begin an application: a folder with its file, an environment, a test, a README.
+
+    It flies at once, in simulation.
+
+        aerodaas new my_app
+        cd my_app
+        aerodaas run my_app.py
+        pip install pytest && pytest
+    """
+    templates = sorted(path.parent.name for path in TEMPLATES.glob(f"*/{_NAME}.py"))
+    if template not in templates:
+        raise UnknownIdError("template", template, templates)
+    _check(name)
+    folder = Path(name)
+    files = _files(template, name)
+    try:
+        folder.mkdir()
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+    except FileExistsError:
+        raise ConfigError(f"{name} is there already: give another name") from None
+    except OSError as error:
+        raise ConfigError(f"cannot write {folder}: {error.strerror}") from None
+    typer.echo(f"{name}/: {', '.join(files)}")
+    typer.echo(f"fly it: cd {name} && aerodaas run {name}.py")
+
+
+def _check(name: str) -> None:
+    """Refuse a name that Python could not import, or that hides what it imports already."""
+    if not name.isidentifier() or keyword.iskeyword(name):
+        raise ConfigError(f"{name!r} is no name for a Python file: letters, digits, underscores")
+    if importlib.util.find_spec(name) is not None:
+        raise ConfigError(f"a module is called {name!r} already: give another name")
+
+
+def _files(template: str, name: str) -> dict[str, str]:
+    """Text of each file by its name, the application's first."""
+    from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
+
+    folder = TEMPLATES / template
+    application = folder / f"{_NAME}.py"
+    others = [path for path in sorted(folder.iterdir()) if path.is_file() and path != application]
+    sources = {
+        application.name: application,
+        **{path.name: path for path in others},
+        f"test_{_NAME}.py": TEMPLATES / _TEST,
+    }
+    texts = {
+        file.replace(_NAME, name): path.read_text(encoding="utf-8").replace(_NAME, name)
+        for file, path in sources.items()
+    }
+    return {**texts, _SCHEMA: environment_schema()}

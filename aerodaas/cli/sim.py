@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.options import ExampleGroup
 from aerodaas.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:

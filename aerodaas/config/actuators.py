@@ -7,8 +7,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from aerodaas.config.checked import near
-from aerodaas.config.strict import Strict
+from aerodaas.config.checked import Strict, near
 from aerodaas.identifiers import Identifier
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Validation of settings from files, and the wording of its errors."""
+"""Validation of settings from files: strict models, and the wording of errors."""
 
 from __future__ import annotations
 
@@ -7,16 +7,93 @@ import re
 import types
 import typing
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Secret, SecretBytes, SecretStr, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    Secret,
+    SecretBytes,
+    SecretStr,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+)
 from pydantic_core import ErrorDetails
 
-from aerodaas.config.annotations import is_subclass
-from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name
+from aerodaas.config.secrets import HIDDEN, SecretUrl, cleaned, is_secret_name, shown, shown_text
 from aerodaas.errors import ConfigError
 
-__all__ = ["checked", "explained", "near"]
+__all__ = [
+    "Finite",
+    "NotNegative",
+    "Positive",
+    "Settings",
+    "Strict",
+    "checked",
+    "explained",
+    "is_subclass",
+    "near",
+]
+
+
+def is_subclass(annotation: Any, *parents: type) -> bool:  # noqa: ANN401 - any annotation
+    """Whether an annotation is a class below one of `parents`.
+
+    On Python 3.10 `list[int]` claims to be a class, and `issubclass` raises TypeError for it.
+    """
+    plain = isinstance(annotation, type) and typing.get_origin(annotation) is None
+    return plain and issubclass(annotation, parents)
+
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _shown_settings(settings: dict[str, Any]) -> dict[str, Any]:
+    return dict(shown(settings))
+
+
+Settings = Annotated[dict[str, Any], PlainSerializer(_shown_settings, when_used="json")]
+"""Settings of a plug-in, which may hold secrets."""
+
+
+def _without_logins(value: Any) -> Any:  # noqa: ANN401 - as nested as its input
+    """URLs in texts without user, password and parameters, in any setting."""
+    if isinstance(value, str):
+        return shown_text(value)
+    if isinstance(value, list):
+        return [_without_logins(one) for one in value]
+    if isinstance(value, dict):
+        return {key: _without_logins(one) for key, one in value.items()}
+    return value
+
+
+class Strict(BaseModel):
+    """Unknown keys are mistakes, not wishes.
+
+    Neither `repr` nor JSON holds a secret; `model_dump()` keeps them, for a copy.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_serializer(mode="wrap")
+    def _serialized(
+        self, dump: SerializerFunctionWrapHandler, info: SerializationInfo
+    ) -> dict[str, Any]:
+        content: dict[str, Any] = dump(self)
+        return _without_logins(content) if info.mode == "json" else content
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        for name, value in super().__repr_args__():
+            # Which settings of a plug-in are secrets, its own model alone knows.
+            hidden = dict.fromkeys(value, HIDDEN) if name == "settings" else value
+            yield name, _without_logins(hidden)
+
 
 M = TypeVar("M", bound=BaseModel)
 _WORD = re.compile(r"[\w .\-]{0,40}")

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, SecretStr, model_validator
 from typing_extensions import Self
 
+from aerodaas.config.checked import NotNegative, Positive, Settings, Strict
 from aerodaas.config.secrets import SecretUrl, shown_text
-from aerodaas.config.strict import NotNegative, Positive, Settings, Strict
 from aerodaas.identifiers import Identifier
 
 __all__ = ["ComputeConfig", "EndpointConfig", "RuntimeEnvConfig"]

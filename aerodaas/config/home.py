@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from aerodaas.config.strict import Finite, Strict
+from aerodaas.config.checked import Finite, Strict
 
 if TYPE_CHECKING:
     from aerodaas.geometry.frames import GeodeticOrigin

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator
 
-from aerodaas.config.strict import Strict
+from aerodaas.config.checked import Strict
 
 __all__ = ["MapTilesConfig"]
 

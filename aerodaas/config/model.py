@@ -19,7 +19,7 @@ from aerodaas.config.actuators import (
     RelayConfig,
     ServoConfig,
 )
-from aerodaas.config.checked import checked
+from aerodaas.config.checked import Finite, NotNegative, Positive, Strict, checked
 from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
 from aerodaas.config.home import HomeConfig
 from aerodaas.config.json_text import check_plain, read_json
@@ -35,7 +35,6 @@ from aerodaas.config.robot import (
     RobotConfig,
     SensorConfig,
 )
-from aerodaas.config.strict import Finite, NotNegative, Positive, Strict
 from aerodaas.config.terrain import TerrainConfig
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier, ScopedName

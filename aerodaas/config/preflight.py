@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from aerodaas.config.strict import Finite, Positive, Strict
+from aerodaas.config.checked import Finite, Positive, Strict
 
 __all__ = ["PreflightConfig", "PreflightLevel"]
 

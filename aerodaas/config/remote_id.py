@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, SecretStr, field_validator, model_validator
 from typing_extensions import Self
 
-from aerodaas.config.strict import Finite, Strict
+from aerodaas.config.checked import Finite, Strict
 
 __all__ = ["OperatorPlaceConfig", "RemoteIdConfig"]
 

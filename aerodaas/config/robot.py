@@ -8,10 +8,10 @@ from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.config.checked import Finite, NotNegative, Positive, Settings, Strict
 from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.config.strict import Finite, NotNegative, Positive, Settings, Strict
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier
 

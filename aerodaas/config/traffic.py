@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from aerodaas.config.strict import Positive, Strict
+from aerodaas.config.checked import Positive, Strict
 
 __all__ = ["TrafficConfig"]
 

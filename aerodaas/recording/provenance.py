@@ -13,8 +13,8 @@ from pathlib import Path
 
 from typing_extensions import Self
 
-from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.redaction import public_document
 
 __all__ = ["Provenance", "package_versions", "processor_name", "revision_of"]
 

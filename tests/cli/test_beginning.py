@@ -77,7 +77,7 @@ def test_only_templates_are_named(aerodaas: Command, monkeypatch: pytest.MonkeyP
     """Not the folder in which Python keeps what it has compiled."""
     shutil.copytree(TEMPLATES, "templates")
     Path("templates/__pycache__").mkdir(exist_ok=True)
-    monkeypatch.setattr("aerodaas.cli.new.TEMPLATES", Path("templates"))
+    monkeypatch.setattr("aerodaas.cli.shipped.TEMPLATES", Path("templates"))
     code, _, said = aerodaas("new", "patrol", "--template", "__pycache__")
     assert code == 2
     assert "known: camera, detector, driver, follow, scheduler, survey" in said

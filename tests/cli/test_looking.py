@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 import pytest
 
-from aerodaas.cli import preflight
 from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import load_vehicle
@@ -65,7 +64,7 @@ def look(monkeypatch: pytest.MonkeyPatch, command: str) -> int:
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr(preflight, "_SETTLING", 0.2)
+    monkeypatch.setattr("aerodaas.cli.vehicle._SETTLING", 0.2)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config.annotations import is_subclass
+from aerodaas.config.checked import is_subclass
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig, validated
 from aerodaas.config.overrides import located, overridden, parse_setting
 from aerodaas.errors import ConfigError

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.config.checked import checked
-from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.config.redaction import catalogue
+from aerodaas.config.redaction import catalogue, public_document
 from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.traffic import TrafficConfig
 from aerodaas.errors import ConfigError

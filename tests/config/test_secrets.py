@@ -16,9 +16,9 @@ from mcap.reader import make_reader
 from pydantic import BaseModel, SecretStr, field_validator
 
 from aerodaas.config.checked import checked
-from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, validated
 from aerodaas.config.overrides import parse_setting
+from aerodaas.config.redaction import public_document
 from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name, shown_text
 from aerodaas.errors import ConfigError
 from aerodaas.recording.provenance import Provenance

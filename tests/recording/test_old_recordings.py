@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from aerodaas import Environment
-from aerodaas.cli.flown_tasks import Flown
+from aerodaas.cli.flown_workload import Flown
 from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.environment.document.building import build_mission

@@ -13,10 +13,10 @@ from typing import Any
 import typer
 
 from aerodaas.cli.lab_study import spread_of
+from aerodaas.cli.lab_sweep import write_csv
 from aerodaas.cli.leaderboard.markdown import markdown_page
 from aerodaas.cli.leaderboard.origin import Origin
 from aerodaas.cli.leaderboard.page import html_page
-from aerodaas.cli.rows import write_csv
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.leaderboard import (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-from aerodaas.cli.rows import write_csv
+from aerodaas.cli.lab_sweep import write_csv
 from aerodaas.cli.seeds.figures import rows, show
 from aerodaas.cli.seeds.runs import ApplicationRun, SeededRun, fly_seeds
 from aerodaas.config.options import RunOptions

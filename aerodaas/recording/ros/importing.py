@@ -15,7 +15,6 @@ from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_
 from aerodaas.cameras.settings import camera_model
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.checked import checked
-from aerodaas.config.document import public_document
 from aerodaas.config.model import (
     CameraConfig,
     EnvironmentConfig,
@@ -23,6 +22,7 @@ from aerodaas.config.model import (
     RecordingConfig,
     validated,
 )
+from aerodaas.config.redaction import public_document
 from aerodaas.errors import AeroDaaSError, RecordingError, SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.identifiers import internal

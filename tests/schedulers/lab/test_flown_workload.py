@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 
 from aerodaas import Environment
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.flown_tasks import Flown
-from aerodaas.cli.flown_workload import flown_trace, flown_workload
+from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
 from aerodaas.cli.lab import app
 from aerodaas.config.model import TaskConfig
 from aerodaas.errors import RecordingError

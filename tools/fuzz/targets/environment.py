@@ -7,9 +7,9 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located, overridden, parse_setting
+from aerodaas.config.redaction import public_document
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["run", "seeds"]

@@ -22,8 +22,7 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from aerodaas.cli.flown_tasks import Flown
-from aerodaas.cli.flown_workload import flown_trace, flown_workload
+from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
 from aerodaas.config.model import RecordingConfig, SensorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import AeroDaaSError
