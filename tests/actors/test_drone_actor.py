@@ -25,6 +25,8 @@ from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.runtime.session import Session
 from aerodaas.service.flights.locks import RobotLocks
 
+pytestmark = pytest.mark.wall_clock
+
 _READS = 100_000
 _ON_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.TAKING_OFF}
 _HOLD = {"on_complete": "hold"}

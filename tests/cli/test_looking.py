@@ -21,6 +21,8 @@ from aerodaas.messages.vehicle import Vehicle, VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 from tools.tello_vehicle import EmulatedTello
 
+pytestmark = pytest.mark.wall_clock
+
 LOOPBACK = "127.0.0.1"
 SETTING = {"fallback": "set", "failsafes": "set", "fence": "land", "role": "ground_station"}
 """Of a flight that sets all there is."""

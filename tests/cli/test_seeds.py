@@ -23,6 +23,8 @@ from aerodaas.cli.seeds.runs import SeededRun
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
+pytestmark = pytest.mark.wall_clock
+
 # A shell starts what a script runs in its background with Ctrl-C ignored.
 _MAIN = """
 import signal

@@ -25,6 +25,8 @@ from aerodaas.mission.commands import AddNavigation, Pause
 from aerodaas.service.http.bearer import bearer
 from aerodaas.service.own.server import FlightServer
 
+pytestmark = pytest.mark.wall_clock
+
 HOVER = {"robot": "drone", "command": "pause"}
 
 

@@ -33,6 +33,8 @@ from aerodaas.service.live import controls, surveys
 from aerodaas.service.live.controls import Freshness
 from aerodaas.service.own.server import FlightServer
 
+pytestmark = pytest.mark.wall_clock
+
 FIELD = [[0, 0], [20, 0], [20, 10], [0, 10]]
 SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"}
 

@@ -18,6 +18,8 @@ from aerodaas.http_server import server as serving
 from aerodaas.http_server.addresses import App, Receive, Scope, Send, listen
 from aerodaas.http_server.server import web_server
 
+pytestmark = pytest.mark.wall_clock
+
 PATIENCE = 0.5
 _MOST = 2
 _ENOUGH = 10.0

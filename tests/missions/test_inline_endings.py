@@ -22,6 +22,8 @@ from aerodaas.messages.readings import Readings
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
+pytestmark = pytest.mark.wall_clock
+
 _APP = """
 import sys
 import time

@@ -51,6 +51,8 @@ from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
+pytestmark = pytest.mark.wall_clock
+
 ENOUGH = 20.0
 SEEN = {
     "id": "one/seen",

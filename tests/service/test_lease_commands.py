@@ -13,6 +13,8 @@ from typer.testing import CliRunner, Result
 
 from aerodaas.cli.app import app
 
+pytestmark = pytest.mark.wall_clock
+
 Lease = Callable[..., Result]
 NUMBERS = itertools.count()
 

@@ -24,6 +24,8 @@ from aerodaas.service.flights.locks import RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.store import Account, Mission, Tenant
 
+pytestmark = pytest.mark.wall_clock
+
 CROWD = Principal("crowd", "crowd", Role.PILOT, frozenset(Scope), "t")
 ROWS = 3000
 HOLD = """

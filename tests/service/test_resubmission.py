@@ -15,6 +15,8 @@ from served import Served, document, fleet, robot
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.protocol.schemas import MissionIn
 
+pytestmark = pytest.mark.wall_clock
+
 BODY = {"document": document("one", (5, 0))}
 
 

@@ -13,6 +13,8 @@ from aerodaas.protocol.schemas import SilencePolicy
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
 
+pytestmark = pytest.mark.wall_clock
+
 LONG = 3600.0
 
 

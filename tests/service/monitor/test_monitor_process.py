@@ -18,6 +18,8 @@ from aerodaas.service.monitor import process as processes
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.monitor.process import FleetMonitor
 
+pytestmark = pytest.mark.wall_clock
+
 
 class Told:
     """A monitor over two drones, and what it has told."""
