@@ -63,7 +63,7 @@ def npm(folder: Path, *words: str) -> None:
 def test_the_page_that_ships_is_built_from_its_source(source: Path) -> None:
     """To the last byte."""
     npm(source, "run", "build")
-    built = source.parent / "aerodaas" / "console" / "page"
+    built = source.parent / "aerodaas" / "service" / "http" / "page"
     assert {one.name for one in built.iterdir()} == {one.name for one in _PAGE.iterdir()}
     for one in built.iterdir():
         assert one.read_bytes() == (_PAGE / one.name).read_bytes(), f"{one.name}: make console"
