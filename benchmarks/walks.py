@@ -122,7 +122,12 @@ def main() -> None:
     session, host, robot = Session(environment, None), _Host(), environment.robots[0]
     sensor, state = robot.sensors[0], state_stream(robot.id)
     spec = RobotSpec(
-        robot, (), (_NAVIGATION,), (), (), (OpenStream(_NAVIGATION),), OrderedScheduler()
+        robot,
+        sensors=(),
+        navigation=(_NAVIGATION,),
+        commands=(),
+        initial=(OpenStream(_NAVIGATION),),
+        scheduler=OrderedScheduler(),
     )
     drone = DroneNode(
         session,
