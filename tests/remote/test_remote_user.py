@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -21,11 +22,14 @@ from aerodaas.analytics.remote import TOKEN_VARIABLE, RemoteAnalytics
 from aerodaas.cli.app import app as cli
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.environment.remote_client import RemoteClient
-from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, SourceError
+from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, SilentError, SourceError
 from aerodaas.http_server.addresses import is_loopback
 from aerodaas.messages.mission import MissionState
+from aerodaas.mission.commands import Answer, Command, Pause, Resume
+from aerodaas.protocol.schemas import CommandIn, Role
 from aerodaas.recording.provenance import Provenance
 from aerodaas.service.own import flight as own_flight
+from aerodaas.service.own.access import OWN, REMOTE, principal_of
 from aerodaas.service.own.server import FlightServer
 
 pytestmark = pytest.mark.wall_clock
@@ -246,6 +250,35 @@ def test_silent_drone_is_no_silent_answer(service: Served, monkeypatch: pytest.M
     with pytest.raises(SourceError, match="did not answer"):
         service.client().command("pause")
     assert "did not answer" in service.run.notes[0]
+
+
+def test_a_command_that_was_told_as_unanswered_is_not_given_later(
+    service: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where others hang before it, it waits for its turn, and ends with its sender's patience."""
+    begun, free = threading.Semaphore(0), threading.Event()
+    carried_out: list[Command] = []
+
+    def hang(_: str, command: Command) -> Answer:
+        carried_out.append(command)
+        begun.release()
+        assert free.wait(20)
+        return Answer(accepted=True)
+
+    monkeypatch.setattr(own_flight, "_PATIENCE", 0.1)
+    monkeypatch.setattr(service.run, "command", hang)
+    pilot = principal_of(REMOTE, Role.PILOT)
+    with ThreadPoolExecutor(40) as users:
+        pauses = [CommandIn(robot="drone", command="pause")] * own_flight._MOST_ASKED
+        asked = [users.submit(service.flight.fly, pilot, OWN, one) for one in pauses]
+        for _ in asked:
+            assert begun.acquire(timeout=20)
+        with pytest.raises(SilentError):
+            service.flight.fly(pilot, OWN, CommandIn(robot="drone", command="land"))
+        free.set()
+    monkeypatch.setattr(own_flight, "_PATIENCE", 5.0)
+    assert service.flight.fly(pilot, OWN, CommandIn(robot="drone", command="resume")).accepted
+    assert set(map(type, carried_out)) == {Pause, Resume}
 
 
 def test_address_and_token_are_checked(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -202,10 +202,12 @@ class OwnFlight:
             given = self._as_stream_item(command.robot, given)
         sender = "a remote user" if principal.account == REMOTE else "the console"
         asked = f"{sender} asked {command.robot} to {told}" if told else ""
+        asking = self._commands.submit(self._run.command, command.robot, given)
         try:
-            asking = self._commands.submit(self._run.command, command.robot, given)
             answer = asking.result(_PATIENCE)
         except FutureTimeoutError:
+            # One that still waits for its turn is never given: nobody expects it any more.
+            asking.cancel()
             text = f"the drone did not answer within {_PATIENCE:g} s"
             self._tell(asked, text)
             raise SilentError(text) from None
