@@ -18,11 +18,9 @@ from aerodaas.protocol.schemas import (
     PictureForm,
     StreamKind,
 )
+from aerodaas.service.own.access import OWN
 
 __all__ = ["RemoteClient"]
-
-_OWN = "own"
-"""Id of the one mission of a flight's API."""
 
 
 class RemoteClient:
@@ -54,7 +52,7 @@ class RemoteClient:
     def status(self) -> dict[str, Any]:
         """Return the status of mission and vehicle, with the fields of `schemas.StatusOut`."""
         with _explained():
-            mission = self._client.mission(_OWN)
+            mission = self._client.mission(OWN)
         return mission.status[self._robot_of(mission)].model_dump(mode="json")
 
     def add_waypoints(
@@ -80,13 +78,13 @@ class RemoteClient:
         """
         with _explained():
             content = {
-                "robot": self._robot or self._robot_of(self._client.mission(_OWN)),
+                "robot": self._commanded(),
                 "waypoints": list(waypoints),
                 "ordered": ordered,
                 "index": index,
             }
             wanted = checked(NavigationIn, content, "the waypoints")
-            return _accepted(self._client.add_navigation(_OWN, wanted))
+            return _accepted(self._client.add_navigation(OWN, wanted))
 
     def command(self, name: str) -> dict[str, Any]:
         """Send `pause`, `resume`, `clear`, `return-home` or `land`; returns the drone's answer.
@@ -94,19 +92,19 @@ class RemoteClient:
         Raises MissionError if the mission refuses.
         """
         with _explained():
-            robot = self._robot or self._robot_of(self._client.mission(_OWN))
-            wanted = checked(CommandIn, {"robot": robot, "command": name}, "the command")
-            return _accepted(self._client.command(_OWN, wanted))
+            content = {"robot": self._commanded(), "command": name}
+            wanted = checked(CommandIn, content, "the command")
+            return _accepted(self._client.command(OWN, wanted))
 
     def frame(self) -> bytes:
         """Return the next picture of the robot's first camera as JPEG; waits for one."""
         with _explained():
-            mission = self._client.mission(_OWN)
+            mission = self._client.mission(OWN)
             cameras = [n for n, kind in mission.streams.items() if kind is StreamKind.PICTURES]
             if not cameras:
                 raise MissionError("no camera of this flight has a stream")
             form = PictureForm.JPEG
-            with self._client.live(_OWN, 1.0, cameras[0], pictures=form) as connection:
+            with self._client.live(OWN, 1.0, cameras[0], pictures=form) as connection:
                 for received in connection:
                     if not isinstance(received, MissionOut) and received.blob:
                         return received.blob
@@ -114,10 +112,14 @@ class RemoteClient:
 
     def stream(self, rate: float = 5.0) -> Iterator[dict[str, Any]]:
         """Yield the status at each change, `rate` times a second at most, until the flight ends."""
-        with _explained(), self._client.live(_OWN, rate) as connection:
+        with _explained(), self._client.live(OWN, rate) as connection:
             for received in connection:
                 if isinstance(received, MissionOut) and received.status:
                     yield received.status[self._robot_of(received)].model_dump(mode="json")
+
+    def _commanded(self) -> str:
+        """The robot that is named, or the only one that flies."""
+        return self._robot or self._robot_of(self._client.mission(OWN))
 
     def _robot_of(self, mission: MissionOut) -> str:
         """The robot, which has told something; raises ConfigError where it has to be named."""

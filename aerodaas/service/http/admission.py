@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 from starlette.requests import HTTPConnection
 
 from aerodaas.errors import AeroDaaSError
+from aerodaas.http_server.addresses import address_of
 from aerodaas.protocol.schemas import AnswerOut, Role, Scope
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.access.rates import RateLimiter
@@ -78,7 +79,7 @@ class Admission:
 
     def enter(self, connection: HTTPConnection) -> Principal:
         """Find out who sends a request, before its body is read; raises RefusedError."""
-        address = _address(connection)
+        address = address_of(connection.scope)
         principal: Principal | None = None
         try:
             principal = self._tokens.of(bearer(connection.headers), address)
@@ -102,7 +103,7 @@ class Admission:
 
         `look` raises RefusedError for who may not. The service's own trouble refuses nobody.
         """
-        token, address = bearer(connection.headers), _address(connection)
+        token, address = bearer(connection.headers), address_of(connection.scope)
         try:
             connection.scope[_SENDER] = self._tokens.of(token, address)
             look(self.require(connection, role, scope))
@@ -149,10 +150,6 @@ class Admission:
             action,
             text=str(error),
             accepted=False,
-            address=_address(connection),
+            address=address_of(connection.scope),
             required=False,
         )
-
-
-def _address(connection: HTTPConnection) -> str:
-    return connection.client.host if connection.client is not None else ""
