@@ -52,13 +52,13 @@ COMMANDS = (
     ),
     DeferredCommand(
         "preflight",
-        "aerodaas.cli.vehicle:preflight",
+        "aerodaas.cli.preflight:preflight",
         "Print a robot's health before take-off as one list; nothing moves, and nothing is set "
         "there.",
     ),
     DeferredCommand(
         "logs",
-        "aerodaas.cli.vehicle:logs",
+        "aerodaas.cli.logs:logs",
         "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
     ),
     DeferredCommand(

@@ -14,8 +14,8 @@ import typer
 
 from aerodaas.cli.application import build_application
 from aerodaas.cli.options import OtherEnvironment, Overrides
+from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
-from aerodaas.cli.vehicle import settled_items
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.errors import AeroDaaSError, GraphError, SourceError, VehicleError, failure_line
 from aerodaas.findings import Finding

@@ -27,10 +27,11 @@ from aerodaas.messages.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
+from aerodaas.simulation.actuators import SimulatedActuators
 from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
-from aerodaas.simulation.payload import SimulatedActuators, SimulatedGimbal, SimulatedPhotoCamera
+from aerodaas.simulation.payload import SimulatedGimbal, SimulatedPhotoCamera
 from aerodaas.simulation.sensors import SensorNoise, SimulatedRangefinder, Surface
 from aerodaas.simulation.world import World
 from aerodaas.terrain.ground import Ground

@@ -24,8 +24,9 @@ from aerodaas.messages.vehicle import (
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import Neighbour, traffic_neighbours
+from aerodaas.mission.safety.traffic import traffic_neighbours
 
 __all__ = ["SetpointLoop"]
 

@@ -37,7 +37,7 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import BackgroundPlanner, Planner
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
-from aerodaas.mission.safety.traffic import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.runtime.node import NEVER, Outlet
 from aerodaas.runtime.reports import Latencies
 from aerodaas.runtime.session import Session

@@ -176,7 +176,7 @@ def test_a_vehicle_is_judged_by_what_it_says_in_the_end(
     checked: Checked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Some is told late; until then it is read, and once it is judged."""
-    monkeypatch.setattr("aerodaas.cli.vehicle._SETTLING", 0.5)
+    monkeypatch.setattr("aerodaas.cli.preflight._SETTLING", 0.5)
     code, told = checked(vehicle="check_parts:Slow", camera="simulated")
     assert code == 0, told
     assert "ok drone check_parts:Slow answers: grounded, battery 100 %" in told
@@ -189,7 +189,7 @@ def test_a_charge_that_no_vehicle_tells_is_called_unknown(
     checked: Checked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is no number."""
-    monkeypatch.setattr("aerodaas.cli.vehicle._SETTLING", 0.1)
+    monkeypatch.setattr("aerodaas.cli.preflight._SETTLING", 0.1)
     _, told = checked(vehicle="check_parts:Uncharged", camera="simulated")
     assert "check_parts:Uncharged answers: grounded, battery unknown" in told
 

@@ -21,8 +21,8 @@ from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoin
 from aerodaas.mission.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
 from aerodaas.mission.planner import BackgroundPlanner
 from aerodaas.mission.queue import WaypointQueue
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import Neighbour
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 

@@ -21,7 +21,7 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance, GroundView, climb_speed
-from aerodaas.mission.safety.traffic import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 
 __all__ = ["FilteredSetpoint", "SetpointFilter"]
 

@@ -13,7 +13,7 @@ from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
 from aerodaas.recording.reader import Recording, vehicle_states
-from aerodaas.simulation.payload import SimulatedActuators
+from aerodaas.simulation.actuators import SimulatedActuators
 
 __all__ = ["ReplayedVehicle"]
 

@@ -36,7 +36,7 @@ from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
 from aerodaas.mission.planner import InlinePlanner
-from aerodaas.mission.safety.traffic import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 

@@ -27,7 +27,7 @@ from aerodaas.mission.commands import (
     ReturnHome,
     TakeBack,
 )
-from aerodaas.mission.safety.traffic import Neighbour
+from aerodaas.mission.safety.neighbours import Neighbour
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.flight import MavFlight
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.robot import LimitsConfig
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import SILENT, Neighbours, Whereabouts
 
 _SECOND = NANOSECONDS
 _SILENT_NS = round(SILENT * NANOSECONDS)

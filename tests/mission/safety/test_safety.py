@@ -18,8 +18,8 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
 from aerodaas.mission.safety import setpoint_filter
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import Neighbour
 
 L_SHAPE = [(-15.0, -15.0), (15.0, -15.0), (15.0, 0.0), (0.0, 0.0), (0.0, 15.0), (-15.0, 15.0)]
 HOLE = [(-9.0, -9.0), (-5.0, -9.0), (-5.0, -5.0), (-9.0, -5.0)]

@@ -32,10 +32,10 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import ReturnHome
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.failsafe import FailsafeAction
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.mission.safety.traffic import (
     Encounter,
-    Neighbour,
     TrafficWatch,
     encounters,
     meets_in,

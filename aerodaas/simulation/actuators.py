@@ -1,0 +1,76 @@
+"""Actuators of a simulated drone, in its own steps of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.messages.actuators import MoveResult
+
+__all__ = ["SimulatedActuators"]
+
+_DURATION = {"gripper": 1.0, "servo": 0.5, "relay": 0.05, "parachute": 0.05}
+"""Seconds until a position is taken, by the actuator's type."""
+
+
+class _Move(NamedTuple):
+    number: int
+    actuator: str
+    position: str
+    """Empty for a parachute that is fired."""
+    due: int
+    """Mission clock at which it is done, nanoseconds."""
+
+
+class SimulatedActuators:
+    """Do as they are told; implement `aerodaas.messages.actuators.Actuators`."""
+
+    def __init__(self, actuators: list[ActuatorConfig], fire: Callable[[], None]) -> None:
+        """Carry `actuators`; `fire` is called when a parachute opens."""
+        self._types = {one.id: one.type for one in actuators}
+        self._fire = fire
+        self._positions: dict[str, str] = {}
+        self._moves: list[_Move] = []
+        self._results: list[MoveResult] = []
+        self._asked = 0
+        self._now = 0
+
+    @property
+    def positions(self) -> Mapping[str, str]:
+        """The positions last taken, by actuator."""
+        return dict(self._positions)
+
+    def move(self, actuator: str, position: str) -> int:
+        """Take a position from now on."""
+        self._asked += 1
+        due = self._now + round(_DURATION[self._types[actuator]] * NANOSECONDS)
+        self._moves.append(_Move(self._asked, actuator, position, due))
+        return self._asked
+
+    def release_parachute(self, actuator: str) -> int:
+        """Fire a parachute at the next step of time."""
+        return self.move(actuator, "")
+
+    def withdraw(self, number: int) -> None:
+        """Leave an actuator as it is, unless it has taken its position already."""
+        self._moves = [one for one in self._moves if one.number != number]
+
+    def results(self) -> list[MoveResult]:
+        """What was done since the last call."""
+        results, self._results = self._results, []
+        return results
+
+    def advance_to(self, stamp: int) -> None:
+        """Move until mission time `stamp`, nanoseconds."""
+        self._now = stamp
+        done = [one for one in self._moves if one.due <= stamp]
+        self._moves = [one for one in self._moves if one.due > stamp]
+        for one in done:
+            if one.position:
+                self._positions[one.actuator] = one.position
+            else:
+                self._positions[one.actuator] = "released"
+                self._fire()
+            self._results.append(MoveResult(one.number, accepted=True))
