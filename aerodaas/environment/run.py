@@ -258,7 +258,7 @@ class Run:
             self._api = OwnFlight(self, application.stem if application else self.config.name)
         for server in self._servers:
             if self._api is not None and not server.serving:
-                server.start(self._api)
+                server.show(self._api)
 
     def _close_servers(self) -> None:
         if self._api is not None:

@@ -128,7 +128,7 @@ class Flying:
             if not order.rehearsal:
                 server = ProcessServer(self._folder.socket, self.served, self._lease, self._relay)
                 ending.callback(server.close)
-                server.start()
+                server.show()
             ending.callback(self.served.end)
             ending.callback(self._lease.stop)
             if not order.rehearsal:

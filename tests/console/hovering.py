@@ -90,7 +90,7 @@ def console(*, framed: bool = False, **environment: object) -> Iterator[tuple[Fl
     server = FlightServer("127.0.0.1:0", "--console-address")
     server.framed = framed
     flight = OwnFlight(run, "survey")
-    server.start(flight)
+    server.show(flight)
     try:
         yield server, run
     finally:

@@ -119,7 +119,7 @@ def served(token: str | None = TOKEN) -> Iterator[Served]:
     settings = RemoteConfig.model_validate({"port": port, **({"token": token} if token else {})})
     server = FlightServer.of_remote(settings)
     own = OwnFlight(run, "survey")
-    server.start(own)
+    server.show(own)
     yield Served(run, own, port)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(own_flight, "_FAREWELL", 0.0)

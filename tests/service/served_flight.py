@@ -58,7 +58,7 @@ class ServedFlight:
         self.relay = HereRelay(folder.path / "here")
         self.flight = make(drones, "m", lease)
         self._server = ProcessServer(folder.socket, self.flight, lease, self.relay)
-        self._server.start()
+        self._server.show()
 
     def close(self) -> None:
         """End the flight."""

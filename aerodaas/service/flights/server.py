@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,12 +12,13 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.http.app_server import AppServer
 from aerodaas.service.own.access import FlightTokens, principal_of
 from aerodaas.service.own.flight import Flown, OwnFlight
 from aerodaas.unix_server import listen_unix
 
 if TYPE_CHECKING:
-    import uvicorn
+    from fastapi import FastAPI
 
 __all__ = ["LeasedFlight", "ProcessServer"]
 
@@ -31,7 +31,6 @@ _RATE = 10_000.0
 """Requests a second, on average: the service has counted its users' own."""
 _MOST_MESSAGE = LARGEST_ANSWER + (64 << 10)
 """Bytes of a WebSocket message, see `service.serve`."""
-_STOPPING = 5.0
 
 
 class LeasedFlight(OwnFlight):
@@ -60,37 +59,31 @@ class LeasedFlight(OwnFlight):
         return True
 
 
-class ProcessServer:
-    """Serves one flight on a Unix socket until it is closed, in a thread of its own."""
+class ProcessServer(AppServer):
+    """Serves one flight on a Unix socket, until it is closed."""
 
     def __init__(
         self, path: Path, flight: LeasedFlight, lease: LeaseWatch, relay: HereRelay
     ) -> None:
         """Listen at the socket `path`; raises MissionError if that cannot be done."""
         try:
-            self._socket = listen_unix(path)
+            listener = listen_unix(path)
         except OSError as error:
             raise MissionError(f"there is no socket at {path}: {error}") from None
+        super().__init__(
+            listener,
+            most_connections=_MOST_CONNECTIONS,
+            ws_max_size=_MOST_MESSAGE,
+            ws_ping_interval=None,
+        )
         self._flight, self._lease, self._relay = flight, lease, relay
-        self._closed = threading.Event()
-        self._server: uvicorn.Server | None = None
-        self._thread = threading.Thread(target=self._serve, name="flight server", daemon=True)
 
-    def start(self) -> None:
-        """Serve from now on; who has connected before is answered then."""
-        self._thread.start()
+    def show(self) -> None:
+        """Serve the flight from now on."""
+        self.start(self._build)
 
-    def close(self) -> None:
-        """Tell who watches that the flight is over, and stop serving."""
-        self._closed.set()
-        if self._server is not None:
-            self._server.should_exit = True
-        self._thread.join(_STOPPING)
-        self._socket.close()
-
-    def _serve(self) -> None:
+    def _build(self) -> FastAPI:
         # FastAPI takes a while to load, in which the flight is launched.
-        from aerodaas.http_server.server import web_server  # noqa: PLC0415
         from aerodaas.service.flights.routes import FlightRoutes  # noqa: PLC0415
         from aerodaas.service.http.admission import Admission  # noqa: PLC0415
         from aerodaas.service.http.gate import Bounds  # noqa: PLC0415
@@ -100,13 +93,4 @@ class ProcessServer:
         roles = {role.value: principal_of(role.value, role) for role in Role}
         admission = Admission(FlightTokens(roles), rates=RateLimiter(_RATE, _RATE))
         own = FlightRoutes(self._flight, self._lease, self._relay, admission).router()
-        self._server = web_server(
-            flight_app(self._flight, admission, [own], bounds=Bounds(lasting=_MOST_WATCHING)),
-            most_connections=_MOST_CONNECTIONS,
-            timeout_graceful_shutdown=1,
-            ws_max_size=_MOST_MESSAGE,
-            ws_per_message_deflate=False,
-            ws_ping_interval=None,
-        )
-        if not self._closed.is_set():
-            self._server.run(sockets=[self._socket])
+        return flight_app(self._flight, admission, [own], bounds=Bounds(lasting=_MOST_WATCHING))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 
 from fastapi import APIRouter, FastAPI
@@ -12,11 +11,11 @@ from typing_extensions import Self
 from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError
 from aerodaas.http_server.addresses import HostGuard, listen
-from aerodaas.http_server.server import web_server
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.app import build_app
 from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.app_server import AppServer
 from aerodaas.service.http.gate import Bounds
 from aerodaas.service.own.access import REMOTE, FlightTokens, new_tokens, principal_of
 from aerodaas.service.own.flight import OwnFlight
@@ -26,7 +25,6 @@ from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes
 
 __all__ = ["ApiServer", "FlightServer", "flight_app"]
 
-_STOPPING = 5.0
 _MOST_CONNECTIONS = 640
 """A page has two that stay, and a few that come and go."""
 _MOST_WATCHERS = 320
@@ -39,7 +37,7 @@ _MOST_BYTES_SENT = 4096
 _PING_SECONDS = 5.0
 
 
-class ApiServer:
+class ApiServer(AppServer):
     """Serves the API and its page to who has a token, until it is closed."""
 
     def __init__(
@@ -63,14 +61,21 @@ class ApiServer:
         host, _, port = address.rpartition(":")
         self._host = host
         try:
-            self._socket = listen(host.strip("[]"), int(port))
+            listener = listen(host.strip("[]"), int(port))
         except (OSError, OverflowError, ValueError) as error:
             raise ConfigError(
                 f"cannot serve the flight at {address}: {error}; give another {option}"
             ) from None
+        super().__init__(
+            listener,
+            most_connections=_MOST_CONNECTIONS,
+            ws_max_size=_MOST_BYTES_SENT,
+            ws_ping_interval=_PING_SECONDS,
+            ws_ping_timeout=_PING_SECONDS,
+        )
+        self._port = listener.getsockname()[1]
         self._tokens = tokens or FlightTokens(new_tokens())
         self._guard = guard
-        self._thread: threading.Thread | None = None
 
     def address(self, *, viewer: bool = False) -> str:
         """Where a browser opens the page, with the token of who flies, or of who watches only.
@@ -79,40 +84,13 @@ class ApiServer:
         """
         host = "127.0.0.1" if self._host in {"0.0.0.0", "[::]"} else self._host  # noqa: S104 - compared
         token = self._tokens.token(Role.VIEWER if viewer else Role.PILOT)
-        return f"http://{host}:{self._socket.getsockname()[1]}/#token={token}"
-
-    @property
-    def serving(self) -> bool:
-        """Whether it has begun to serve."""
-        return self._thread is not None
+        return f"http://{host}:{self._port}/#token={token}"
 
     def serve(self, build: Callable[[Admission], FastAPI], tell: Callable[[str], None]) -> None:
         """Serve what `build` makes, in a thread; `tell` tells people of many wrong tokens."""
         self._tokens.tell = tell
-        self._server = web_server(
-            self._guard(
-                build(Admission(self._tokens, rates=RateLimiter(_RATE, _BURST))), self._host
-            ),
-            most_connections=_MOST_CONNECTIONS,
-            timeout_graceful_shutdown=1,
-            ws_max_size=_MOST_BYTES_SENT,
-            # It would compress each picture anew for each watcher, and pictures are compressed.
-            ws_per_message_deflate=False,
-            ws_ping_interval=_PING_SECONDS,
-            ws_ping_timeout=_PING_SECONDS,
-        )
-        words = {"sockets": [self._socket]}
-        self._thread = threading.Thread(
-            target=self._server.run, kwargs=words, name="api server", daemon=True
-        )
-        self._thread.start()
-
-    def close(self) -> None:
-        """Stop serving."""
-        if self._thread is not None:
-            self._server.should_exit = True
-            self._thread.join(_STOPPING)
-        self._socket.close()
+        app = build(Admission(self._tokens, rates=RateLimiter(_RATE, _BURST)))
+        self.start(lambda: self._guard(app, self._host))
 
 
 class FlightServer(ApiServer):
@@ -138,7 +116,7 @@ class FlightServer(ApiServer):
             guard = _by_any_name
         return cls(f"{host}:{settings.port}", "remote.port", tokens, guard)
 
-    def start(self, flight: OwnFlight) -> None:
+    def show(self, flight: OwnFlight) -> None:
         """Serve a flight that has begun."""
         self.serve(
             lambda admission: flight_app(flight, admission, framed=self.framed),
