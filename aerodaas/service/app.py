@@ -12,24 +12,20 @@ from fastapi import APIRouter, FastAPI
 
 from aerodaas.config.map_tiles import MapTilesConfig
 from aerodaas.service.http.admission import Admission
-from aerodaas.service.http.gate import Bounds, Gate
+from aerodaas.service.http.gate import Gate
+from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.http.map_archive import archive_routes
 from aerodaas.service.http.page import page_routes
 from aerodaas.service.http.refusals import register_refusals
 
 __all__ = ["build_app"]
 
-_BOUNDS = Bounds()
-_THREADS = 200
-"""Most threads that answer requests, and most that look whether lasting ones still may be: more
-than all users but those with a reserve may keep busy, see `Bounds`."""
-
 
 def build_app(
     admission: Admission,
     routers: Sequence[APIRouter],
     *,
-    bounds: Bounds = _BOUNDS,
+    limits: RequestLimits = PROVIDER,
     tiles: MapTilesConfig | None = None,
     framed: bool = False,
     running: Callable[[], AbstractAsyncContextManager[None]] = nullcontext,
@@ -39,7 +35,7 @@ def build_app(
     Args:
         admission: Admits each request.
         routers: Routes of the API.
-        bounds: Bounds of who may ask how much at once.
+        limits: Limits of requests.
         tiles: Map below the page's drones.
         framed: Whether a page of this machine, such as a notebook, may hold the page in a frame.
         running: Makes the context that is entered while the application runs.
@@ -50,8 +46,10 @@ def build_app(
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        anyio.to_thread.current_default_thread_limiter().total_tokens = _THREADS
-        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(_THREADS, "service"))
+        # One pool answers requests, the other looks whether live views may stay.
+        anyio.to_thread.current_default_thread_limiter().total_tokens = limits.threads
+        executor = ThreadPoolExecutor(limits.threads, "service")
+        asyncio.get_running_loop().set_default_executor(executor)
         async with running():
             yield
 
@@ -67,5 +65,5 @@ def build_app(
     register_refusals(app)
     for router in (*routers, page_routes(framed=framed, tiles=tiles), archive_routes(tiles)):
         app.include_router(router)
-    app.add_middleware(Gate, admission=admission, bounds=bounds)
+    app.add_middleware(Gate, admission=admission, limits=limits)
     return app

@@ -24,11 +24,10 @@ from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.errors import ConfigError
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.limits import RequestLimits
 
-__all__ = ["LARGEST_MODEL", "ModelShelf", "require_room"]
+__all__ = ["ModelShelf", "require_room"]
 
-LARGEST_MODEL = 64 << 20
-"""Bytes."""
 _LEAST_FREE = 1 << 30
 """Bytes that stay free on the disk: flights under way are recorded there."""
 _LARGEST_SHELF = 2 << 30
@@ -78,8 +77,8 @@ class ModelShelf:
         Raises ConfigError if it is too large or not the one that it is called, or takes too much
         to be run; RefusedError if there is no room.
         """
-        if len(content) > LARGEST_MODEL:
-            raise ConfigError(f"a model has at most {LARGEST_MODEL >> 20} MiB")
+        if len(content) > RequestLimits.model_bytes:
+            raise ConfigError(f"a model has at most {RequestLimits.model_bytes >> 20} MiB")
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ConfigError("the content has another SHA-256 than its name")
         if self.has(tenant, sha256):

@@ -6,25 +6,18 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
-from aerodaas.analytics.here.relay import LARGEST_ANSWER
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.loading import link_of
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.http_server.addresses import is_loopback, listen
-from aerodaas.http_server.server import web_server
 from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.http.connections import web_server
+from aerodaas.service.http.limits import PROVIDER
 from aerodaas.service.provider import build_service
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
 __all__ = ["serve"]
-
-_MOST_CONNECTIONS = 1000
-_MOST_MESSAGE = LARGEST_ANSWER + (64 << 10)
-"""Bytes of a WebSocket message: what an analysis at the user's side answers, and what belongs to
-it."""
-_PING_SECONDS = 5.0
-"""Seconds after which a watcher who does not answer is gone."""
 
 
 def serve(
@@ -71,14 +64,9 @@ def serve(
         tell(f"serving {settings.config.name} at {scheme}://{where}:{listener.getsockname()[1]}")
         web_server(
             build_service(settings, store, tell),
-            most_connections=_MOST_CONNECTIONS,
+            PROVIDER,
             ssl_certfile=certificate,
             ssl_keyfile=key,
-            ws_max_size=_MOST_MESSAGE,
-            ws_ping_interval=_PING_SECONDS,
-            ws_ping_timeout=_PING_SECONDS,
-            # It would compress each state anew for each watcher, and pictures are compressed.
-            ws_per_message_deflate=False,
             timeout_graceful_shutdown=2,
         ).run(sockets=[listener])
 

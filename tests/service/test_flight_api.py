@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -34,6 +35,7 @@ from aerodaas.service.flights.order import Attached, FlightOrder
 from aerodaas.service.flights.server import LeasedFlight, ProcessServer
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.http.limits import LEASED_FLIGHT
 from aerodaas.service.own import flight as own
 
 FLEET = {
@@ -266,7 +268,7 @@ def test_who_watches_much_keeps_nobody_from_commanding(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As many views as the flight has places leave some to the service itself."""
-    monkeypatch.setattr(server, "_MOST_WATCHING", 5)
+    monkeypatch.setattr(server, "LEASED_FLIGHT", replace(LEASED_FLIGHT, account_views=5))
     flight = Flight(tmp_path)
     flight.flight.pictures = Still()
     views = [flight.link.items("one/cam") for _ in range(8)]

@@ -22,7 +22,6 @@ from websockets.sync.client import ClientConnection, connect
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.http_server.addresses import listen
-from aerodaas.http_server.server import web_server
 from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.schemas import (
     AccountIn,
@@ -34,7 +33,6 @@ from aerodaas.protocol.schemas import (
     TokenIn,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service import serve
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
@@ -42,7 +40,9 @@ from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.service.http import bodies, gate
+from aerodaas.service.http import bodies
+from aerodaas.service.http.connections import web_server
+from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.live import controls as hand
 from aerodaas.service.live import session
 from aerodaas.service.models import ModelShelf
@@ -163,8 +163,7 @@ def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
             start(desk)
 
         monkeypatch.setattr(MissionDesk, "start", started)
-        app, largest = build_service(made.settings, made.store), serve._MOST_MESSAGE
-        server = web_server(app, most_connections=100, ws_max_size=largest)
+        server = web_server(build_service(made.settings, made.store), PROVIDER)
         with listen("127.0.0.1", 0) as listener:
             made.port = listener.getsockname()[1]
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
@@ -380,12 +379,12 @@ def test_who_asks_much_at_once_keeps_nobody_waiting(
     greedy, other = service.token("ivan"), service.token("olga")
     with ThreadPoolExecutor(45) as pool:
         asked = [pool.submit(service.status, "GET", "fleet", greedy) for _ in range(45)]
-        until(lambda: sum(one.done() for one in asked) == 45 - gate._MOST_AT_ONCE)
+        until(lambda: sum(one.done() for one in asked) == 45 - RequestLimits.account_requests)
         assert service.status("GET", "fleet", other) == 200
         free.set()
     statuses = [one.result() for one in asked]
     assert sorted(set(statuses)) == [200, 429]
-    assert statuses.count(200) == gate._MOST_AT_ONCE
+    assert statuses.count(200) == RequestLimits.account_requests
     assert service.status("GET", "fleet", greedy) == 200
 
 
@@ -393,7 +392,7 @@ def test_an_operator_is_never_turned_away(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever else the account has asked for: it may be a drone that must come home."""
-    monkeypatch.setattr(gate, "_MOST_AT_ONCE", 0)
+    monkeypatch.setattr(RequestLimits, "account_requests", 0)
     token = service.token("olga")
     service.accounts.change("olga", role=Role.OPERATOR)
     assert service.status("GET", "fleet", token) == 200
@@ -511,7 +510,7 @@ def test_a_command_waits_for_nothing_that_the_desk_does(service: Service) -> Non
 
 def test_an_account_has_so_many_views_and_an_operator_all(service: Service) -> None:
     """One that ends makes room for the next one."""
-    most = gate.Bounds().lasting
+    most = PROVIDER.account_views
     mission = service.submit()
     viewer = service.token("vera", role=Role.VIEWER)
     operator = service.token("olga", role=Role.OPERATOR)

@@ -24,7 +24,7 @@ from served import document, fleet, robot
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.service import provider
 from aerodaas.service.access.accounts import Accounts
-from aerodaas.service.http import admission
+from aerodaas.service.http.counters import RateLimiter
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -45,7 +45,7 @@ _CHECKS = [
 @pytest.fixture
 def interface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Schema and content of a service with two drones, in which nothing moves on; for its admin."""
-    monkeypatch.setattr(admission, "_BURST", 1e9)
+    monkeypatch.setattr(RateLimiter, "admit", lambda *_: None)
     path = tmp_path / "fleet.json"
     path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
     config = EnvironmentConfig.load(path)

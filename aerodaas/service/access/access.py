@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from http import HTTPStatus
 
-from aerodaas.http_server.wrong_tokens import WrongTokens
 from aerodaas.protocol.schemas import Scope
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
@@ -17,6 +16,7 @@ from aerodaas.service.access.oidc import OidcVerifier
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.tokens import digest_of, fits, parse
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.http.counters import WrongTokens
 from aerodaas.service.store import Store
 from aerodaas.service.store.rows import Account, Token
 
@@ -56,7 +56,7 @@ class Access:
         self._audit = audit
         self._clock = clock
         self._lock = threading.Lock()
-        self._wrong = WrongTokens(tell, what="service")
+        self._wrong = WrongTokens(tell, server="service")
         self._known: OrderedDict[str, tuple[Principal, float]] = OrderedDict()
 
     def of(self, token: str, address: str) -> Principal:

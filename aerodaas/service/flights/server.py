@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay
+from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import AnswerOut, Role
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.http.app_server import AppServer
+from aerodaas.service.http.limits import LEASED_FLIGHT
 from aerodaas.service.own.access import FlightTokens, principal_of
 from aerodaas.service.own.flight import Flown, OwnFlight
 from aerodaas.unix_server import listen_unix
@@ -21,16 +21,6 @@ if TYPE_CHECKING:
     from fastapi import FastAPI
 
 __all__ = ["LeasedFlight", "ProcessServer"]
-
-_MOST_CONNECTIONS = 256
-_MOST_WATCHING = 48
-"""Connections that last of viewers, and of pilots: a mission's users open them. The service has the
-rest to command and follow, or whoever watches much could keep an operator from recalling a drone.
-"""
-_RATE = 10_000.0
-"""Requests a second, on average: the service has counted its users' own."""
-_MOST_MESSAGE = LARGEST_ANSWER + (64 << 10)
-"""Bytes of a WebSocket message, see `service.serve`."""
 
 
 class LeasedFlight(OwnFlight):
@@ -70,12 +60,7 @@ class ProcessServer(AppServer):
             listener = listen_unix(path)
         except OSError as error:
             raise MissionError(f"there is no socket at {path}: {error}") from None
-        super().__init__(
-            listener,
-            most_connections=_MOST_CONNECTIONS,
-            ws_max_size=_MOST_MESSAGE,
-            ws_ping_interval=None,
-        )
+        super().__init__(listener, LEASED_FLIGHT)
         self._flight, self._lease, self._relay = flight, lease, relay
 
     def show(self) -> None:
@@ -86,11 +71,10 @@ class ProcessServer(AppServer):
         # FastAPI takes a while to load, in which the flight is launched.
         from aerodaas.service.flights.routes import FlightRoutes  # noqa: PLC0415
         from aerodaas.service.http.admission import Admission  # noqa: PLC0415
-        from aerodaas.service.http.gate import Bounds  # noqa: PLC0415
         from aerodaas.service.own.server import flight_app  # noqa: PLC0415
 
         # Whoever can open the socket is the service; it names the role as which it asks.
         roles = {role.value: principal_of(role.value, role) for role in Role}
-        admission = Admission(FlightTokens(roles), rates=RateLimiter(_RATE, _RATE))
+        admission = Admission(FlightTokens(roles))
         own = FlightRoutes(self._flight, self._lease, self._relay, admission).router()
-        return flight_app(self._flight, admission, [own], bounds=Bounds(lasting=_MOST_WATCHING))
+        return flight_app(self._flight, admission, [own], limits=LEASED_FLIGHT)

@@ -15,7 +15,6 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.http_server.addresses import address_of
 from aerodaas.protocol.schemas import AnswerOut, Role, Scope
 from aerodaas.service.access.principal import Principal, require
-from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.bearer import bearer
 
@@ -27,8 +26,6 @@ __all__ = ["Admission", "Tokens"]
 _SENDER = "aerodaas.principal"
 """Key of the sender in a request's ASGI scope."""
 _THREADS = 8
-_RATE, _BURST = 50.0, 200.0
-"""Requests a second of one account, on average and at once."""
 _GONE = frozenset(
     {
         HTTPStatus.UNAUTHORIZED,
@@ -52,38 +49,47 @@ class Tokens(Protocol):
 class Admission:
     """Tells who sends a request, and whether they may; refusals are audited."""
 
-    def __init__(
-        self, tokens: Tokens, audit: Audit | None = None, rates: RateLimiter | None = None
-    ) -> None:
+    def __init__(self, tokens: Tokens, audit: Audit | None = None) -> None:
         """Admit by `tokens`.
 
         Args:
             tokens: Tokens that are good.
             audit: Log of refusals and of drones' answers; None for none.
-            rates: How often an account may ask; None for the usual.
         """
         self._audit = audit
         self._tokens = tokens
-        self._rates = rates or RateLimiter(_RATE, _BURST)
         self._threads = ThreadPoolExecutor(_THREADS, "admission")
 
-    async def admit(self, connection: HTTPConnection) -> Principal:
-        """As `enter`, in a thread of this alone: nobody's other work keeps a sender waiting.
+    async def admit(self, connection: HTTPConnection, count: Callable[[str], None]) -> Principal:
+        """Identify the sender of a request before its body is read.
 
-        Without a database that has the tokens, and the audit, it is done at once.
+        A thread of this alone does it: nobody's other work keeps a sender waiting. Without a
+        database that has the tokens, and the audit, it is done at once.
+
+        Args:
+            connection: The request.
+            count: Counts a request of an account; raises RefusedError for one too many.
+
+        Returns:
+            The sender.
+
+        Raises:
+            RefusedError: For a wrong token, and from `count`.
         """
         if self._audit is None:
-            return self.enter(connection)
+            return self.identify(connection, count)
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._threads, self.enter, connection)
+        return await loop.run_in_executor(self._threads, self.identify, connection, count)
 
-    def enter(self, connection: HTTPConnection) -> Principal:
-        """Find out who sends a request, before its body is read; raises RefusedError."""
+    def identify(
+        self, connection: HTTPConnection, count: Callable[[str], None] = lambda _: None
+    ) -> Principal:
+        """As `admit`, in this thread; without `count` it is no further request."""
         address = address_of(connection.scope)
         principal: Principal | None = None
         try:
             principal = self._tokens.of(bearer(connection.headers), address)
-            self._rates.admit(principal.account)
+            count(principal.account)
         except RefusedError as error:
             # A wrong token is audited where it is counted.
             if principal is not None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import uvicorn
     from starlette.types import ASGIApp
+
+    from aerodaas.service.http.limits import RequestLimits
 
 __all__ = ["AppServer"]
 
@@ -20,22 +22,15 @@ _STOPPING = 5.0
 class AppServer:
     """Serves an application to who connects to a socket, in a thread, until it is closed."""
 
-    def __init__(
-        self,
-        listener: socket.socket,
-        *,
-        most_connections: int,
-        **settings: Any,  # noqa: ANN401 - uvicorn's
-    ) -> None:
+    def __init__(self, listener: socket.socket, limits: RequestLimits) -> None:
         """Take over a socket; who connects before `start` is answered then.
 
         Args:
             listener: Socket that listens; it is closed with the server.
-            most_connections: Connections at a time, as of `web_server`.
-            settings: Further ones of `uvicorn.Config`.
+            limits: Limits of its connections.
         """
         self._listener = listener
-        self._settings = {"most_connections": most_connections, **settings}
+        self._limits = limits
         self._closed = threading.Event()
         self._server: uvicorn.Server | None = None
         self._thread: threading.Thread | None = None
@@ -63,14 +58,8 @@ class AppServer:
 
     def _serve(self, build: Callable[[], ASGIApp]) -> None:
         # uvicorn takes a while to load, in which a flight is launched.
-        from aerodaas.http_server.server import web_server  # noqa: PLC0415
+        from aerodaas.service.http.connections import web_server  # noqa: PLC0415
 
-        settings = {
-            "timeout_graceful_shutdown": 1,
-            # It would compress each picture anew for each watcher, and pictures are compressed.
-            "ws_per_message_deflate": False,
-            **self._settings,
-        }
-        self._server = web_server(build(), **settings)
+        self._server = web_server(build(), self._limits, timeout_graceful_shutdown=1)
         if not self._closed.is_set():
             self._server.run(sockets=[self._listener])

@@ -16,19 +16,13 @@ from fastapi.security import HTTPBearer
 from pydantic import TypeAdapter, ValidationError
 
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.limits import RequestLimits
 from aerodaas.service.http.refusals import REFUSALS
 
 __all__ = ["api_router"]
 
 _SMALL = 1 << 10
 """Bytes of a body that is parsed at once: a command waits for nobody's document."""
-_MOST_VALUES, _MOST_GROUPS = 300_000, 100_000
-"""Most commas, and opening brackets, of a body: 10,000 waypoints have 210,000 and 30,000."""
-_FEW_VALUES, _MOST_OF_GROUP = 20_000, 200
-"""Most values of a list or object on average, where a body has more than few: a waypoint has 26."""
-_MOST_KEYS = 1000
-_MOST_ERRORS = 100
-"""Most errors of a body that are worded; each one takes as long as many values."""
 _parsing = ThreadPoolExecutor(1, "parsing")
 
 
@@ -76,9 +70,10 @@ class _Parsed(Request):
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object with few enough keys: unknown ones are refused one by one, which takes long."""
-    if len(pairs) > _MOST_KEYS:
+    if len(pairs) > RequestLimits.object_keys:
         raise RefusedError(
-            int(HTTPStatus.UNPROCESSABLE_ENTITY), f"an object has at most {_MOST_KEYS} keys"
+            int(HTTPStatus.UNPROCESSABLE_ENTITY),
+            f"an object has at most {RequestLimits.object_keys} keys",
         )
     return dict(pairs)
 
@@ -87,14 +82,13 @@ def _content(model: TypeAdapter[Any], body: bytes) -> Any:  # noqa: ANN401 - the
     """What a body says; raises RequestValidationError, and RefusedError for one beyond bounds."""
     values = max(body.count(b","), body.count(b":"))
     groups = body.count(b"{") + body.count(b"[")
-    if (
-        values > max(_FEW_VALUES, min(_MOST_VALUES, _MOST_OF_GROUP * groups))
-        or groups > _MOST_GROUPS
-    ):
+    limits = RequestLimits
+    most = min(limits.body_values, limits.group_values * groups)
+    if values > max(limits.few_values, most) or groups > limits.body_groups:
         raise RefusedError(
             int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE),
-            f"a body has at most {_MOST_VALUES} values, {_MOST_GROUPS} lists and objects, and "
-            f"{_MOST_OF_GROUP} values in each of these on average",
+            f"a body has at most {limits.body_values} values, {limits.body_groups} lists and "
+            f"objects, and {limits.group_values} values in each of these on average",
         )
     try:
         return model.validate_python(json.loads(body, object_pairs_hook=_object))
@@ -104,7 +98,7 @@ def _content(model: TypeAdapter[Any], body: bytes) -> Any:  # noqa: ANN401 - the
     except RecursionError:
         raise RefusedError(int(HTTPStatus.BAD_REQUEST), "the body is nested too deeply") from None
     except ValidationError as error:
-        if error.error_count() > _MOST_ERRORS:
+        if error.error_count() > RequestLimits.body_errors:
             raise RefusedError(
                 int(HTTPStatus.UNPROCESSABLE_ENTITY),
                 f"{error.error_count()} values of the body are not as the schema has them: GET "

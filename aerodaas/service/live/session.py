@@ -13,6 +13,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.backend import Missions
 from aerodaas.service.http.bearer import SUBPROTOCOL
+from aerodaas.service.http.limits import RequestLimits
 from aerodaas.service.live.hub import StreamHub, Watcher
 from aerodaas.service.live.jobs import end_jobs
 
@@ -29,14 +30,13 @@ __all__ = [
 Wanted: TypeAlias = tuple[str, PictureForm]
 """A stream, and how its pictures are sent."""
 
-Rate: TypeAlias = Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)]
+Rate: TypeAlias = Annotated[float, Query(gt=0, le=RequestLimits.view_rate, allow_inf_nan=False)]
 """Most messages of a mission's state a second, of a view's address."""
 StreamNames: TypeAlias = Annotated[str, Query(max_length=2000)]
 """Streams whose items are sent, too, by comma; of a view's address."""
 Form: TypeAlias = Annotated[PictureForm, Query()]
 """How pictures are sent; of a view's address."""
 
-_MOST_STREAMS = 16
 _RENEWAL_SECONDS = 5.0
 """Wall seconds between two looks at whether a connection still may be had."""
 _END_SECONDS = 0.2
@@ -55,7 +55,7 @@ def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[Wanted]:
     """
     wanted = [(name, form) for name in streams.split(",") if name]
     wanted += [(name, PictureForm.DEPTH) for name in depth.split(",") if name]
-    return wanted[:_MOST_STREAMS]
+    return wanted[: RequestLimits.view_streams]
 
 
 async def until_refused(allowed: Callable[[], bool]) -> None:

@@ -7,10 +7,10 @@ import secrets
 import threading
 from collections.abc import Callable, Mapping
 
-from aerodaas.http_server.wrong_tokens import WrongTokens
 from aerodaas.protocol.schemas import AccountOut, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.http.counters import WrongTokens
 
 __all__ = ["OWN", "REMOTE", "FlightTokens", "account_of", "new_tokens", "principal_of"]
 
@@ -66,7 +66,7 @@ class FlightTokens:
         self.tell: Callable[[str], None] = lambda _: None
         """Tells people of many wrong tokens."""
         self._tokens = tokens
-        self._wrong = WrongTokens(self._tell, what=what)
+        self._wrong = WrongTokens(self._tell, server=what)
         self._remedy = remedy
         self._anybody = anybody
         self._lock = threading.Lock()

@@ -15,6 +15,7 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.app import build_app
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.limits import OWN_FLIGHT
 from aerodaas.service.live.playback import Player
 from aerodaas.service.own.access import OWN, account_of
 from aerodaas.service.own.server import ApiServer
@@ -53,7 +54,7 @@ class RecordingServer(ApiServer):
                 MissionRoutes(flights, admission),
                 PlaybackRoutes(flights.player, admission),
             )
-            return build_app(admission, [one.router() for one in routes])
+            return build_app(admission, [one.router() for one in routes], limits=OWN_FLIGHT)
 
         self.serve(build, tell)
 

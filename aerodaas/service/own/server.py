@@ -12,11 +12,10 @@ from aerodaas.config.model import RemoteConfig
 from aerodaas.errors import ConfigError
 from aerodaas.http_server.addresses import HostGuard, listen
 from aerodaas.protocol.schemas import Role
-from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.app import build_app
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.app_server import AppServer
-from aerodaas.service.http.gate import Bounds
+from aerodaas.service.http.limits import OWN_FLIGHT, RequestLimits
 from aerodaas.service.own.access import REMOTE, FlightTokens, new_tokens, principal_of
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.routes.fleet import FleetRoutes
@@ -24,17 +23,6 @@ from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes
 
 __all__ = ["ApiServer", "FlightServer", "flight_app"]
-
-_MOST_CONNECTIONS = 640
-"""A page has two that stay, and a few that come and go."""
-_MOST_WATCHERS = 320
-"""Live views by the token of who watches only, which many may share."""
-_RATE, _BURST = 500.0, 2000.0
-"""Requests a second by one token, which many may share, on average and at once."""
-_BOUNDS = Bounds(reserved=Role.PILOT, lasting=_MOST_WATCHERS)
-_MOST_BYTES_SENT = 4096
-"""Bytes of a WebSocket message; watchers have nothing to say."""
-_PING_SECONDS = 5.0
 
 
 class ApiServer(AppServer):
@@ -66,13 +54,7 @@ class ApiServer(AppServer):
             raise ConfigError(
                 f"cannot serve the flight at {address}: {error}; give another {option}"
             ) from None
-        super().__init__(
-            listener,
-            most_connections=_MOST_CONNECTIONS,
-            ws_max_size=_MOST_BYTES_SENT,
-            ws_ping_interval=_PING_SECONDS,
-            ws_ping_timeout=_PING_SECONDS,
-        )
+        super().__init__(listener, OWN_FLIGHT)
         self._port = listener.getsockname()[1]
         self._tokens = tokens or FlightTokens(new_tokens())
         self._guard = guard
@@ -89,7 +71,7 @@ class ApiServer(AppServer):
     def serve(self, build: Callable[[Admission], FastAPI], tell: Callable[[str], None]) -> None:
         """Serve what `build` makes, in a thread; `tell` tells people of many wrong tokens."""
         self._tokens.tell = tell
-        app = build(Admission(self._tokens, rates=RateLimiter(_RATE, _BURST)))
+        app = build(Admission(self._tokens))
         self.start(lambda: self._guard(app, self._host))
 
 
@@ -129,7 +111,7 @@ def flight_app(
     admission: Admission,
     further: Sequence[APIRouter] = (),
     *,
-    bounds: Bounds = _BOUNDS,
+    limits: RequestLimits = OWN_FLIGHT,
     framed: bool = False,
 ) -> FastAPI:
     """Build the application of one flight with `further` routes; the rest as of `build_app`."""
@@ -142,7 +124,7 @@ def flight_app(
     return build_app(
         admission,
         [*further, *(one.router() for one in routes)],
-        bounds=bounds,
+        limits=limits,
         tiles=flight.config.map_tiles,
         framed=framed,
     )

@@ -86,7 +86,7 @@ class LiveRoutes:
             return answer
 
         def renew() -> None:
-            self._admission.enter(socket)
+            self._admission.identify(socket)
             self._admission.require(socket, Role.PILOT, Scope.FLY)
 
         await ControlSession(socket, principal.account, give, renew).run()

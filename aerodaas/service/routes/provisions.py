@@ -14,7 +14,8 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
-from aerodaas.service.models import LARGEST_MODEL, ModelShelf
+from aerodaas.service.http.limits import RequestLimits
+from aerodaas.service.models import ModelShelf
 
 __all__ = ["ProvisionRoutes"]
 
@@ -68,8 +69,10 @@ class ProvisionRoutes:
         content = bytearray()
         async for part in request.stream():
             content += part
-            if len(content) > LARGEST_MODEL:
-                raise RefusedError(413, f"a model has at most {LARGEST_MODEL >> 20} MiB")
+            if len(content) > RequestLimits.model_bytes:
+                raise RefusedError(
+                    413, f"a model has at most {RequestLimits.model_bytes >> 20} MiB"
+                )
         # A large one takes a while to be hashed and written, and others do not wait for it.
         await asyncio.to_thread(self._models.put, principal.tenant, sha256, bytes(content))
         self._audit.write(principal, "model.put", sha256, f"{len(content)} bytes", accepted=True)

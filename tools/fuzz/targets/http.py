@@ -9,6 +9,7 @@ import asyncio
 import json
 from collections.abc import Iterable
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -20,8 +21,8 @@ from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.schemas import Role
-from aerodaas.service.access.rates import RateLimiter
 from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.limits import OWN_FLIGHT
 from aerodaas.service.own.access import FlightTokens, principal_of
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.own.server import flight_app
@@ -149,7 +150,8 @@ def _service() -> tuple[_Link, Any, asyncio.AbstractEventLoop]:
     """
     link = _Link()
     tokens = FlightTokens({}, anybody=principal_of("remote", Role.PILOT))
-    app = flight_app(OwnFlight(link, "fuzzed"), Admission(tokens, rates=RateLimiter(1e9, 1e9)))
+    limits = replace(OWN_FLIGHT, rate=1e9, burst=1e9)
+    app = flight_app(OwnFlight(link, "fuzzed"), Admission(tokens), limits=limits)
     return link, app, asyncio.new_event_loop()
 
 

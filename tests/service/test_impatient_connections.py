@@ -14,9 +14,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from aerodaas.http_server import server as serving
 from aerodaas.http_server.addresses import App, Receive, Scope, Send, listen
-from aerodaas.http_server.server import web_server
+from aerodaas.service.http.connections import web_server
+from aerodaas.service.http.limits import RequestLimits
 
 pytestmark = pytest.mark.wall_clock
 
@@ -58,11 +58,13 @@ async def application(scope: Scope, receive: Receive, send: Send) -> None:
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """Port of a server with short patience and two connections."""
-    monkeypatch.setattr(serving, "_HEAD_SECONDS", PATIENCE)
-    monkeypatch.setattr(serving, "_BODY_SECONDS", PATIENCE)
-    monkeypatch.setattr(serving, "_TAKEN_SECONDS", PATIENCE)
+    monkeypatch.setattr(RequestLimits, "head_seconds", PATIENCE)
+    monkeypatch.setattr(RequestLimits, "body_seconds", PATIENCE)
+    monkeypatch.setattr(RequestLimits, "answer_seconds", PATIENCE)
     app: App = application
-    server = web_server(app, most_connections=_MOST + 1, lifespan="off", timeout_keep_alive=60)
+    server = web_server(
+        app, RequestLimits(connections=_MOST + 1), lifespan="off", timeout_keep_alive=60
+    )
     with listen("127.0.0.1", 0) as listener:
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
         thread.start()
@@ -110,7 +112,7 @@ def test_a_new_client_takes_the_place_of_the_oldest_that_asks_nothing(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At once, however many come; who has asked, or has a WebSocket, keeps its place."""
-    monkeypatch.setattr(serving, "_HEAD_SECONDS", 10 * _ENOUGH)
+    monkeypatch.setattr(RequestLimits, "head_seconds", 10 * _ENOUGH)
     with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as kept, ExitStack() as stack:
         for _ in range(20):
             stack.enter_context(client(port))
@@ -125,7 +127,7 @@ def test_room_is_made_at_the_address_with_most_silent_connections(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Who connects from elsewhere, once, and has not asked yet, keeps the place."""
-    monkeypatch.setattr(serving, "_HEAD_SECONDS", 10 * _ENOUGH)
+    monkeypatch.setattr(RequestLimits, "head_seconds", 10 * _ENOUGH)
     source = ("127.0.0.2", 0)
     with (
         socket.create_connection(("127.0.0.1", port), _ENOUGH, source) as other,
@@ -227,7 +229,7 @@ def test_a_websocket_message_is_whole_in_time(
     port: int, monkeypatch: pytest.MonkeyPatch, *, fragmented: bool
 ) -> None:
     """One that never ends closes its connection; further bytes of it do not start the clock."""
-    monkeypatch.setattr(serving, "_MESSAGE_SECONDS", PATIENCE)
+    monkeypatch.setattr(RequestLimits, "message_seconds", PATIENCE)
     with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as slow:
         part = b"\x01\x81\x00\x00\x00\x00a" if fragmented else _masked(200)[:20]
         slow.socket.sendall(part)
@@ -252,7 +254,7 @@ def test_messages_one_after_the_other_are_each_given_their_time(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where a part of the next one comes with the last."""
-    monkeypatch.setattr(serving, "_MESSAGE_SECONDS", PATIENCE)
+    monkeypatch.setattr(RequestLimits, "message_seconds", PATIENCE)
     frame = _masked(8)
     with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as busy:
         busy.socket.sendall(frame[:3])
@@ -266,7 +268,7 @@ def test_unfinished_messages_are_bounded_for_all_together(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The oldest ends; who sends whole messages meanwhile is not touched."""
-    monkeypatch.setattr(serving, "_UNFINISHED_BYTES", 1000)
+    monkeypatch.setattr(RequestLimits, "unfinished_bytes", 1000)
     url = f"ws://127.0.0.1:{port}/"
     with connect(url, open_timeout=_ENOUGH) as hoarder, connect(url, open_timeout=_ENOUGH) as other:
         hoarder.socket.sendall(_masked(5000)[:900])

@@ -16,6 +16,8 @@ import uvicorn
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from aerodaas.service.http.limits import RequestLimits
+
 if TYPE_CHECKING:
     import asyncio
 
@@ -25,38 +27,32 @@ else:
 
 __all__ = ["web_server"]
 
-_HEAD_SECONDS = 10.0
-"""From the connection, or the first byte of a further request, to the end of its headers."""
-_BODY_SECONDS = 300.0
-"""For a body: 64 MiB, the largest model, by 2 Mbit/s."""
-_TAKEN_SECONDS, _TAKEN_BYTES = 30.0, 30_000
-"""A client takes so many of the bytes that wait for it, or all of them, in so many seconds."""
-_MESSAGE_SECONDS = 30.0
-"""From the first byte of a WebSocket's message to its last."""
-_UNFINISHED_BYTES = 64 << 20
-"""Of the WebSocket messages of a server that are not whole yet; the oldest is given up first."""
-_MOST_FRAGMENTS = 64
 _TRY_AGAIN_LATER, _POLICY_VIOLATION = 1013, 1008
 """Codes by which a WebSocket is closed (RFC 6455)."""
 
 
-def web_server(app: Any, *, most_connections: int, **settings: Any) -> uvicorn.Server:  # noqa: ANN401 - uvicorn's
-    """A server of an ASGI application with bounds on connections and on a request's time.
+def web_server(app: Any, limits: RequestLimits, **settings: Any) -> uvicorn.Server:  # noqa: ANN401 - uvicorn's
+    """A server of an ASGI application whose connections are limited in number and in time.
 
     Args:
         app: The application.
-        most_connections: Connections at a time; a request of a further one is answered by 503,
-            unless one that awaits a request makes room for it.
+        limits: Limits of the server; beyond its connections a request is answered by 503, unless
+            a connection that awaits a request makes room for it.
         settings: Further ones of `uvicorn.Config`.
     """
     config = _Config(
         app,
         http=_ImpatientProtocol,
         ws=_ImpatientWebSocket,
-        limit_concurrency=most_connections,
+        limit_concurrency=limits.connections,
         log_config=None,
         access_log=False,
         server_header=False,
+        ws_max_size=limits.message_bytes,
+        ws_ping_interval=limits.ping_seconds,
+        ws_ping_timeout=limits.ping_seconds,
+        # It would compress each picture anew for each watcher, and pictures are compressed.
+        ws_per_message_deflate=False,
         **settings,
     )
     return uvicorn.Server(config)
@@ -98,7 +94,7 @@ class _Connections:
             self._unfinished[connection] = size
         else:
             self._unfinished.pop(connection, None)
-        while sum(self._unfinished.values()) > _UNFINISHED_BYTES:
+        while sum(self._unfinished.values()) > RequestLimits.unfinished_bytes:
             oldest = next(iter(self._unfinished))
             del self._unfinished[oldest]
             oldest.give_up(_TRY_AGAIN_LATER, "too many unfinished messages: connect again")
@@ -121,7 +117,7 @@ class _ImpatientWebSocket(WebSocketsSansIOProtocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        if len(self.frames) > _MOST_FRAGMENTS:
+        if len(self.frames) > RequestLimits.fragments:
             # Fragments of a byte take forty times their size.
             self.frames = [b"".join(self.frames)]
         size = len(self.conn.reader.buffer) + sum(map(len, self.frames))
@@ -129,7 +125,7 @@ class _ImpatientWebSocket(WebSocketsSansIOProtocol):
         if not size:
             self._stop()
         elif self._closing is None:
-            self._closing = self.loop.call_later(_MESSAGE_SECONDS, self._require_whole)
+            self._closing = self.loop.call_later(RequestLimits.message_seconds, self._require_whole)
 
     def send_receive_event_to_app(self) -> None:
         super().send_receive_event_to_app()
@@ -153,9 +149,9 @@ class _ImpatientWebSocket(WebSocketsSansIOProtocol):
         self._closing = None
         if self.read_paused:
             # It is not the client who is waited for.
-            self._closing = self.loop.call_later(_MESSAGE_SECONDS, self._require_whole)
+            self._closing = self.loop.call_later(RequestLimits.message_seconds, self._require_whole)
         else:
-            text = f"a message is whole within {_MESSAGE_SECONDS:g} s: send it faster"
+            text = f"a message is whole within {RequestLimits.message_seconds:g} s: send it faster"
             self.give_up(_POLICY_VIOLATION, text)
 
     def _stop(self) -> None:
@@ -239,17 +235,19 @@ class _ImpatientProtocol(_Protocol):
 
     def _seconds(self) -> float:
         if self._awaits_request():
-            return _HEAD_SECONDS
+            return RequestLimits.head_seconds
         if self.transport.get_protocol() is not self:
             return 0.0
-        return _BODY_SECONDS if self.cycle.more_body else 0.0
+        return RequestLimits.body_seconds if self.cycle.more_body else 0.0
 
     def _await_taking(self) -> None:
         waiting = self.transport.get_write_buffer_size()
-        self._taking = self.loop.call_later(_TAKEN_SECONDS, self._require_taken, waiting)
+        self._taking = self.loop.call_later(
+            RequestLimits.answer_seconds, self._require_taken, waiting
+        )
 
     def _require_taken(self, before: int) -> None:
-        if before - self.transport.get_write_buffer_size() < _TAKEN_BYTES:
+        if before - self.transport.get_write_buffer_size() < RequestLimits.answer_bytes:
             self.transport.abort()
         else:
             self._await_taking()

@@ -1,0 +1,165 @@
+"""Limits of what a server of the API accepts: connections, bodies, rates and live views."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from aerodaas.analytics.here.relay import LARGEST_ANSWER
+from aerodaas.protocol.schemas import Role
+
+__all__ = ["LEASED_FLIGHT", "OWN_FLIGHT", "PROVIDER", "RequestLimits"]
+
+
+@dataclass(frozen=True)
+class RequestLimits:
+    """Limits of one server; the gate and the server's connections apply them.
+
+    An account is the holder of a token. Accounts of the role `reserved` and above are never refused
+    for the number of their requests: such a request may call a drone home. Class variables are the
+    same at every server.
+    """
+
+    connections: int = 1000
+    """Connections at a time, of all addresses together."""
+    message_bytes: int = LARGEST_ANSWER + (64 << 10)
+    """Bytes of a WebSocket message: the answer of an analysis at the user's side, and its head."""
+    ping_seconds: float | None = 5.0
+    """Seconds after which a WebSocket that does not answer is closed; None for never."""
+    reserved: Role = Role.OPERATOR
+    """Lowest role that is never refused for its number of requests and live views."""
+    rate: float = 50.0
+    """Requests a second of one account, on average."""
+    burst: float = 200.0
+    """Requests of one account at once, after a pause."""
+    account_views: int = 32
+    """Live views and other WebSockets of one account."""
+
+    head_seconds: ClassVar[float] = 10.0
+    """From the connection, or the first byte of a further request, to the end of its headers."""
+    body_seconds: ClassVar[float] = 300.0
+    """For a body: 64 MiB, the largest model, by 2 Mbit/s."""
+    answer_seconds: ClassVar[float] = 30.0
+    """Within which a client takes `answer_bytes` of the bytes that wait for it, or all of them."""
+    answer_bytes: ClassVar[int] = 30_000
+    message_seconds: ClassVar[float] = 30.0
+    """From the first byte of a WebSocket's message to its last."""
+    unfinished_bytes: ClassVar[int] = 64 << 20
+    """Of all WebSocket messages that are not whole yet; the oldest one is given up first."""
+    fragments: ClassVar[int] = 64
+    """Fragments of a message that are kept apart: one of a byte takes forty times its size."""
+
+    rated_accounts: ClassVar[int] = 10_000
+    """Accounts whose rate is remembered."""
+    account_requests: ClassVar[int] = 16
+    """Requests of one account at a time: further ones would keep others' commands waiting."""
+    account_large_requests: ClassVar[int] = 2
+    """Requests of one account at a time with a body of more than `large_bytes`."""
+    requests: ClassVar[int] = 160
+    """Requests at a time of all accounts below `reserved`, for which threads are left."""
+    large_requests: ClassVar[int] = 16
+    """Requests with a large body at a time of all accounts below `reserved`."""
+    threads: ClassVar[int] = 200
+    """Threads that answer requests: more than all accounts below `reserved` may keep busy."""
+    address_views: ClassVar[int] = 160
+    """Live views of one address."""
+    views: ClassVar[int] = 320
+    """Live views of all accounts below `reserved`."""
+    view_streams: ClassVar[int] = 16
+    """Streams of one live view."""
+    view_rate: ClassVar[float] = 20.0
+    """Messages of a mission's state a second of one live view."""
+
+    submission_bytes: ClassVar[int] = 4 << 20
+    """Bytes of a submission: a document of 10,000 waypoints has 2 MB."""
+    command_bytes: ClassVar[int] = 1 << 20
+    """Bytes of a command to a mission: one of 1,000 waypoints has a quarter."""
+    model_bytes: ClassVar[int] = 64 << 20
+    """Bytes of a model."""
+    other_bytes: ClassVar[int] = 16 << 10
+    """Bytes of any other body."""
+    large_bytes: ClassVar[int] = 64 << 10
+    """Bytes of a body of which an account sends few at a time."""
+    body_values: ClassVar[int] = 300_000
+    """Commas of a JSON body: 10,000 waypoints have 210,000."""
+    body_groups: ClassVar[int] = 100_000
+    """Opening brackets of a JSON body: 10,000 waypoints have 30,000."""
+    few_values: ClassVar[int] = 20_000
+    """Commas up to which `group_values` is not asked."""
+    group_values: ClassVar[int] = 200
+    """Values of a list or object on average: a waypoint has 26."""
+    object_keys: ClassVar[int] = 1000
+    """Keys of one object: unknown ones are refused one by one, which takes long."""
+    body_errors: ClassVar[int] = 100
+    """Errors of a body that are worded: each takes as long as many values."""
+
+    wrong_tokens: ClassVar[int] = 10
+    """Wrong tokens of one address in `wrong_token_seconds` that are answered without a pause."""
+    wrong_tokens_of_all: ClassVar[int] = 100
+    """The same of all addresses; people are alerted beyond it."""
+    wrong_tokens_alerted: ClassVar[int] = 20
+    """Wrong tokens of one address of which people are alerted."""
+    wrong_token_seconds: ClassVar[float] = 60.0
+    """Seconds after which the count begins anew."""
+    wrong_token_addresses: ClassVar[int] = 1024
+    """Addresses whose count is remembered."""
+
+    def body_bytes(self, path: str) -> int:
+        """Bytes that the body of a request for `path` may have."""
+        if path == "/v1/missions":
+            return self.submission_bytes
+        if path.startswith("/v1/missions/"):
+            return self.command_bytes
+        return self.model_bytes if path.startswith("/v1/models/") else self.other_bytes
+
+    def at_a_time(
+        self, kind: str, account: str, address: str, *, large: bool
+    ) -> dict[tuple[str, str], int]:
+        """Limits of one request below `reserved`, by what it counts as and by whose it is.
+
+        Args:
+            kind: `http` or `websocket`.
+            account: Account that sends the request.
+            address: Address that it comes from.
+            large: Whether its body has more than `large_bytes`.
+
+        Returns:
+            Most requests at a time; "" stands for all accounts together.
+        """
+        if kind == "websocket":
+            return {
+                ("live views", account): self.account_views,
+                ("live views", address): self.address_views,
+                ("live views", ""): self.views,
+            }
+        limits = {("requests", account): self.account_requests, ("requests", ""): self.requests}
+        if large:
+            limits["large requests", account] = self.account_large_requests
+            limits["large requests", ""] = self.large_requests
+        return limits
+
+
+PROVIDER = RequestLimits()
+"""Limits of a provider's service."""
+
+OWN_FLIGHT = RequestLimits(
+    connections=640,  # a page has two that stay, and a few that come and go
+    message_bytes=4096,  # watchers have nothing to say
+    reserved=Role.PILOT,
+    rate=500.0,  # many may share the one token of who watches
+    burst=2000.0,
+    account_views=320,
+)
+"""Limits of one's own flight, or of recordings, with a token for each role."""
+
+LEASED_FLIGHT = RequestLimits(
+    connections=256,
+    ping_seconds=None,  # the service is on this machine
+    rate=10_000.0,  # the service has counted its users' requests
+    burst=10_000.0,
+    # The service has the other connections to command and follow: who watches much keeps no
+    # operator from calling a drone home.
+    account_views=48,
+)
+"""Limits of a leased flight's process, whose accounts are roles and whose one client the service
+is."""
