@@ -17,8 +17,8 @@ from starlette.websockets import WebSocketDisconnect
 from typing_extensions import Self
 
 from aerodaas.messages.health import Verdict
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import (
-    AnswerOut,
     CommandIn,
     FleetOut,
     MissionIn,
@@ -87,7 +87,7 @@ class Stub:
     state: MissionOut = field(default_factory=mission)
     recording: bytes = b"recorded"
     items: list[tuple[dict[str, Any], bytes]] = field(default_factory=list)
-    answer: AnswerOut = field(default_factory=lambda: AnswerOut(accepted=True))
+    answer: Answer = field(default_factory=lambda: Answer(accepted=True))
     refusals: dict[str, tuple[int, Any]] = field(default_factory=dict)
     """Status and JSON by the beginning of a path, instead of an answer."""
     asked: list[tuple[str, str, Any]] = field(default_factory=list)
@@ -192,10 +192,10 @@ class Stub:
         self.on_cancel()
         return self.state
 
-    def _command(self, body: CommandIn) -> AnswerOut:  # noqa: ARG002 - checked by its model
+    def _command(self, body: CommandIn) -> Answer:  # noqa: ARG002 - checked by its model
         return self.answer
 
-    def _navigation(self, body: dict[str, Any]) -> AnswerOut:  # noqa: ARG002 - as above
+    def _navigation(self, body: dict[str, Any]) -> Answer:  # noqa: ARG002 - as above
         return self.answer
 
     def _recording(self) -> Response:

@@ -10,16 +10,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-from pydantic.json_schema import JsonSchemaMode, models_json_schema
+from pydantic import TypeAdapter
+from pydantic.json_schema import JsonSchemaMode
 
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
-    AnswerOut,
     CommandIn,
     FleetOut,
     MissionOut,
@@ -30,9 +30,9 @@ from aerodaas.protocol.schemas import (
 __all__ = ["SCHEMA", "schema_text"]
 
 SCHEMA = Path(__file__).resolve().parents[1] / "console" / "wire.schema.json"
-_OUT: tuple[type[BaseModel], ...] = (
+_OUT: tuple[type, ...] = (
     AccountOut,
-    AnswerOut,
+    Answer,
     ControlsOut,
     FleetOut,
     MissionOut,
@@ -42,7 +42,7 @@ _OUT: tuple[type[BaseModel], ...] = (
     SceneryOut,
     SurveyOut,
 )
-_IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
+_IN: tuple[type, ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
 
 
 def schema_text() -> str:
@@ -64,8 +64,8 @@ def schema_text() -> str:
     return json.dumps(_plain(whole), indent=1, sort_keys=True) + "\n"
 
 
-def _definitions(models: tuple[type[BaseModel], ...], mode: JsonSchemaMode) -> dict[str, Any]:
-    _, schema = models_json_schema([(one, mode) for one in models])
+def _definitions(models: tuple[type, ...], mode: JsonSchemaMode) -> dict[str, Any]:
+    _, schema = TypeAdapter.json_schemas([(model, mode, TypeAdapter(model)) for model in models])
     found: dict[str, Any] = schema["$defs"]
     for model in found.values():
         for field in model.get("properties", {}).values():

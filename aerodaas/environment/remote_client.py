@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Any
 from urllib.parse import urlsplit
 
 from aerodaas.config.checked import checked
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import ConfigError, MissionError, UnreachableError
-from aerodaas.protocol.schemas import (
-    AnswerOut,
-    CommandIn,
-    MissionOut,
-    NavigationIn,
-    PictureForm,
-    StreamKind,
-)
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, PictureForm, StreamKind
 from aerodaas.service.own.access import OWN
 
 __all__ = ["RemoteClient"]
@@ -131,10 +126,10 @@ class RemoteClient:
         return self._robot or flying[0]
 
 
-def _accepted(answer: AnswerOut) -> dict[str, Any]:
+def _accepted(answer: Answer) -> dict[str, Any]:
     if not answer.accepted:
         raise MissionError(answer.text)
-    return answer.model_dump(mode="json")
+    return asdict(answer)
 
 
 @contextmanager

@@ -10,9 +10,10 @@ from typing import Any
 
 from pydantic import Field
 
+from aerodaas.messages.mission import BatteryOutlook
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import AnalyticsOut, OutlookOut, StatusOut, StreamKind, TrafficOut
+from aerodaas.protocol.schemas import AnalyticsOut, StatusOut, StreamKind, TrafficOut
 
 __all__ = [
     "AlertOut",
@@ -77,7 +78,7 @@ class TrackOut(AnswerModel):
     pitch: list[float | None]
     battery: list[float | None]
     distance: list[float]
-    outlook: list[OutlookOut | None]
+    outlook: list[BatteryOutlook | None]
     """How far the battery lasts, by row; null where it was not known."""
     gps: list[GpsOut | None]
     """What the satellites give, by row; null without a receiver."""

@@ -18,10 +18,10 @@ from aerodaas.dataflow.mission_document import MissionDocument, WaypointEntry
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
-from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, MissionStatus
 from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType, Waypoint
-from aerodaas.mission.commands import AddNavigation, Answer
+from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
 
@@ -29,7 +29,6 @@ __all__ = [
     "AccountIn",
     "AccountOut",
     "AnalyticsOut",
-    "AnswerOut",
     "Area",
     "AuditOut",
     "CommandIn",
@@ -43,7 +42,6 @@ __all__ = [
     "MissionOut",
     "MissionPhase",
     "NavigationIn",
-    "OutlookOut",
     "RefusalOut",
     "RobotOut",
     "Role",
@@ -184,32 +182,6 @@ class RefusalOut(AnswerModel):
     """Why, and the remedy."""
 
 
-class AnswerOut(AnswerModel):
-    """Answer of the mission, or of the service on its behalf, to a command."""
-
-    accepted: bool
-    text: str = ""
-    refused: Mapping[str, str] = Field(default_factory=dict)
-    """Reason by waypoint id, for the refused waypoints."""
-
-    @classmethod
-    def of(cls, answer: Answer) -> AnswerOut:
-        """Convert the mission's answer."""
-        return cls(accepted=answer.accepted, text=answer.text, refused=dict(answer.refused))
-
-
-class OutlookOut(AnswerModel):
-    """How far the battery lasts from here, by the energy model as the flight has shown it."""
-
-    plan: float
-    """Charge that the rest of the plan, the way home and the reserve of a landing need now; more
-    than 1 where no battery has it."""
-    returns_at: float
-    """Charge at which the drone would return from where it is, 0 to 1."""
-    hover: float
-    """Seconds until then, if it stays where it is."""
-
-
 class TrafficOut(AnswerModel):
     """Another aircraft that the vehicle hears of, where it is at the moment of its state."""
 
@@ -278,7 +250,7 @@ class StatusOut(AnswerModel):
     """Radians, positive with the nose down."""
     battery: float | None = None
     """Charge left, 0 to 1."""
-    outlook: OutlookOut | None = None
+    outlook: BatteryOutlook | None = None
     """How far the battery lasts; null while that is not known, or of no meaning."""
     latitude: float | None = None
     longitude: float | None = None
@@ -332,11 +304,11 @@ class StatusOut(AnswerModel):
         )
 
 
-def _outlook(status: MissionStatus) -> OutlookOut | None:
-    known = status.outlook
-    if known is None or not math.isfinite(known.plan + known.hover):
-        return None
-    return OutlookOut(plan=known.plan, returns_at=known.returns_at, hover=known.hover)
+def _outlook(status: MissionStatus) -> BatteryOutlook | None:
+    """The outlook, where all of it is known."""
+    outlook = status.outlook
+    known = outlook is not None and math.isfinite(outlook.plan + outlook.hover)
+    return outlook if known else None
 
 
 def _ahead(status: MissionStatus) -> tuple[Waypoint, ...]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import Any, Protocol, TypeAlias
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
-    AnswerOut,
     CommandIn,
     FleetOut,
     MissionOut,
@@ -48,7 +48,7 @@ class ShownMissions(Protocol):
 class Missions(ShownMissions, Protocol):
     """Missions that fly, and obey their pilots."""
 
-    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
         """Give a robot a command; returns the drone's answer. Raises MissionError if it is lost."""
         ...
 

@@ -17,10 +17,10 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
-    AnswerOut,
     LeaseState,
     LinkState,
     MissionIn,
@@ -221,7 +221,7 @@ class MissionDesk:
         one.cancel_flight(reason)
         return shown(one)
 
-    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
         # Without the lock, which may be held for long: a drone that is to come home comes home.
         link = self._flown(principal, mission).follow()

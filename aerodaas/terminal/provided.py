@@ -13,7 +13,7 @@ from rich.console import Console
 from typing_extensions import Self
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.messages.mission import GROUNDED, BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
@@ -121,7 +121,6 @@ class ProvidedView:
     def _mission(self, name: str, status: StatusOut) -> MissionStatus:
         states = {state.value: state for state in MissionState}
         state = states.get(status.state, MissionState.IDLE)
-        known = status.outlook
         ahead = [self._places[one] for one in status.pending if one in self._places]
         return MissionStatus(
             stamp=round(status.time * NANOSECONDS),
@@ -135,7 +134,7 @@ class ProvidedView:
             faults=tuple(status.faults),
             visits=status.waypoints_visited,
             waypoint_counts=(status.waypoints_visited, status.waypoints_known),
-            outlook=None if known is None else BatteryOutlook(**known.model_dump()),
+            outlook=status.outlook,
         )
 
 

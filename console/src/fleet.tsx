@@ -13,7 +13,7 @@ import { Alerts, tone } from "./panels";
 import { type Place, type Point, type Spot, areasOf } from "./place";
 import { Badge, PreflightPanel } from "./preflight";
 import { useScenery } from "./scenery";
-import type { AccountOut, AnswerOut, CommandIn, MissionOut, RobotOut, StatusOut } from "./wire";
+import type { AccountOut, Answer, CommandIn, MissionOut, RobotOut, StatusOut } from "./wire";
 
 /** Seconds without a word after which what a flying drone told is shown as old. */
 const OLD = 5;
@@ -104,7 +104,7 @@ export function Fleet(props: FleetProps) {
     setOrders((before) => [order, ...before].slice(0, 20));
     for (const { robot, mission } of group) {
       const body: CommandIn = { robot: robot.id, command: word };
-      ask<AnswerOut>(`v1/missions/${mission?.id}/commands`, token, body)
+      ask<Answer>(`v1/missions/${mission?.id}/commands`, token, body)
         .then((answer) => {
           if (answer.accepted) order.accepted.add(robot.id);
           else order.refused.set(robot.id, answer.text);

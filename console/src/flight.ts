@@ -6,7 +6,7 @@ import type { Spot } from "./place";
 import type { Past, Source } from "./source";
 import type {
   AnalyticsOut,
-  AnswerOut,
+  Answer,
   CommandIn,
   MissionOut,
   NavigationIn,
@@ -271,7 +271,7 @@ export class Flight {
     this.orders = [order, ...this.orders].slice(0, 20);
     this.changed();
     const path = `v1/missions/${this.mission.id}/${route}`;
-    ask<AnswerOut>(path, this.token, body, AbortSignal.timeout(ANSWER))
+    ask<Answer>(path, this.token, body, AbortSignal.timeout(ANSWER))
       .then((answer) => {
         if (order.stage === "asked") order.stage = answer.accepted ? "accepted" : "refused";
         const each = Object.entries(answer.refused).map(([id, why]) => `${id}: ${why}`);

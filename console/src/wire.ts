@@ -36,7 +36,7 @@ export type StreamKind = "pictures" | "detections" | "navigation";
 
 export interface Wire {
   AccountOut: AccountOut;
-  AnswerOut: AnswerOut;
+  Answer: Answer;
   CommandIn: CommandIn;
   ControlsOut: ControlsOut;
   FleetOut: FleetOut;
@@ -63,9 +63,9 @@ export interface AccountOut {
   tenant: string;
 }
 /**
- * Answer of the mission, or of the service on its behalf, to a command.
+ * The mission's answer to a command.
  */
-export interface AnswerOut {
+export interface Answer {
   accepted: boolean;
   refused: {
     [k: string]: string;
@@ -179,7 +179,7 @@ export interface StatusOut {
   longitude: number | null;
   measured: number | null;
   mode: string | null;
-  outlook: OutlookOut | null;
+  outlook: BatteryOutlook | null;
   pending: string[];
   pilot: string;
   pitch: number | null;
@@ -206,9 +206,9 @@ export interface StatusOut {
   yaw: number | null;
 }
 /**
- * How far the battery lasts from here, by the energy model as the flight has shown it.
+ * How far the battery lasts, by the energy model as this flight scaled it; charges 0 to 1.
  */
-export interface OutlookOut {
+export interface BatteryOutlook {
   hover: number;
   plan: number;
   returns_at: number;
@@ -360,7 +360,7 @@ export interface TrackOut {
   battery: (number | null)[];
   distance: number[];
   gps: (GpsOut | null)[];
-  outlook: (OutlookOut | null)[];
+  outlook: (BatteryOutlook | null)[];
   pitch: (number | null)[];
   places: PlaceOut[];
   position: [number | null, number | null, number | null][];

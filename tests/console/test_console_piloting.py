@@ -28,7 +28,6 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.protocol.schemas import AnswerOut
 from aerodaas.service.live import controls, surveys
 from aerodaas.service.live.controls import Freshness
 from aerodaas.service.own.server import FlightServer
@@ -369,9 +368,9 @@ def test_who_may_not_fly_any_more_loses_the_controls(monkeypatch: pytest.MonkeyP
     given: list[Command] = []
     began = time.monotonic()
 
-    def give(command: controls.ControlCommand) -> AnswerOut:
+    def give(command: controls.ControlCommand) -> Answer:
         given.append(command)
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
     def renew() -> None:
         if time.monotonic() - began > 0.3:

@@ -12,9 +12,9 @@ import pytest
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import (
-    AnswerOut,
     LinkState,
     MissionIn,
     MissionOut,
@@ -88,21 +88,21 @@ class Link:
         self.number = 1
         self.asked: list[Any] = []
 
-    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
+    def change_lease(self, lease: FlightLeaseIn) -> Answer:
         """Accept."""
         return self._accept(lease)
 
-    def share(self, mission: str, sensors: list[str]) -> AnswerOut:
+    def share(self, mission: str, sensors: list[str]) -> Answer:
         """Accept."""
         return self._accept(("share", mission, sensors))
 
-    def withdraw(self, mission: str) -> AnswerOut:
+    def withdraw(self, mission: str) -> Answer:
         """Accept."""
         return self._accept(("withdraw", mission))
 
-    def _accept(self, asked: object) -> AnswerOut:
+    def _accept(self, asked: object) -> Answer:
         self.asked.append(asked)
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
     def hear(self) -> None:
         """Nothing."""

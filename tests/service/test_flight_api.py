@@ -27,7 +27,7 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import AnswerOut, CommandIn, PictureForm
+from aerodaas.protocol.schemas import CommandIn, PictureForm
 from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -112,7 +112,7 @@ class Flight:
         self.pictures = self.flight.pictures = Pictures()
         self.link = FlightLink(self.folder)
 
-    def end(self) -> AnswerOut:
+    def end(self) -> Answer:
         """End the lease as the service does."""
         return self.link.change_lease(FlightLeaseIn(reason="revoked"))
 
@@ -383,7 +383,7 @@ def test_an_operators_drone_obeys_also_once_the_lease_is_over(flight: Flight) ->
     assert (refused.accepted, refused.text) == (False, "the drones come home: revoked")
     assert flight.link.fly(land, operator=True).accepted
     later = FlightLeaseIn(ends=time.time() + 60)
-    assert flight.link.change_lease(later) == AnswerOut(accepted=False, text="revoked")
+    assert flight.link.change_lease(later) == Answer(accepted=False, text="revoked")
 
 
 def test_a_command_that_is_refused_is_answered(flight: Flight) -> None:

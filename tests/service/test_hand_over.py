@@ -11,8 +11,9 @@ import pytest
 from desks import PILOT, Link, Monitor, Provider
 
 from aerodaas.errors import MissionError
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import AnswerOut, LeaseIn, LinkState, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
@@ -170,12 +171,12 @@ def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
 class Launching(Link):
     """A flight whose process does not listen yet."""
 
-    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
+    def change_lease(self, lease: FlightLeaseIn) -> Answer:
         """Note what is asked; answer once it has told its state."""
         super().change_lease(lease)
         if not self.number:
             raise MissionError("the flight's process does not answer")
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
 
 @pytest.fixture

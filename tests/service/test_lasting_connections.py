@@ -22,16 +22,9 @@ from websockets.sync.client import ClientConnection, connect
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.http_server.addresses import listen
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import (
-    AccountIn,
-    AnswerOut,
-    FleetOut,
-    MissionPhase,
-    Role,
-    Scope,
-    TokenIn,
-)
+from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
 from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
@@ -302,10 +295,10 @@ def test_an_operators_hand_is_a_pilots_once_the_role_is_gone(
     """Another tenant's drone is not steered any more."""
     asked: list[tuple[Role, str]] = []
 
-    def fly(_: MissionDesk, who: Any, mission: str, what: ControlsIn) -> AnswerOut:  # noqa: ANN401
+    def fly(_: MissionDesk, who: Any, mission: str, what: ControlsIn) -> Answer:  # noqa: ANN401
         del mission
         asked.append((who.role, "steers" if what.steer else "takes or leaves"))
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
     monkeypatch.setattr(MissionDesk, "fly", fly)
     monkeypatch.setattr(hand, "_SILENT_SECONDS", ENOUGH)

@@ -19,12 +19,12 @@ from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
-    AnswerOut,
     AuditOut,
     CommandIn,
     FleetOut,
@@ -191,23 +191,23 @@ class ProviderClient:
         """Approve a mission that waits for it, as an operator."""
         return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/approve")
 
-    def command(self, mission: str, command: CommandIn) -> AnswerOut:
+    def command(self, mission: str, command: CommandIn) -> Answer:
         """Give a robot of a flying mission a command; the answer is its own."""
         path = f"/v1/missions/{_part(mission)}/commands"
-        return self._ask(AnswerOut, "POST", path, command)
+        return self._ask(Answer, "POST", path, command)
 
-    def add_navigation(self, mission: str, navigation: NavigationIn) -> AnswerOut:
+    def add_navigation(self, mission: str, navigation: NavigationIn) -> Answer:
         """Add waypoints to the queue of a robot, or take its place; the answer is its own."""
         path = f"/v1/missions/{_part(mission)}/navigation"
-        return self._ask(AnswerOut, "POST", path, navigation)
+        return self._ask(Answer, "POST", path, navigation)
 
-    def rearrange(self, mission: str, change: RearrangeIn) -> AnswerOut:
+    def rearrange(self, mission: str, change: RearrangeIn) -> Answer:
         """Change the order of a robot's coming waypoints, or remove some, as a whole."""
-        return self._ask(AnswerOut, "POST", f"/v1/missions/{_part(mission)}/plan", change)
+        return self._ask(Answer, "POST", f"/v1/missions/{_part(mission)}/plan", change)
 
-    def actuate(self, mission: str, wanted: ActuateIn) -> AnswerOut:
+    def actuate(self, mission: str, wanted: ActuateIn) -> Answer:
         """Move an actuator of a robot; the answer is its own."""
-        return self._ask(AnswerOut, "POST", f"/v1/missions/{_part(mission)}/actuators", wanted)
+        return self._ask(Answer, "POST", f"/v1/missions/{_part(mission)}/actuators", wanted)
 
     def plan_survey(self, mission: str, wanted: SurveyIn) -> SurveyOut:
         """Plan the survey of an area; `add_navigation` with its waypoints flies it."""

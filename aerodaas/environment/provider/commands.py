@@ -21,7 +21,7 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
-from aerodaas.protocol.schemas import AnswerOut, CommandIn, NavigationIn
+from aerodaas.protocol.schemas import CommandIn, NavigationIn
 
 __all__ = ["send_command"]
 
@@ -34,15 +34,15 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
     """
     if isinstance(command, AddNavigation):
         if command.navigation:
-            return _answer(client.add_navigation(mission, _navigation(robot, command)))
+            return client.add_navigation(mission, _navigation(robot, command))
         if not command.clear_first:
             return Answer(accepted=False, text="the navigation is empty: there is nothing to fly")
         command = ClearNavigation()
     if isinstance(command, RearrangeNavigation):
-        return _answer(client.rearrange(mission, _change(robot, command)))
+        return client.rearrange(mission, _change(robot, command))
     if isinstance(command, Actuate):
         wanted = ActuateIn(robot=robot, actuator=command.actuator, position=command.position)
-        return _answer(client.actuate(mission, wanted))
+        return client.actuate(mission, wanted)
     if isinstance(command, ReleaseParachute):
         raise GraphError(f"{robot} flies at a provider, and no parachute is fired from afar")
     if isinstance(command, HandOver | TakeBack):
@@ -53,7 +53,7 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
             f"{robot} flies at a provider: streams of navigation are connected before "
             "start_mission(); in flight, waypoints can be added"
         )
-    return _answer(client.command(mission, CommandIn(robot=robot, command=word)))
+    return client.command(mission, CommandIn(robot=robot, command=word))
 
 
 def _navigation(robot: str, command: AddNavigation) -> NavigationIn:
@@ -80,7 +80,3 @@ def _change(robot: str, command: RearrangeNavigation) -> RearrangeIn:
     except ValidationError as error:
         first = error.errors()[0]
         raise InvalidWaypointError(f"{robot}: {first['msg']}") from None
-
-
-def _answer(answer: AnswerOut) -> Answer:
-    return Answer(answer.accepted, answer.text, dict(answer.refused))

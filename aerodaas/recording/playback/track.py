@@ -8,11 +8,11 @@ from typing import Any
 
 from aerodaas.clock import seconds
 from aerodaas.geometry.frames import Vector, is_finite
-from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, MissionStatus
 from aerodaas.messages.odometry import GpsFix
 from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.protocol.playback import GpsOut, HeardOut, PlaceOut, TrackOut
-from aerodaas.protocol.schemas import OutlookOut, StatusOut, TrafficOut
+from aerodaas.protocol.schemas import StatusOut, TrafficOut
 from aerodaas.recording.messages import MissionPlan
 
 __all__ = ["ROW_SECONDS", "Room", "TrackBuilder"]
@@ -75,7 +75,7 @@ class TrackBuilder:
         )  # fmt: skip
         self._interval = ROW_SECONDS
         self._flown = 0.0
-        self._outlook: OutlookOut | None = None
+        self._outlook: BatteryOutlook | None = None
         self._plan: list[str] = []
         self._pending = 0
         self._known: dict[str, tuple[float, float, float]] = {}

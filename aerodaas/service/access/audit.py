@@ -8,7 +8,8 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
-from aerodaas.protocol.schemas import AnswerOut, AuditOut
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.schemas import AuditOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import AuditEntry, Store
@@ -90,7 +91,7 @@ class Audit:
                 with suppress(StoreError):
                     self._store.audit.trim(number - self._most + 1)
 
-    def note_answer(self, who: Principal, action: str, target: str, answer: AnswerOut) -> None:
+    def note_answer(self, who: Principal, action: str, target: str, answer: Answer) -> None:
         """Write what a drone answered to a command: nobody in the air waits for a disk."""
         said, accepted = answer.text, answer.accepted
         self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)

@@ -10,18 +10,18 @@ from collections.abc import Callable, Iterator
 from typing import Any, Literal, TypeVar
 from urllib.parse import urlencode
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import unix_connect
 
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.errors import MissionError, SilentError
 from aerodaas.http_client import http_client, http_errors
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
-    AnswerOut,
     CommandIn,
     GrantIn,
     MissionOut,
@@ -37,7 +37,7 @@ from aerodaas.service.trouble import TroubleLog
 
 __all__ = ["FlightLink", "flight_address"]
 
-M = TypeVar("M", bound=BaseModel)
+M = TypeVar("M")
 
 _log = logging.getLogger(__name__)
 _CONNECT_SECONDS = 2.0
@@ -125,7 +125,7 @@ class FlightLink:
         self._heard.set()
         self._client.close()
 
-    def fly(self, command: PilotCommand, *, operator: bool) -> AnswerOut:
+    def fly(self, command: PilotCommand, *, operator: bool) -> Answer:
         """Give a robot a command; returns its answer, or why the flight refuses it.
 
         Those of users wait for none of an operator's and the service's own; these wait for none
@@ -140,15 +140,15 @@ class FlightLink:
         with self._place():
             return self._answered("POST", path, command, Role.PILOT)
 
-    def change_lease(self, lease: FlightLeaseIn) -> AnswerOut:
+    def change_lease(self, lease: FlightLeaseIn) -> Answer:
         """Tell the flight of its lease; raises MissionError as `fly`, also the others below."""
         return self._answered("PUT", "lease", lease)
 
-    def share(self, mission: str, sensors: list[str]) -> AnswerOut:
+    def share(self, mission: str, sensors: list[str]) -> Answer:
         """Have the flight share these cameras with an attached mission, and no others."""
         return self._answered("PUT", f"shares/{mission}", GrantIn(sensors=sensors))
 
-    def withdraw(self, mission: str) -> AnswerOut:
+    def withdraw(self, mission: str) -> Answer:
         """Have the flight share nothing with a mission any more."""
         return self._answered("DELETE", f"shares/{mission}")
 
@@ -183,11 +183,11 @@ class FlightLink:
 
     def _answered(
         self, method: str, path: str, content: BaseModel | None = None, role: Role = Role.OPERATOR
-    ) -> AnswerOut:
+    ) -> Answer:
         try:
-            return self._asked(AnswerOut, method, f"/v1/missions/{OWN}/{path}", content, role)
+            return self._asked(Answer, method, f"/v1/missions/{OWN}/{path}", content, role)
         except _RefusalError as error:
-            return AnswerOut(accepted=False, text=str(error))
+            return Answer(accepted=False, text=str(error))
 
     def _asked(
         self, kind: type[M], method: str, path: str, content: BaseModel | None, role: Role
@@ -202,7 +202,7 @@ class FlightLink:
             )
         try:
             if answer.is_success:
-                return kind.model_validate_json(answer.content)
+                return TypeAdapter(kind).validate_json(answer.content)
             text = RefusalOut.model_validate_json(answer.content).text
         except ValidationError as error:
             raise _silent(error) from None

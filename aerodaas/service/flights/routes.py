@@ -15,9 +15,10 @@ from fastapi import APIRouter, Request, WebSocket, WebSocketDisconnect
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.clock import host_time_ns
 from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AnswerOut, GrantIn, Role, Scope
+from aerodaas.protocol.schemas import GrantIn, Role, Scope
 from aerodaas.service.flights.server import LeasedFlight
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.http.admission import Admission
@@ -62,39 +63,39 @@ class FlightRoutes:
         router.add_api_websocket_route("/here", self.here)
         return router
 
-    def control(self, body: ControlsIn, request: Request) -> AnswerOut:
+    def control(self, body: ControlsIn, request: Request) -> Answer:
         """Fly a robot by hand, or let go of it."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         return self._flight.fly(principal, OWN, body)
 
-    def hear(self, request: Request) -> AnswerOut:
+    def hear(self, request: Request) -> Answer:
         """Note that the user is there."""
         self._admission.require(request, Role.OPERATOR)
         self._lease.hear()
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
-    def change_lease(self, body: FlightLeaseIn, request: Request) -> AnswerOut:
+    def change_lease(self, body: FlightLeaseIn, request: Request) -> Answer:
         """Move the end of the lease, or end it: then the drones come home."""
         self._admission.require(request, Role.OPERATOR)
         if body.ends is None:
             self._lease.end(body.reason)
         elif not self._lease.extend(body.ends):
-            return AnswerOut(accepted=False, text=self._lease.reason)
-        return AnswerOut(accepted=True)
+            return Answer(accepted=False, text=self._lease.reason)
+        return Answer(accepted=True)
 
-    def share(self, attached: str, body: GrantIn, request: Request) -> AnswerOut:
+    def share(self, attached: str, body: GrantIn, request: Request) -> Answer:
         """Share cameras with a mission, as long as the lease is good."""
         self._admission.require(request, Role.OPERATOR)
         if self._lease.reason:
             return self._flight.refusal()
         self._shared[attached] = frozenset(body.sensors)
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
-    def withdraw(self, attached: str, request: Request) -> AnswerOut:
+    def withdraw(self, attached: str, request: Request) -> Answer:
         """Share nothing with a mission any more."""
         self._admission.require(request, Role.OPERATOR)
         self._shared.pop(attached, None)
-        return AnswerOut(accepted=True)
+        return Answer(accepted=True)
 
     async def pictures(self, socket: WebSocket, attached: str, stream: str) -> None:
         """Answer each message of an attached mission by the newest picture of a camera."""

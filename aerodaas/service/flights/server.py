@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.errors import MissionError
-from aerodaas.protocol.schemas import AnswerOut, Role
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.flights.watch import LeaseWatch
@@ -34,15 +35,15 @@ class LeasedFlight(OwnFlight):
         self._lease = lease
         super().__init__(run, name)
 
-    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
         """Give a robot a command, unless the lease is over; raises AeroDaaSError."""
         if self._lease.reason and not principal.role.reaches(Role.OPERATOR):
             return self.refusal()
         return super().fly(principal, mission, command)
 
-    def refusal(self) -> AnswerOut:
+    def refusal(self) -> Answer:
         """Answer to who may not do anything any more, for the lease is over."""
-        return AnswerOut(accepted=False, text=f"the drones come home: {self._lease.reason}")
+        return Answer(accepted=False, text=f"the drones come home: {self._lease.reason}")
 
     @property
     def _watched(self) -> bool:

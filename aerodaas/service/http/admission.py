@@ -13,7 +13,8 @@ from starlette.requests import HTTPConnection
 
 from aerodaas.errors import AeroDaaSError
 from aerodaas.http_server.addresses import address_of
-from aerodaas.protocol.schemas import AnswerOut, Role, Scope
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.bearer import bearer
@@ -138,9 +139,7 @@ class Admission:
             self._refuse(principal, connection, error)
             raise
 
-    def note_answer(
-        self, principal: Principal, action: str, target: str, answer: AnswerOut
-    ) -> None:
+    def note_answer(self, principal: Principal, action: str, target: str, answer: Answer) -> None:
         """Audit what a drone answered to a command."""
         if self._audit is not None:
             self._audit.note_answer(principal, action, target, answer)

@@ -18,9 +18,8 @@ from fastapi import WebSocket, WebSocketDisconnect
 from pydantic import ValidationError
 
 from aerodaas.errors import AeroDaaSError
-from aerodaas.mission.commands import ReleaseControls, Steer, TakeControls
+from aerodaas.mission.commands import Answer, ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
-from aerodaas.protocol.schemas import AnswerOut
 from aerodaas.service.http.bearer import SUBPROTOCOL
 from aerodaas.service.live.jobs import end_jobs
 
@@ -61,7 +60,7 @@ class ControlSession:
         self,
         socket: WebSocket,
         operator: str,
-        give: Callable[[ControlCommand], AnswerOut],
+        give: Callable[[ControlCommand], Answer],
         renew: Callable[[], None] = lambda: None,
     ) -> None:
         """Steer by `socket`, which is not accepted yet.
@@ -82,7 +81,7 @@ class ControlSession:
         self._arrived = 0.0
         self._came = asyncio.Event()
 
-    async def run(self) -> AnswerOut:
+    async def run(self) -> Answer:
         """Take the controls, and steer until they are let go; returns what the drone said first."""
         offered = self._socket.scope.get("subprotocols", ())
         await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
@@ -108,7 +107,7 @@ class ControlSession:
                 await asyncio.wait_for(self._came.wait(), _SILENT_SECONDS)
             except asyncio.TimeoutError:
                 text = f"nothing was heard of this page for {_SILENT_SECONDS:g} s"
-                await self._answer(0.0, AnswerOut(accepted=False, text=text))
+                await self._answer(0.0, Answer(accepted=False, text=text))
                 return
             self._came.clear()
             wanted = self._newest
@@ -135,17 +134,17 @@ class ControlSession:
                     first = error.errors(include_input=False)[0]
                     place = ".".join(map(str, first["loc"]))
                     said = f"{place}: {first['msg']}" if place else first["msg"]
-                    await self._answer(0.0, AnswerOut(accepted=False, text=said))
+                    await self._answer(0.0, Answer(accepted=False, text=said))
                     return
                 arrived = time.monotonic()
                 if self._fresh.is_fresh(wanted.at / 1000, arrived):
                     self._newest, self._arrived = wanted, arrived
                     self._came.set()
 
-    async def _told(self, command: ControlCommand, *, renews: bool = False) -> AnswerOut:
+    async def _told(self, command: ControlCommand, *, renews: bool = False) -> Answer:
         """Give a command, and take a failure for a refusal."""
 
-        def give() -> AnswerOut:
+        def give() -> Answer:
             if renews:
                 self._renew()
             return self._give(command)
@@ -153,9 +152,9 @@ class ControlSession:
         try:
             return await asyncio.to_thread(give)
         except AeroDaaSError as error:
-            return AnswerOut(accepted=False, text=str(error))
+            return Answer(accepted=False, text=str(error))
 
-    async def _answer(self, at: float, said: AnswerOut) -> bool:
+    async def _answer(self, at: float, said: Answer) -> bool:
         """Tell the operator what the drone said; returns whether they have the controls."""
         answer = ControlsOut(held=said.accepted, at=at, text=said.text)
         await self._socket.send_text(answer.model_dump_json())

@@ -21,7 +21,6 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
-    AnswerOut,
     CommandIn,
     FleetOut,
     MissionOut,
@@ -194,7 +193,7 @@ class OwnFlight:
         _require_own(mission)
         return self._scenery
 
-    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
         """Give a robot a command, of which an alert tells; raises AeroDaaSError."""
         self.require_pilot(principal, mission)
         given, told = _worded(command)
@@ -214,7 +213,7 @@ class OwnFlight:
         self._commanded = True
         word = "accepted" if answer.accepted else "refused"
         self._tell(asked, f"{word}{': ' if answer.text else ''}{answer.text}")
-        return AnswerOut.of(answer)
+        return answer
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
         """Raise RefusedError unless the account may command the flight."""

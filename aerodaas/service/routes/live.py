@@ -7,8 +7,9 @@ import asyncio
 from fastapi import APIRouter, WebSocket
 
 from aerodaas.errors import AeroDaaSError
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ControlsIn, told_of_controls
-from aerodaas.protocol.schemas import AnswerOut, PictureForm, Role, Scope, Word
+from aerodaas.protocol.schemas import PictureForm, Role, Scope, Word
 from aerodaas.service.backend import Missions
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.refusals import refuse
@@ -76,7 +77,7 @@ class LiveRoutes:
             await refuse(socket.scope, socket.send, error)
             return
 
-        def give(command: ControlCommand) -> AnswerOut:
+        def give(command: ControlCommand) -> Answer:
             # As the account is now: an operator's hand does not outlive the role.
             sender = self._admission.require(socket, Role.PILOT, Scope.FLY)
             answer = self._missions.fly(sender, mission, ControlsIn.of(robot, command))

@@ -6,16 +6,10 @@ from typing import Any
 
 from fastapi import APIRouter, BackgroundTasks, Request
 
+from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import (
-    AnswerOut,
-    CommandIn,
-    MissionOut,
-    NavigationIn,
-    Role,
-    Scope,
-)
+from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, Role, Scope
 from aerodaas.service.backend import Missions, PilotCommand, ShownMissions
 from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
@@ -75,25 +69,25 @@ class PilotingRoutes:
 
     def command(
         self, mission: str, body: CommandIn, request: Request, later: BackgroundTasks
-    ) -> AnswerOut:
+    ) -> Answer:
         """Give one of the mission's robots a command; answers what the drone said."""
         return self._fly(mission, body, body.command, request, later)
 
     def navigation(
         self, mission: str, body: NavigationIn, request: Request, later: BackgroundTasks
-    ) -> AnswerOut:
+    ) -> Answer:
         """Add waypoints to the queue of one of the mission's robots."""
         return self._fly(mission, body, "navigation", request, later)
 
     def rearrange(
         self, mission: str, body: RearrangeIn, request: Request, later: BackgroundTasks
-    ) -> AnswerOut:
+    ) -> Answer:
         """Change the order of a robot's coming waypoints, or remove some."""
         return self._fly(mission, body, "plan", request, later)
 
     def actuate(
         self, mission: str, body: ActuateIn, request: Request, later: BackgroundTasks
-    ) -> AnswerOut:
+    ) -> Answer:
         """Move an actuator that the account may move."""
         return self._fly(mission, body, "actuate", request, later, f"/{body.actuator}")
 
@@ -112,7 +106,7 @@ class PilotingRoutes:
         request: Request,
         later: BackgroundTasks,
         part: str = "",
-    ) -> AnswerOut:
+    ) -> Answer:
         """Have a robot do what its pilot asks; audited as `action` on the robot, or its `part`."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):

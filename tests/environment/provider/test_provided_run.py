@@ -30,8 +30,8 @@ from aerodaas.errors import (
     SourceError,
     UnknownIdError,
 )
-from aerodaas.mission.commands import AddNavigation
-from aerodaas.protocol.schemas import AnswerOut, MissionPhase, NavigationIn, VerdictOut
+from aerodaas.mission.commands import AddNavigation, Answer
+from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 
 
 @pytest.fixture(autouse=True)
@@ -180,7 +180,7 @@ def test_commands_go_over_the_wire(stub: Stub) -> None:
         drone.pause_mission()
         drone.resume_mission()
         drone.navigate(hop((1, 1), name="b"))
-        stub.answer = AnswerOut(accepted=False, text="it is landing")
+        stub.answer = Answer(accepted=False, text="it is landing")
         with pytest.raises(MissionError, match="drone: it is landing"):
             drone.end_mission()
         with pytest.raises(MissionError, match="it is landing"):
