@@ -7,7 +7,7 @@ its user's side: the document holds a place for it, by what it reads and what it
 
 from __future__ import annotations
 
-import dataclasses
+import itertools
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -17,7 +17,6 @@ from pydantic import (
     ConfigDict,
     FailFast,
     Field,
-    Strict,
     model_validator,
 )
 from typing_extensions import Self
@@ -30,31 +29,22 @@ from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.readings import Readings
-from aerodaas.messages.waypoints import (
-    DEFAULT_PRIORITY,
-    LARGEST,
-    HeightReference,
-    Waypoint,
-    WaypointType,
-)
+from aerodaas.messages.waypoints import LARGEST, Waypoint
 
 __all__ = [
     "HERE_CONDITION",
     "HERE_ITEMS",
     "AnalysisEntry",
+    "DocumentWaypoint",
     "HereEntry",
     "HereItem",
     "MissionDocument",
     "NavigationDocument",
     "SchedulerEntry",
     "TriggerEntry",
-    "WaypointEntry",
     "read_mission",
 ]
 
-_Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-_Percent = Annotated[float, Field(ge=0, le=100)]
-_HalfTurn = Annotated[float, Field(ge=-3.1416, le=3.1416)]
 _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
@@ -62,7 +52,8 @@ _MOST_WAYPOINTS = 10_000
 _MOST_VALUES = 10_000
 """Of the settings of one analysis or scheduler, or of a condition."""
 _MOST_MOVES = 16
-_Name = Annotated[str, Field(min_length=1, max_length=64)]
+_LONGEST = 64
+"""Characters of a name."""
 _MOST_HERTZ = 1000.0
 HERE_CONDITION = "$here"
 """Key of a condition that is code at the user's side; its value is the trigger's number."""
@@ -114,63 +105,18 @@ class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class WaypointEntry(BaseModel):
-    """One waypoint, as in `aerodaas.Waypoint`: metres, seconds, radians, m/s."""
+def _of_a_document(waypoint: Waypoint) -> Waypoint:
+    """A waypoint whose names are short enough for a document; raises ValueError for another."""
+    if len(waypoint.actuate) > _MOST_MOVES:
+        raise ValueError(f"waypoint {waypoint.id[:_LONGEST]!r} moves more than {_MOST_MOVES}")
+    for name in (waypoint.id, *itertools.chain.from_iterable(waypoint.moves.items())):
+        if not 0 < len(name) <= _LONGEST:
+            raise ValueError(f"{name[:_LONGEST]!r}: a name has 1 to {_LONGEST} characters")
+    return waypoint
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    id: Annotated[str, Field(min_length=1, max_length=64)]
-    x: _Number
-    y: _Number
-    z: _Number
-    hover_duration: Annotated[_Number, Field(ge=0)] = 0.0
-    waypoint_type: Literal["relative", "local", "global", "global_relative"] = "relative"
-    yaw: _Number | None = None
-    speed: Annotated[_Number, Field(gt=0)] | None = None
-    priority: Annotated[int, Field(ge=-LARGEST, le=LARGEST)] = DEFAULT_PRIORITY
-    deadline: _Number | None = None
-    above: Literal["home", "sea", "ground"] | None = None
-    """What z is counted from; None: as `waypoint_type` says."""
-    gimbal_pitch: _HalfTurn | None = None
-    """Negative looks down."""
-    gimbal_yaw: _HalfTurn | None = None
-    """From the nose, counter-clockwise."""
-    photo: bool = False
-    actuate: Annotated[dict[_Name, _Name], Field(max_length=_MOST_MOVES)] = Field(
-        default_factory=dict
-    )
-    """Positions by actuator, in order."""
-    trigger_distance: Annotated[_Number, Field(ge=0.1)] | None = None
-    """Metres between pictures on the way there."""
-    trigger_interval: Annotated[_Number, Field(ge=0.1)] | None = None
-    """Seconds between pictures on the way there and during the stay."""
-    look_at: Annotated[tuple[_Number, _Number, _Number], Strict(strict=False)] | None = None
-    """Place that is looked at, counted as x, y and z are."""
-    zoom: _Percent | None = None
-    """Of the camera's zoom, set on the way there; 0 sees most."""
-    focus: _Percent | None = None
-    video: bool | None = None
-    """Whether the camera's recording is begun or ended there; None leaves it as it is."""
-
-    @classmethod
-    def of(cls, waypoint: Waypoint) -> WaypointEntry:
-        """Write a waypoint; raises ValueError for one that a document cannot hold."""
-        return cls.model_validate(
-            {
-                one.name: getattr(waypoint, one.name)
-                for one in dataclasses.fields(waypoint)
-                if one.name not in {"waypoint_type", "above", "actuate"}
-            }
-            | {
-                "waypoint_type": WaypointType(waypoint.waypoint_type).value,
-                "above": HeightReference(waypoint.above).value if waypoint.above else None,
-                "actuate": waypoint.moves,
-            }
-        )
-
-    def waypoint(self) -> Waypoint:
-        """Read a waypoint; raises InvalidWaypointError for one that cannot be flown."""
-        return Waypoint(**self.model_dump())
+DocumentWaypoint: TypeAlias = Annotated[Waypoint, AfterValidator(_of_a_document)]
+"""A waypoint as it goes to a provider and into documents."""
 
 
 class SchedulerEntry(_Entry):
@@ -242,7 +188,7 @@ class NavigationDocument(_Entry):
 
     robot: Word
     stream: ScopedWord | None = None
-    waypoints: Annotated[list[WaypointEntry], FailFast()] = Field(
+    waypoints: Annotated[list[DocumentWaypoint], FailFast()] = Field(
         default_factory=list, max_length=_MOST_WAYPOINTS
     )
     ordered: bool = True

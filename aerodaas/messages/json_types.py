@@ -13,7 +13,16 @@ if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
     from pydantic_core import CoreSchema
 
-__all__ = ["XYZ", "Int64", "NanIsNull", "NestedLists", "Real", "SignedBits"]
+__all__ = [
+    "XYZ",
+    "Int64",
+    "NanIsNull",
+    "NestedLists",
+    "PairsAsObject",
+    "Real",
+    "SignedBits",
+    "StrictlyTyped",
+]
 
 Array: TypeAlias = NDArray[Any]
 _AXES = ("x", "y", "z")
@@ -37,7 +46,7 @@ class SignedBits:
 
         del source, handler
         end = 1 << self.count - 1
-        return core_schema.int_schema(ge=-end, lt=end)
+        return core_schema.int_schema(ge=-end, lt=end, strict=True)
 
 
 Int64: TypeAlias = Annotated[int, SignedBits(64)]
@@ -59,6 +68,47 @@ class NanIsNull:
 
 Real: TypeAlias = Annotated[float, NanIsNull()]
 """A number that may be NaN."""
+
+
+@dataclass(frozen=True)
+class StrictlyTyped:
+    """A value of the annotated type itself: no number as a text, no flag as a number."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the value."""
+        schema = handler(source)
+        schema["strict"] = True  # type: ignore[typeddict-unknown-key] - any scalar's has it
+        return schema
+
+
+@dataclass(frozen=True)
+class PairsAsObject:
+    """A tuple of pairs of texts as an object; read from an object or a list of pairs.
+
+    Args:
+        longest: Most pairs that are read.
+    """
+
+    longest: int = 1000
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads and writes the pairs."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
+        del source
+        texts = handler.generate_schema(dict[str, str])
+        pairs = handler.generate_schema(tuple[tuple[str, str], ...])
+        texts["max_length"] = self.longest  # type: ignore[typeddict-unknown-key] - a dictionary's
+        return core_schema.union_schema(
+            [texts, pairs],
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                dict, return_schema=texts
+            ),
+        )
 
 
 @dataclass(frozen=True)

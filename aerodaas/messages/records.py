@@ -29,7 +29,12 @@ _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
 
 
-_JSON = {"ser_json_bytes": "base64", "val_json_bytes": "base64", "ser_json_inf_nan": "null"}
+_JSON = {
+    "extra": "forbid",
+    "ser_json_bytes": "base64",
+    "val_json_bytes": "base64",
+    "ser_json_inf_nan": "null",
+}
 """How pydantic writes a record's fields as JSON, and reads them."""
 
 

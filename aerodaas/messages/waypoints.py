@@ -6,13 +6,14 @@ import enum
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
-from aerodaas.messages.json_types import Int64
+from aerodaas.messages.json_types import Int64, PairsAsObject, StrictlyTyped
 from aerodaas.messages.payload import GimbalTarget, LensTarget
 from aerodaas.messages.records import fast_pickle, shared_pickle
 
@@ -24,6 +25,7 @@ __all__ = [
     "HeightReference",
     "NavigationItem",
     "NavigationType",
+    "Number",
     "SchedulingType",
     "TargetState",
     "VelocityCommand",
@@ -100,6 +102,12 @@ LEAST_TRIGGER = 0.1
 """Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
+Number: TypeAlias = Annotated[float, StrictlyTyped(), Ge(-LARGEST), Le(LARGEST)]
+_Flag: TypeAlias = Annotated[bool, StrictlyTyped()]
+_Angle: TypeAlias = Annotated[Number, Ge(-_HALF_TURN), Le(_HALF_TURN)]
+_Trigger: TypeAlias = Annotated[Number, Ge(LEAST_TRIGGER)]
+_Percent: TypeAlias = Annotated[Number, Ge(0.0), Le(_WHOLE)]
+
 
 def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
     for name in names:
@@ -110,6 +118,8 @@ def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
         if not (isinstance(value, int | float | np.floating) and abs(value) <= LARGEST):
             message = f"{owner}: {name} must be a finite number, not {value!r}; at most {LARGEST:g}"
             raise InvalidWaypointError(message)
+        if isinstance(value, np.generic):
+            object.__setattr__(record, name, value.item())
 
 
 def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
@@ -146,54 +156,54 @@ class Waypoint:
     """
 
     id: str
-    x: float
+    x: Number
     """Metres east, or latitude in degrees for a global waypoint."""
-    y: float
+    y: Number
     """Metres north, or longitude in degrees for a global waypoint."""
-    z: float
+    z: Number
     """Metres up, or altitude in metres for a global waypoint; see WaypointType."""
-    hover_duration: float = 0.0
+    hover_duration: Annotated[Number, Ge(0.0)] = 0.0
     """Seconds to stay after arrival."""
     waypoint_type: WaypointType | str = WaypointType.RELATIVE
-    yaw: float | None = None
+    yaw: Number | None = None
     """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
-    speed: float | None = None
+    speed: Annotated[Number, Gt(0.0)] | None = None
     """m/s towards it; None takes the robot's cruise speed."""
     priority: Int64 = DEFAULT_PRIORITY
     """Smaller is more urgent; a more urgent waypoint preempts the plan."""
-    deadline: float | None = None
+    deadline: Number | None = None
     """Seconds of mission time by which to arrive; None for no deadline."""
     above: HeightReference | str | None = None
     """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
-    gimbal_pitch: float | None = None
+    gimbal_pitch: _Angle | None = None
     """Radians to which the gimbal is turned on the way there, 0 at the horizon, negative
     downwards: -pi/2 looks straight down. None leaves it as it is, or level where `gimbal_yaw` is
     given."""
-    gimbal_yaw: float | None = None
+    gimbal_yaw: _Angle | None = None
     """Radians from the nose, counter-clockwise; None leaves it as it is, or ahead where
     `gimbal_pitch` is given."""
-    photo: bool = False
+    photo: _Flag = False
     """Whether a picture is taken there, once the gimbal looks where it is to."""
-    actuate: dict[str, str] | tuple[tuple[str, str], ...] = ()
+    actuate: Annotated[dict[str, str] | tuple[tuple[str, str], ...], PairsAsObject()] = ()
     """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
     other, after the picture; kept as a tuple of pairs."""
-    trigger_distance: float | None = None
+    trigger_distance: _Trigger | None = None
     """Metres between pictures on the way there, along the straight line from where it begins; the
     drone does not stop for them. None takes none."""
-    trigger_interval: float | None = None
+    trigger_interval: _Trigger | None = None
     """Seconds between pictures on the way there and during the stay; the drone does not stop for
     them. None takes none."""
-    look_at: tuple[float, float, float] | None = None
+    look_at: tuple[Number, Number, Number] | None = None
     """A place that the gimbal keeps looking at from the way there on, or the nose where the gimbal
     cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
     x, y and z are."""
 
-    zoom: float | None = None
+    zoom: _Percent | None = None
     """Percent of the camera's zoom, 0 (sees most) to 100, that is set on the way there; None leaves
     it as it is."""
-    focus: float | None = None
+    focus: _Percent | None = None
     """The same for the focus, 0 (near) to 100 (far)."""
-    video: bool | None = None
+    video: _Flag | None = None
     """Whether the camera's recording on its own card is begun there (True) or ended (False), after
     the picture and before actuators move; None leaves it as it is. One that the mission has begun
     ends with it."""

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
-from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.dataflow.mission_document import DocumentWaypoint
 from aerodaas.messages.waypoints import VelocityCommand
 from aerodaas.mission.commands import (
     Actuate,
@@ -106,7 +106,7 @@ class SurveyPhotosOut(AnswerModel):
 class SurveyOut(AnswerModel):
     """A survey as it would be flown; its waypoints are added by `navigation`."""
 
-    waypoints: list[WaypointEntry]
+    waypoints: list[DocumentWaypoint]
     height: float
     """Metres above home."""
     width: float

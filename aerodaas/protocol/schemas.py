@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, FailFast, Field, field_validator
 
 from aerodaas.clock import seconds
-from aerodaas.dataflow.mission_document import MissionDocument, WaypointEntry
+from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
@@ -533,7 +533,7 @@ class NavigationIn(RequestModel):
     model_config = ConfigDict(strict=True)
 
     waypoints: Annotated[
-        list[WaypointEntry], Field(min_length=1, max_length=_MOST_WAYPOINTS), FailFast()
+        list[DocumentWaypoint], Field(min_length=1, max_length=_MOST_WAYPOINTS), FailFast()
     ]
     ordered: bool = True
     """Whether to keep their order; otherwise the scheduler chooses it."""
@@ -547,7 +547,7 @@ class NavigationIn(RequestModel):
 
     @field_validator("waypoints")
     @classmethod
-    def _distinct(cls, waypoints: list[WaypointEntry]) -> list[WaypointEntry]:
+    def _distinct(cls, waypoints: list[DocumentWaypoint]) -> list[DocumentWaypoint]:
         counts = Counter(waypoint.id for waypoint in waypoints)
         twice = sorted(name for name, count in counts.items() if count > 1)
         if twice:
@@ -559,7 +559,7 @@ class NavigationIn(RequestModel):
         """The command; raises InvalidWaypointError for waypoints that cannot be flown."""
         navigation = AeroNavigation(
             NavigationType.ANALYTICS_DRIVEN,
-            [waypoint.waypoint() for waypoint in self.waypoints],
+            self.waypoints,
             SchedulingType.ORDERED if self.ordered else SchedulingType.UNORDERED,
         )
         return AddNavigation(navigation, self.index, self.deadline, clear_first=self.clear_first)

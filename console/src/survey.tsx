@@ -5,7 +5,7 @@ import { type Flight, aheadOf } from "./flight";
 import { Field } from "./panels";
 import type { Abilities, Point } from "./place";
 import type { Drawn } from "./survey_map";
-import type { SurveyIn, SurveyOut, SurveyPhotosOut, WaypointEntry } from "./wire";
+import type { SurveyIn, SurveyOut, SurveyPhotosOut, Waypoint } from "./wire";
 
 /** Milliseconds without a change before a plan is asked for. */
 const PAUSE = 250;
@@ -125,7 +125,7 @@ export function useSurvey(
       const [first, ...rest] = waypoints;
       if (!first) return;
       const last = waypoints[waypoints.length - 1]?.id ?? first.id;
-      const list: [WaypointEntry, ...WaypointEntry[]] = [first, ...rest];
+      const list: [Waypoint, ...Waypoint[]] = [first, ...rest];
       flight.fly({ robot, waypoints: list }, `survey ${name.current}`, (status) => {
         const known = [...aheadOf(status), ...status.visited];
         return known.includes(last) ? `its ${waypoints.length} waypoints are in the plan` : null;

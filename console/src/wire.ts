@@ -33,6 +33,14 @@ export type MissionPhase =
  * What a page can draw of a stream.
  */
 export type StreamKind = "pictures" | "detections" | "navigation";
+/**
+ * What a waypoint's z is counted from, whatever its x and y are.
+ */
+export type HeightReference = "home" | "sea" | "ground";
+/**
+ * The reference of a waypoint's x, y and z.
+ */
+export type WaypointType = "relative" | "local" | "global" | "global_relative";
 
 export interface Wire {
   AccountOut: AccountOut;
@@ -255,16 +263,20 @@ export interface NavigationIn {
    * @minItems 1
    * @maxItems 1000
    */
-  waypoints: [WaypointEntry, ...WaypointEntry[]];
+  waypoints: [Waypoint, ...Waypoint[]];
 }
 /**
- * One waypoint, as in `aerodaas.Waypoint`: metres, seconds, radians, m/s.
+ * A place to fly to, with hover time, yaw, speed and priority.
+ *
+ * Raises InvalidWaypointError for numbers that are not finite or out of range.
  */
-export interface WaypointEntry {
-  above?: ("home" | "sea" | "ground") | null;
-  actuate?: {
-    [k: string]: string;
-  };
+export interface Waypoint {
+  above?: HeightReference | string | null;
+  actuate?:
+    | {
+        [k: string]: string;
+      }
+    | [string, string][];
   deadline?: number | null;
   focus?: number | null;
   gimbal_pitch?: number | null;
@@ -278,7 +290,7 @@ export interface WaypointEntry {
   trigger_distance?: number | null;
   trigger_interval?: number | null;
   video?: boolean | null;
-  waypoint_type?: "relative" | "local" | "global" | "global_relative";
+  waypoint_type?: WaypointType | string;
   x: number;
   y: number;
   yaw?: number | null;
@@ -492,7 +504,7 @@ export interface SurveyOut {
    */
   start: [number, number, number];
   sweeps: number;
-  waypoints: WaypointEntry[];
+  waypoints: Waypoint[];
   width: number;
 }
 /**

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from aerodaas import AeroNavigation, Environment, Waypoint
-from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.errors import ConfigError, GraphError, InvalidWaypointError
 
 CARRIED: list[dict[str, Any]] = [
@@ -93,6 +93,8 @@ def test_moves_are_positions_by_actuator(moves: Any) -> None:  # noqa: ANN401
 def test_a_document_holds_moves_in_order() -> None:
     """There and back."""
     stop = Waypoint("drop", 0, 5, 2, actuate={"hatch": "open", "hook": "release"})
-    entry = WaypointEntry.model_validate_json(WaypointEntry.of(stop).model_dump_json())
-    assert entry.waypoint() == stop
-    assert list(entry.waypoint().moves) == ["hatch", "hook"]
+    text = NavigationDocument(robot="drone", waypoints=[stop]).model_dump_json()
+    assert '"actuate":{"hatch":"open","hook":"release"}' in text
+    (read,) = NavigationDocument.model_validate_json(text).waypoints
+    assert read == stop
+    assert list(read.moves) == ["hatch", "hook"]

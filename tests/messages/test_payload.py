@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.odometry import Odometry
@@ -78,6 +78,7 @@ def test_a_mission_document_holds_it() -> None:
     waypoint = Waypoint(
         "a", 0, 0, 2, gimbal_pitch=-1.0, gimbal_yaw=0.5, zoom=5, focus=80, photo=True, video=False
     )
-    entry = WaypointEntry.of(waypoint)
-    assert entry.waypoint() == waypoint
-    assert "photo" not in WaypointEntry.of(Waypoint("a", 0, 0, 2)).model_dump(exclude_defaults=True)
+    navigation = NavigationDocument(robot="drone", waypoints=[waypoint])
+    text = navigation.model_dump_json(exclude_defaults=True)
+    assert NavigationDocument.model_validate_json(text).waypoints == [waypoint]
+    assert "trigger" not in text

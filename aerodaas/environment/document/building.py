@@ -175,7 +175,7 @@ class _Builder:
                 raise GraphError(f"{entry.robot} cannot navigate by {entry.stream}")
             source: Any = stream
         else:
-            source = [one.waypoint() for one in entry.waypoints]
+            source = list(entry.waypoints)
         driven = NavigationType.ANALYTICS_DRIVEN if entry.stream else NavigationType.DISTANCE_DRIVEN
         navigation = AeroNavigation(driven, source, ordering, priority=entry.priority)
         if entry.clear_on is not None:

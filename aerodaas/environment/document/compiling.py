@@ -20,7 +20,6 @@ from aerodaas.dataflow.mission_document import (
     HERE_CONDITION,
     HERE_ITEMS,
     MissionDocument,
-    WaypointEntry,
 )
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueWriter, registered_name
@@ -193,17 +192,13 @@ class _Compiler:
         return {
             "robot": edge.robot,
             "stream": navigation.stream.name if navigation.stream is not None else None,
-            "waypoints": list(self._waypoints(edge)),
+            "waypoints": list(navigation.waypoints),
             "ordered": navigation.scheduling_type is SchedulingType.ORDERED,
             "priority": navigation.priority,
             "index": edge.index,
             "deadline": edge.deadline,
             "clear_on": edge.clear_on,
         }
-
-    def _waypoints(self, edge: NavigationEdge) -> Iterator[dict[str, Any]]:
-        for waypoint in edge.navigation.waypoints:
-            yield WaypointEntry.of(waypoint).model_dump(exclude_defaults=True)
 
     def _trajectory(self) -> dict[str, Any] | None:
         scheduler = self._environment.chosen_trajectory

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
-from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import GraphError, InvalidWaypointError
 from aerodaas.messages.waypoints import SchedulingType
@@ -63,7 +62,7 @@ def _navigation(robot: str, command: AddNavigation) -> NavigationIn:
     try:
         return NavigationIn(
             robot=robot,
-            waypoints=[WaypointEntry.of(one) for one in navigation.waypoints],
+            waypoints=list(navigation.waypoints),
             ordered=navigation.scheduling_type is SchedulingType.ORDERED,
             index=command.index,
             deadline=command.deadline,

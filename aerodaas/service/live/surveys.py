@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.errors import MissionError
 from aerodaas.mission.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
@@ -54,7 +53,7 @@ class SurveyPlanner:
         named = (replace(one, id=f"{wanted.name}-{n}") for n, one in enumerate(survey.waypoints, 1))
         reserve = robot.limits.battery_land
         return SurveyOut(
-            waypoints=[WaypointEntry.of(one) for one in named],
+            waypoints=list(named),
             height=settings.height,
             width=settings.strips[0],
             angle=survey.angle,

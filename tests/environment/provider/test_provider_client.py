@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from provider_stub import MISSION, TOKEN, Stub, mission
 
-from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.client import LARGEST_MODEL, ProviderClient
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, SourceError
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import CommandIn, MissionPhase, NavigationIn
 
 
@@ -48,7 +48,7 @@ def test_answers_are_models(client: ProviderClient, stub: Stub) -> None:
     assert client.missions() == [stub.state]
     assert client.mission(MISSION) == stub.state
     assert client.command(MISSION, CommandIn(robot="drone", command="pause")).accepted
-    navigation = NavigationIn(robot="drone", waypoints=[WaypointEntry(id="a", x=1.0, y=2.0, z=3.0)])
+    navigation = NavigationIn(robot="drone", waypoints=[Waypoint("a", 1.0, 2.0, 3.0)])
     assert client.add_navigation(MISSION, navigation).accepted
     assert all(TOKEN not in path for _, path, _ in stub.asked)
 
