@@ -10,10 +10,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, create_model
 from pydantic.json_schema import JsonSchemaMode
 
+from aerodaas.config.robot import CameraConfig, RobotConfig
 from aerodaas.mission.commands import Answer
+from aerodaas.protocol.live import EndMessage, ItemMessage, LeftOutMessage, StateMessage
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.preflight import PreflightOut
@@ -34,27 +36,39 @@ _OUT: tuple[type, ...] = (
     AccountOut,
     Answer,
     ControlsOut,
+    EndMessage,
     FleetOut,
+    ItemMessage,
+    LeftOutMessage,
     MissionOut,
     PlaybackOut,
     PreflightOut,
     RefusalOut,
     SceneryOut,
+    StateMessage,
     SurveyOut,
 )
+_DRAWN = ("id", "limits", "sensors", "start")
+_FIELDS: dict[str, Any] = {
+    name: (RobotConfig.model_fields[name].annotation, ...) for name in _DRAWN
+}
+_ROBOT = create_model(
+    "RobotConfig", __doc__="One drone of an environment, as far as the page draws it.", **_FIELDS
+)
+_CONFIG: tuple[type, ...] = (CameraConfig, _ROBOT)
 _IN: tuple[type, ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
 
 
 def schema_text() -> str:
     """The schema: an object with a property for each message."""
-    answers = _definitions(_OUT, "serialization")
+    # How a configuration is serialised, its secrets left out, no schema tells.
+    answers = _definitions(_OUT, "serialization") | _definitions(_CONFIG, "validation")
     for model in answers.values():
         if "properties" in model:
             # An answer has all its fields, those of a default value included.
             model["required"] = sorted(model["properties"])
-    names = [one.__name__ for one in (*_OUT, *_IN)]
+    names = [one.__name__ for one in (*_OUT, *_CONFIG, *_IN)]
     whole = {
-        "title": "Wire",
         "type": "object",
         "additionalProperties": False,
         "required": names,
@@ -67,20 +81,23 @@ def schema_text() -> str:
 def _definitions(models: tuple[type, ...], mode: JsonSchemaMode) -> dict[str, Any]:
     _, schema = TypeAdapter.json_schemas([(model, mode, TypeAdapter(model)) for model in models])
     found: dict[str, Any] = schema["$defs"]
-    for model in found.values():
-        for field in model.get("properties", {}).values():
-            # Each would become a type of its own.
-            field.pop("title", None)
     return found
 
 
 def _plain(content: Any) -> Any:  # noqa: ANN401 - JSON
-    """Tuples as the makers of TypeScript know them: `items` instead of `prefixItems`."""
+    """A schema as the makers of TypeScript know it.
+
+    Tuples have `items` instead of `prefixItems`. No part has a title, which would be a type.
+    """
     if isinstance(content, list):
         return [_plain(one) for one in content]
     if isinstance(content, dict):
         words = {"prefixItems": "items"}
-        return {words.get(key, key): _plain(one) for key, one in content.items()}
+        return {
+            words.get(key, key): _plain(one)
+            for key, one in content.items()
+            if key != "title" or not isinstance(one, str)
+        }
     return content
 
 

@@ -1,21 +1,17 @@
 // Made from wire.schema.json by types.mjs; not to be edited.
 
 /**
- * What an account may do; each role may do what those before it may.
- */
-export type Role = "viewer" | "pilot" | "operator" | "admin";
-/**
  * What a token may be used for, within its account's role.
  */
 export type Scope = "fly" | "sense" | "compute";
 /**
- * Who is connected to a drone, and whether it answers.
- */
-export type LinkState = "unwatched" | "connecting" | "connected" | "mission" | "lost";
-/**
  * What an item means for a take-off.
  */
 export type Verdict = "good" | "warning" | "refused" | "unknown";
+/**
+ * How sure a follower is of its target in one frame.
+ */
+export type TargetState = "sure" | "likely" | "uncertain" | "unseen";
 /**
  * State of a submitted mission at the service; its drones have states of their own.
  */
@@ -45,16 +41,22 @@ export type WaypointType = "relative" | "local" | "global" | "global_relative";
 export interface Wire {
   AccountOut: AccountOut;
   Answer: Answer;
+  CameraConfig: CameraConfig;
   CommandIn: CommandIn;
   ControlsOut: ControlsOut;
+  EndMessage: EndMessage;
   FleetOut: FleetOut;
+  ItemMessage: ItemMessage;
+  LeftOutMessage: LeftOutMessage;
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
   PlaybackOut: PlaybackOut;
   PreflightOut: PreflightOut;
   RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
+  RobotConfig: RobotConfig;
   SceneryOut: SceneryOut1;
+  StateMessage: StateMessage;
   SteerIn: SteerIn;
   SurveyIn: SurveyIn;
   SurveyOut: SurveyOut;
@@ -66,7 +68,10 @@ export interface AccountOut {
   created: number;
   disabled: boolean;
   name: string;
-  role: Role;
+  /**
+   * What an account may do; each role may do what those before it may.
+   */
+  role: "viewer" | "pilot" | "operator" | "admin";
   scopes: Scope[];
   tenant: string;
 }
@@ -79,6 +84,37 @@ export interface Answer {
     [k: string]: string;
   };
   text: string;
+}
+/**
+ * The settings of a camera, from `SensorConfig.settings`.
+ */
+export interface CameraConfig {
+  depth_range: number | null;
+  gimbal: GimbalConfig | null;
+  height: number;
+  horizontal_fov: number;
+  loop: boolean;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  mount: [number, number, number];
+  path: string | null;
+  photo_interval: number | null;
+  pitch: number;
+  topic: string | null;
+  width: number;
+  yaw: number;
+  zoom: number;
+}
+/**
+ * The gimbal of a camera, which keeps it to the horizon.
+ */
+export interface GimbalConfig {
+  highest: number;
+  lowest: number;
+  max_rate: number;
+  widest: number;
 }
 /**
  * A command to one robot of a mission.
@@ -94,6 +130,12 @@ export interface ControlsOut {
   at: number;
   held: boolean;
   text: string;
+}
+/**
+ * The mission is over; nothing follows.
+ */
+export interface EndMessage {
+  kind: "end";
 }
 /**
  * The fleet, and the environment that an application's graph is built against.
@@ -116,7 +158,10 @@ export interface RobotOut {
   heard: number | null;
   id: string;
   lease: string | null;
-  link: LinkState;
+  /**
+   * Who is connected to a drone, and whether it answers.
+   */
+  link: "unwatched" | "connecting" | "connected" | "mission" | "lost";
   mission: string | null;
   mode: string | null;
   objection: string;
@@ -126,6 +171,159 @@ export interface RobotOut {
   shared: string[];
   since: number | null;
   tenant: string | null;
+}
+/**
+ * An item of one of the flight's streams.
+ */
+export interface ItemMessage {
+  blob: boolean;
+  captured: number;
+  item: PictureItem | DepthItem | TargetItem | FoundItem;
+  key: boolean;
+  kind: "item";
+  places: ([number, number, number, number, number, number] | null)[];
+  stamp: number;
+  stream: string;
+}
+/**
+ * A picture of a camera; its bytes follow the message.
+ */
+export interface PictureItem {
+  /**
+   * @minItems 1
+   * @maxItems 1
+   */
+  bytes: [number];
+  depth: boolean;
+  format: "jpeg" | "h264";
+  header: {
+    id: number;
+    source: string;
+    stamp: number;
+  };
+  is: "Picture";
+}
+/**
+ * The depth measured with a picture, as a grey PNG whose bytes follow the message.
+ */
+export interface DepthItem {
+  /**
+   * @minItems 1
+   * @maxItems 1
+   */
+  bytes: [number];
+  header: {
+    id: number;
+    source: string;
+    stamp: number;
+  };
+  is: "Depth";
+  range: number;
+}
+/**
+ * What a drone follows, in the frame that its command was made from.
+ */
+export interface TargetItem {
+  box: [number, number, number, number] | null;
+  header: {
+    id: number;
+    source: string;
+    stamp: number;
+  };
+  is: "Target";
+  state: TargetState;
+}
+/**
+ * What an analysis found in a frame.
+ */
+export interface FoundItem {
+  is: "Detections";
+  of: Detections;
+}
+/**
+ * All detections in one frame, best first, with that frame's metadata.
+ */
+export interface Detections {
+  camera: CameraModel | null;
+  header: {
+    id: number;
+    source: string;
+    stamp: number;
+  };
+  height: number;
+  items: Detection[];
+  nearest: number[][] | null;
+  odometry: Odometry | null;
+  width: number;
+}
+/**
+ * A pinhole camera bolted to a body: intrinsics in pixels, mount in metres and radians.
+ *
+ * The optical frame is x right, y down, z forward. `mount` is the camera's place in the body
+ * frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive, `roll`
+ * lowers its right side when positive.
+ */
+export interface CameraModel {
+  cx: number;
+  cy: number;
+  fx: number;
+  fy: number;
+  height: number;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  mount: [number, number, number];
+  pitch: number;
+  roll: number;
+  width: number;
+  yaw: number;
+}
+/**
+ * One object found in a frame; the box is in the frame's own pixels.
+ *
+ * Raises ValueError for key points or an appearance of another size.
+ */
+export interface Detection {
+  appearance: string | null;
+  /**
+   * @minItems 4
+   * @maxItems 4
+   */
+  box: [number, number, number, number];
+  depth: number | null;
+  keypoints: [number | null, number | null, number | null][] | null;
+  label: string;
+  score: number;
+  track_id: number | null;
+}
+/**
+ * Where the vehicle believes it is: ENU position and velocity, attitude and body rates.
+ */
+export interface Odometry {
+  pitch: number;
+  position: {
+    x: number | null;
+    y: number | null;
+    z: number | null;
+  };
+  position_sigma: number;
+  roll: number;
+  velocity: {
+    x: number | null;
+    y: number | null;
+    z: number | null;
+  };
+  yaw: number;
+  yaw_rate: number;
+}
+/**
+ * In place of an item that cannot be sent.
+ */
+export interface LeftOutMessage {
+  kind: "left_out";
+  reason: string;
+  stream: string;
 }
 /**
  * A mission and its newest state.
@@ -449,11 +647,91 @@ export interface RefusalOut {
   text: string;
 }
 /**
+ * One drone of an environment, as far as the page draws it.
+ */
+export interface RobotConfig {
+  id: string;
+  limits: LimitsConfig;
+  sensors: SensorConfig[];
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  start: [number, number, number];
+}
+/**
+ * What the drone's node clamps to, and how long it waits before it protects the drone.
+ */
+export interface LimitsConfig {
+  arrival_radius: number;
+  battery_land: number;
+  battery_return: number;
+  command_timeout: number;
+  cruise_speed: number;
+  endurance: number;
+  geofence: GeofenceConfig;
+  link_timeout: number;
+  max_acceleration: number;
+  max_climb: number;
+  max_range: number;
+  max_speed: number;
+  max_yaw_rate: number;
+  preflight_timeout: number;
+  rangefinder_clearance: number;
+  reaction_time: number;
+  return_timeout: number;
+  separation: number;
+  silence_return: number;
+  takeoff_height: number;
+  takeoff_timeout: number;
+  traffic: TrafficConfig;
+}
+/**
+ * Where the drone may be: a polygon in ENU metres, a floor and a ceiling above home.
+ */
+export interface GeofenceConfig {
+  ceiling: number;
+  floor: number;
+  margin: number;
+  no_fly: [number, number][][];
+  polygon: [number, number][];
+}
+/**
+ * Other aircraft, as the vehicle hears them (ADS-B), and what they mean in flight.
+ */
+export interface TrafficConfig {
+  action: "ignore" | "warn" | "hold" | "return" | "land";
+  distance: number;
+  height: number;
+  lookahead: number;
+  own_address: string | null;
+}
+/**
+ * One sensor. `driver` names a camera or reading; further settings go to that driver.
+ */
+export interface SensorConfig {
+  driver: string | null;
+  id: string;
+  rate: number;
+  settings: {
+    [k: string]: unknown;
+  };
+  type: "camera" | "odometry" | "gps" | "battery" | "status";
+}
+/**
  * What the map draws below a flight; empty where nothing is known.
  */
 export interface SceneryOut1 {
   shapes: ShapeOut[];
   tiles: TilesOut | null;
+}
+/**
+ * The newest state of a mission in flight.
+ */
+export interface StateMessage {
+  kind: "mission";
+  mission: MissionOut;
+  now: number;
 }
 /**
  * A velocity by hand, in the drone's level frame; it is good for a third of a second.

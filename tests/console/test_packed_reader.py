@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,6 +22,7 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
+from aerodaas.protocol.live import ItemMessage
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.live.packed_reader import PackedReader, ground_of
 from aerodaas.terrain.ground import Ground
@@ -52,7 +54,20 @@ class Stream:
 def packed(form: PictureForm, *items: Any) -> list[tuple[dict[str, Any], bytes]]:  # noqa: ANN401
     """What a watcher gets of these."""
     reader = PackedReader(Stream(*items), SOURCE, form)
-    return [found for _ in items if (found := reader.next_packed(0.1)) is not None]
+    found = [found for _ in items if (found := reader.next_packed(0.1)) is not None]
+    if form is not PictureForm.WHOLE:
+        for message, _ in found:
+            if message["kind"] == "item":
+                require_declared(message)
+    return found
+
+
+def require_declared(message: dict[str, Any]) -> None:
+    """Require that a page's message is what the wire's schema says of it."""
+    told = ItemMessage.model_validate_json(json.dumps(message)).item
+    assert message.keys() - {"seq"} <= ItemMessage.model_fields.keys()
+    fields = {one.alias or name for name, one in type(told).model_fields.items()}
+    assert message["item"].keys() == fields
 
 
 def greys(data: list[bytes]) -> list[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -12,8 +12,9 @@ from aerodaas.following.ground_point import ground_point
 from aerodaas.geometry.depth import METRE
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
-from aerodaas.messages.schema import json_of
 from aerodaas.messages.waypoints import FollowedTarget
+from aerodaas.protocol.bases import AnswerModel
+from aerodaas.protocol.live import DepthItem, PictureItem, TargetItem
 from aerodaas.terrain.ground import Ground
 
 __all__ = ["depth_picture", "packed_depth", "packed_picture", "packed_places", "packed_target"]
@@ -57,39 +58,36 @@ def _range(farthest: float) -> float:
     return next(one for one in ranges if one >= farthest)
 
 
-def packed_picture(header: Header, size: int, form: str, *, measured: bool) -> dict[str, Any]:
+def packed_picture(
+    header: Header, size: int, form: Literal["jpeg", "h264"], *, measured: bool
+) -> dict[str, Any]:
     """What a page is told of a picture.
 
     Args:
         header: Of its frame.
         size: Bytes of the picture.
-        form: `jpeg` or `h264`.
+        form: How it is encoded.
         measured: Whether the camera measured depth with it.
     """
-    return {
-        "is": "Picture",
-        "header": json_of(header),
-        "format": form,
-        "depth": measured,
-        "bytes": [size],
-    }
+    item = PictureItem.model_construct(header=header, format=form, depth=measured, bytes=(size,))
+    return _json(item)
 
 
 def packed_depth(header: Header, depth: NDArray[np.uint16]) -> tuple[dict[str, Any], bytes]:
     """A frame's depth (height x width, millimetres) as a grey PNG, with its range in metres."""
     data, reach = depth_picture(depth)
-    content = {"is": "Depth", "header": json_of(header), "range": reach, "bytes": [len(data)]}
-    return content, data
+    item = DepthItem.model_construct(header=header, range=reach, bytes=(len(data),))
+    return _json(item), data
 
 
 def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
     """What a page is told of what is followed in the frame of `header`."""
-    return {
-        "is": "Target",
-        "header": json_of(header),
-        "state": target.state.value,
-        "box": None if target.box is None else list(target.box),
-    }
+    item = TargetItem.model_construct(header=header, state=target.state, box=target.box)
+    return _json(item)
+
+
+def _json(item: AnswerModel) -> dict[str, Any]:
+    return item.model_dump(mode="json", by_alias=True)
 
 
 def packed_places(found: Detections, ground: Ground | None = None) -> dict[str, Any]:
