@@ -20,10 +20,9 @@ from standing_person import PERSON, write_flight
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import CameraModel
-from aerodaas.messages import frames as data
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
-from aerodaas.messages.frames import Header
+from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from tools.browser import Browser, Page
 
@@ -134,10 +133,9 @@ class Crowd:
 
 def test_marks_fade_are_bounded_and_vanish(browser: Browser) -> None:
     """By mission time; labels cover none of a surer one, and whose feet are cut off has no mark."""
-    kinds = (("drone/cam", "Frame"), ("drone/people", "Detections"))
+    kinds = {"drone/cam": Frame, "drone/people": Detections}
     nodes = {
-        name: SimpleNamespace(id=name, item=getattr(data, kind), dormant=False)
-        for name, kind in kinds
+        name: SimpleNamespace(id=name, item=kind, dormant=False) for name, kind in kinds.items()
     }
     with console() as (server, run):
         run.graph = SimpleNamespace(nodes=nodes, reader=Crowd)  # type: ignore[assignment]

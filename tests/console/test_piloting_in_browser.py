@@ -161,7 +161,7 @@ def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
         leave(page, watcher)
         take_over(page, watcher)
         # The browser itself tells of the area that was refused.
-        assert [one for one in page.complaints() if "409" not in one] == []
+        assert [one for one in page.complaints() if "422" not in one] == []
 
         # The page ends with the key down: the drone stands, and somebody else resumes.
         page.kill()

@@ -60,5 +60,5 @@ def test_pictures_are_shown_before_they_are_flown(width: int) -> None:
         fill(page, "width", "4")
         shows(page, "survey-plan", "of 4.0 m")
         assert page.run("document.querySelector('.survey .photos')") is None
-        assert [one for one in page.complaints() if "409" not in one] == []
+        assert [one for one in page.complaints() if "422" not in one] == []
         assert not run.commands
