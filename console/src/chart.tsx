@@ -1,7 +1,8 @@
 // A small chart of figures over mission time.
 
-import { useEffect, useRef } from "preact/hooks";
+import { useContext, useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
+import { Theme } from "./page";
 import "uplot/dist/uPlot.min.css";
 
 const HEIGHT = 110;
@@ -18,13 +19,13 @@ export interface ChartProps {
   lines: Line[];
   /** Largest figure of the vertical axis; without it, the axis fits the lines, from 0. */
   most?: number;
-  theme: string;
   /** Mission time that is marked; null for none. */
   cursor: number | null;
   onTime?: ((time: number) => void) | undefined;
 }
 
-export function Chart({ times, lines, most, theme, cursor, onTime }: ChartProps) {
+export function Chart({ times, lines, most, cursor, onTime }: ChartProps) {
+  const { shown: theme } = useContext(Theme);
   const box = useRef<HTMLDivElement>(null);
   const chart = useRef<uPlot | null>(null);
   const mark = useRef<{ time: number | null; colour: string }>({ time: cursor, colour: "" });

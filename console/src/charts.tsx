@@ -1,113 +1,93 @@
 // Small charts over mission time: of one drone, and of what the analytics scheduler decides.
 
 import { useMemo } from "preact/hooks";
-import { Chart } from "./chart";
-import type { Flight, Sample } from "./flight";
+import { Chart, type Line } from "./chart";
+import type { Flight } from "./flight";
 import { Playback } from "./playback";
 import type { AnalyticsOut } from "./wire";
 
-interface ChartsProps {
-  flight: Flight;
-  robot: string;
-  theme: string;
+/** Seconds over which rates are taken. */
+const WINDOW = 5;
+
+interface Drawn {
+  name: string;
+  unit: string;
+  lines: Line[];
+  /** Colour and text of what is told beside the name. */
+  keys: [colour: string, text: string][];
+  /** Largest figure of the vertical axis; without it, the axis fits the lines. */
+  most?: number;
 }
 
-const FIGURES: { key: "height" | "speed" | "battery"; name: string; unit: string }[] = [
-  { key: "height", name: "Height", unit: "m" },
-  { key: "speed", name: "Speed", unit: "m/s" },
-  { key: "battery", name: "Battery", unit: "%" },
-];
-
-export function Charts({ flight, robot, theme }: ChartsProps) {
-  const samples = flight.history.get(robot) ?? [];
-  const times = useMemo(() => samples.map((one) => one.time), [samples]);
+function ChartCard(props: { label: string; flight: Flight; times: number[]; charts: Drawn[] }) {
+  const { label, flight, times, charts } = props;
   return (
-    <section class="card charts" aria-label="Charts">
-      {FIGURES.map(({ key, name, unit }) => (
-        <figure key={key}>
+    <section class="card charts" aria-label={label} data-testid={label.toLowerCase()}>
+      {charts.map(({ name, unit, keys, ...chart }) => (
+        <figure key={name}>
           <figcaption>
             {name} <small>{unit}</small>
+            {keys.map(([colour, text]) => (
+              <span key={colour} class={`key ${colour}`}>
+                {text}
+              </span>
+            ))}
           </figcaption>
-          <Figure {...{ flight, samples, times, theme }} field={key} />
+          <Chart {...{ times, ...chart, ...timeOf(flight) }} />
         </figure>
       ))}
     </section>
   );
 }
 
-function Figure(props: {
-  flight: Flight;
-  samples: Sample[];
-  times: number[];
-  theme: string;
-  field: "height" | "speed" | "battery";
-}) {
-  const { flight, samples, times, theme, field } = props;
-  const values = useMemo(() => {
-    const factor = field === "battery" ? 100 : 1;
-    return samples.map((one) => (one[field] === null ? null : one[field] * factor));
-  }, [samples, field]);
-  const lines = [{ values, colour: "--accent" }];
-  const most = field === "battery" ? { most: 100 } : {};
-  return <Chart {...{ times, lines, theme, ...most, ...timeOf(flight) }} />;
+export function Charts({ flight, robot }: { flight: Flight; robot: string }) {
+  const samples = flight.history.get(robot) ?? [];
+  const [times, charts] = useMemo(() => {
+    const drawn = (name: string, unit: string, values: (number | null)[]): Drawn => {
+      return { name, unit, keys: [], lines: [{ values, colour: "--accent" }] };
+    };
+    const percent = samples.map(({ battery }) => battery && 100 * battery);
+    const all: Drawn[] = [
+      drawn("Height", "m", samples.map((one) => one.height)),
+      drawn("Speed", "m/s", samples.map((one) => one.speed)),
+      { ...drawn("Battery", "%", percent), most: 100 },
+    ];
+    return [samples.map((one) => one.time), all];
+  }, [samples]);
+  return <ChartCard label="Charts" {...{ flight, times, charts }} />;
 }
 
-/** Seconds over which rates are taken. */
-const WINDOW = 5;
-
-export function AnalyticsCharts({ flight, theme }: { flight: Flight; theme: string }) {
+export function AnalyticsCharts({ flight }: { flight: Flight }) {
   const rows = flight.analytics;
   const rates = useMemo(() => ratesOf(rows), [rows]);
   const now = flight.source instanceof Playback ? flight.source.sums() : rows.at(-1);
   if (rows.length === 0) return null;
-  const shared = { times: rates.times, theme, ...timeOf(flight) };
-  const tasks = (now?.in_time ?? 0) + (now?.late ?? 0) + (now?.dropped ?? 0);
-  const placed = (now?.edge ?? 0) + (now?.cloud ?? 0);
-  return (
-    <section class="card charts" aria-label="Analytics" data-testid="analytics">
-      <figure>
-        <figcaption>
-          Tasks <small>a second</small>{" "}
-          <Key colour="good" text={`${now?.in_time ?? 0} in time`} />
-          <Key colour="warn" text={`${now?.late ?? 0} late`} />
-          <Key colour="bad" text={`${now?.dropped ?? 0} dropped`} />
-        </figcaption>
-        <Chart
-          {...shared}
-          lines={[
-            { values: rates.inTime, colour: "--good" },
-            { values: rates.late, colour: "--warn" },
-            { values: rates.dropped, colour: "--bad" },
-          ]}
-        />
-      </figure>
-      <figure>
-        <figcaption>
-          On the edge <small>%</small>{" "}
-          <Key colour="accent" text={`${now?.edge ?? 0} edge, ${now?.cloud ?? 0} cloud`} />
-          {placed === 0 && tasks > 0 && " none has run"}
-        </figcaption>
-        <Chart {...shared} lines={[{ values: rates.edge, colour: "--accent" }]} most={100} />
-      </figure>
-      <figure>
-        <figcaption>
-          Utility <Key colour="r0" text={`${(now?.qos ?? 0).toFixed(0)} QoS`} />
-          <Key colour="r1" text={`${(now?.qoe ?? 0).toFixed(0)} QoE`} />
-        </figcaption>
-        <Chart
-          {...shared}
-          lines={[
-            { values: rows.map((one) => one.qos), colour: "--r0" },
-            { values: rows.map((one) => one.qoe), colour: "--r1" },
-          ]}
-        />
-      </figure>
-    </section>
-  );
-}
-
-function Key({ colour, text }: { colour: string; text: string }) {
-  return <span class={`key ${colour}`}>{text}</span>;
+  const sums = now ?? { in_time: 0, late: 0, dropped: 0, edge: 0, cloud: 0, qos: 0, qoe: 0 };
+  const { in_time, late, dropped, edge, cloud, qos, qoe } = sums;
+  const idle = edge + cloud === 0 && in_time + late + dropped > 0;
+  const line = (values: (number | null)[], colour: string): Line => ({ values, colour: `--${colour}` });
+  const charts: Drawn[] = [
+    {
+      name: "Tasks",
+      unit: "per second",
+      keys: [["good", `${in_time} in time`], ["warn", `${late} late`], ["bad", `${dropped} dropped`]],
+      lines: [line(rates.inTime, "good"), line(rates.late, "warn"), line(rates.dropped, "bad")],
+    },
+    {
+      name: "On the edge",
+      unit: "%",
+      keys: [["accent", `${edge} edge, ${cloud} cloud${idle ? ": no task has run" : ""}`]],
+      lines: [line(rates.edge, "accent")],
+      most: 100,
+    },
+    {
+      name: "Utility",
+      unit: "",
+      keys: [["r0", `${qos.toFixed(0)} QoS`], ["r1", `${qoe.toFixed(0)} QoE`]],
+      lines: [line(rows.map((one) => one.qos), "r0"), line(rows.map((one) => one.qoe), "r1")],
+    },
+  ];
+  return <ChartCard label="Analytics" times={rates.times} {...{ flight, charts }} />;
 }
 
 /** What a chart marks: the moment of a recording, which a click changes. */

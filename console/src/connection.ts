@@ -1,11 +1,16 @@
-// The way to the server: requests with the token, and a live socket that comes back by itself.
+// Connection to the server: requests with the token, and a live socket that reconnects.
 
-import type { RefusalOut } from "./wire";
+import { useEffect, useRef, useState } from "preact/hooks";
+import type { EndMessage, ItemMessage, LeftOutMessage, RefusalOut, StateMessage } from "./wire";
+
+export type LiveMessage = StateMessage | ItemMessage | LeftOutMessage | EndMessage;
 
 const TOKEN = "aerodaas.token";
 const PAUSES = [250, 500, 1000, 2000, 4000];
+/** Milliseconds after which a polled request counts as unanswered. */
+const TIMEOUT = 10000;
 
-/** Change words of the address' fragment; null takes one out. */
+/** Change words of the address' fragment; null removes one. */
 export function writeFragment(words: Record<string, string | null>): void {
   const fragment = new URLSearchParams(location.hash.slice(1));
   for (const [name, word] of Object.entries(words)) {
@@ -21,8 +26,8 @@ export function readFragment(name: string): string | null {
   return new URLSearchParams(location.hash.slice(1)).get(name);
 }
 
-/** The token of the address' fragment, which is taken out of sight; else the one kept in this tab. */
-export function takeToken(): string {
+/** The token of this tab; one in the address' fragment replaces it and leaves the address. */
+export function token(): string {
   const given = readFragment("token");
   if (given) {
     keepToken(given);
@@ -31,8 +36,8 @@ export function takeToken(): string {
   return sessionStorage.getItem(TOKEN) ?? "";
 }
 
-export function keepToken(token: string): void {
-  sessionStorage.setItem(TOKEN, token);
+export function keepToken(text: string): void {
+  sessionStorage.setItem(TOKEN, text);
 }
 
 export class Refused extends Error {
@@ -44,24 +49,18 @@ export class Refused extends Error {
   }
 }
 
-/** Ask the server; throws Refused with its reason. `signal` gives the request up. */
-export async function ask<T>(
-  path: string,
-  token: string,
-  body?: unknown,
-  signal?: AbortSignal,
-): Promise<T> {
-  return (await (await answered(path, token, body, signal)).json()) as T;
+export function messageOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** Ask the server; throws Refused with its reason. `signal` cancels the request. */
+export async function ask<T>(path: string, body?: unknown, signal?: AbortSignal): Promise<T> {
+  return (await (await answered(path, body, signal)).json()) as T;
 }
 
 /** As `ask`, for an answer of any kind. */
-export async function answered(
-  path: string,
-  token: string,
-  body?: unknown,
-  signal?: AbortSignal,
-): Promise<Response> {
-  const headers: Record<string, string> = { Authorization: `Bearer ${token}` };
+export async function answered(path: string, body?: unknown, signal?: AbortSignal): Promise<Response> {
+  const headers: Record<string, string> = { Authorization: `Bearer ${token()}` };
   const request: RequestInit = { headers, cache: "no-store", signal: signal ?? null };
   if (body !== undefined) {
     headers["Content-Type"] = "application/json";
@@ -72,82 +71,127 @@ export async function answered(
     throw new Refused(0, "the server does not answer");
   });
   if (answer.ok) return answer;
-  const said = (await answer.json().catch(() => null)) as RefusalOut | null;
-  throw new Refused(answer.status, said?.text ?? `the server answered ${answer.status}`);
+  const refusal = (await answer.json().catch(() => null)) as RefusalOut | null;
+  throw new Refused(answer.status, refusal?.text ?? `the server answered ${answer.status}`);
 }
 
-export interface Ears {
-  text(message: Record<string, unknown>): void;
-  blob?(message: Record<string, unknown>, data: ArrayBuffer): void | Promise<void>;
-  up(connected: boolean): void;
+export interface Polled<T> {
+  answer: T | null;
+  /** When the newest answer came, by this machine's clock. */
+  at: number;
+  /** Why the newest request failed; null where it did not. */
+  error: unknown;
+}
+
+/**
+ * Ask while `key` is not empty, anew for another key. `pause` returns the milliseconds until the next
+ * request, given the newest answer, which is null where that failed; null ends it.
+ */
+export function usePolled<T>(
+  key: string,
+  request: (signal: AbortSignal) => Promise<T>,
+  pause: (answer: T | null) => number | null,
+): Polled<T> {
+  const [polled, setPolled] = useState<Polled<T> & { key: string }>();
+  const newest = useRef({ request, pause });
+  newest.current = { request, pause };
+  useEffect(() => {
+    if (!key) return;
+    let gone = false;
+    let timer = 0;
+    const poll = async () => {
+      let answer: T | null = null;
+      try {
+        answer = await newest.current.request(AbortSignal.timeout(TIMEOUT));
+        if (!gone) setPolled({ key, answer, at: Date.now(), error: null });
+      } catch (error) {
+        const none = { key, answer: null, at: 0 };
+        if (!gone) setPolled((last) => ({ ...(last?.key === key ? last : none), error }));
+      }
+      const wait = newest.current.pause(answer);
+      if (!gone && wait !== null) timer = setTimeout(() => void poll(), wait);
+    };
+    void poll();
+    return () => {
+      gone = true;
+      clearTimeout(timer);
+      setPolled(undefined);
+    };
+  }, [key]);
+  return polled?.key === key ? polled : { answer: null, at: 0, error: null };
+}
+
+export interface SocketListener {
+  onMessage(message: LiveMessage, blob: ArrayBuffer | null): void;
+  onConnected?(connected: boolean): void;
 }
 
 /** A WebSocket with the token, which a browser sends as a subprotocol. */
-export function openSocket(path: string, token: string): WebSocket {
+export function openSocket(path: string): WebSocket {
   const url = new URL(path, document.baseURI);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  return new WebSocket(url, ["aerodaas", `bearer.${token}`]);
+  return new WebSocket(url, ["aerodaas", `bearer.${token()}`]);
 }
 
-/** A WebSocket that is made again, with growing pauses, until it is closed. */
+/** A WebSocket that reconnects, with growing pauses, until it is closed. */
 export class LiveSocket {
   private socket: WebSocket | undefined;
-  private tries = 0;
+  private attempts = 0;
   private timer = 0;
   private closed = false;
-  private head: Record<string, unknown> | undefined;
+  /** The message whose blob comes next. */
+  private head: LiveMessage | undefined;
 
   constructor(
     private readonly path: string,
-    private readonly token: string,
-    private readonly ears: Ears,
+    private readonly listener: SocketListener,
   ) {
     this.open();
-    addEventListener("online", this.again);
+    addEventListener("online", this.reconnect);
   }
 
   close(): void {
     this.closed = true;
     clearTimeout(this.timer);
-    removeEventListener("online", this.again);
+    removeEventListener("online", this.reconnect);
     this.socket?.close();
   }
 
-  private readonly again = (): void => {
+  private readonly reconnect = (): void => {
     if (this.socket === undefined && !this.closed) this.open();
   };
 
   private open(): void {
     clearTimeout(this.timer);
-    const socket = openSocket(this.path, this.token);
+    const socket = openSocket(this.path);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.tries = 0;
-      this.ears.up(true);
+      this.attempts = 0;
+      this.listener.onConnected?.(true);
     };
-    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.take(event.data);
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
     socket.onclose = () => {
       if (this.socket !== socket) return;
       this.socket = undefined;
       this.head = undefined;
-      this.ears.up(false);
+      this.listener.onConnected?.(false);
       if (this.closed) return;
-      const pause = PAUSES[Math.min(this.tries, PAUSES.length - 1)] ?? 4000;
-      this.tries += 1;
-      this.timer = setTimeout(this.again, pause);
+      const pause = PAUSES[Math.min(this.attempts, PAUSES.length - 1)] ?? 4000;
+      this.attempts += 1;
+      this.timer = setTimeout(this.reconnect, pause);
     };
     this.socket = socket;
   }
 
-  private take(data: string | ArrayBuffer): void {
-    if (typeof data === "string") {
-      const message = JSON.parse(data) as Record<string, unknown>;
-      this.head = message["blob"] === true ? message : undefined;
-      if (message["kind"] === "end") this.closed = true;
-      if (this.head === undefined) this.ears.text(message);
-    } else if (this.head !== undefined) {
-      void this.ears.blob?.(this.head, data);
+  private receive(data: string | ArrayBuffer): void {
+    if (typeof data !== "string") {
+      if (this.head) this.listener.onMessage(this.head, data);
       this.head = undefined;
+      return;
     }
+    const message = JSON.parse(data) as LiveMessage;
+    if (message.kind === "end") this.closed = true;
+    this.head = message.kind === "item" && message.blob ? message : undefined;
+    if (this.head === undefined) this.listener.onMessage(message, null);
   }
 }

@@ -1,9 +1,12 @@
-// The state of one mission as the page knows it, live or recorded: newest status, trails, charts.
+// What a page knows of drones, live, of a provider's fleet or recorded: states, trails, charts, commands.
 
-import { Refused, ask, openSocket } from "./connection";
+import { useCallback, useEffect, useState } from "preact/hooks";
+import { AlertLog } from "./alerts";
+import { Refused, ask, messageOf, openSocket } from "./connection";
 import { GroundMarks } from "./ground";
 import type { Spot } from "./place";
-import type { Past, Source } from "./source";
+import type { Snapshot, Source } from "./source";
+import { wordsOf } from "./widgets";
 import type {
   AnalyticsOut,
   Answer,
@@ -11,30 +14,39 @@ import type {
   MissionOut,
   NavigationIn,
   RearrangeIn,
+  RobotOut,
   StatusOut,
-  SurveyIn,
-  SurveyOut,
 } from "./wire";
 
 const TRAIL = 3000;
+/** Metres between two places of a trail. */
 const STEP = 0.05;
 const HISTORY = 1200;
+/** Mission seconds between two rows of the analytics' sums. */
 const SUMS = 0.5;
-const STALE = 2500;
-/** States of a drone that is not in the air. */
-export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
+/** Milliseconds of silence after which what is shown counts as old; a fleet is polled. */
+const STALE = { live: 2500, fleet: 5000, recording: Infinity };
+/** Milliseconds of silence after which a fleet's flying drone is shown as old. */
+const STALE_DRONE = 5000;
 const CONFIRMING = 30000;
 /** Milliseconds after which a command counts as one without an answer. */
 const ANSWER = 20000;
+const MOST_ORDERS = 20;
+/** States of a drone that is not in the air. */
+export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
+/** States in which no waypoint is flown to any more. */
+const ENDING = new Set(["returning", "landing", "landed", "aborted"]);
+const OVER = new Set<MissionOut["phase"]>(["landed", "failed", "cancelled", "refused"]);
 
 export type Word = CommandIn["command"];
-/** What the buttons call the commands. */
-export const NAMES: Record<Word, string> = {
-  pause: "Hold",
-  resume: "Resume",
-  "return-home": "Return",
-  clear: "Stop",
-  land: "Land",
+
+/** What the buttons call the commands, and whether a drone was seen to obey. */
+export const COMMANDS: Record<Word, { name: string; obeyed(status: StatusOut): boolean }> = {
+  pause: { name: "Hold", obeyed: ({ state }) => state === "paused" },
+  resume: { name: "Resume", obeyed: ({ state }) => state !== "paused" },
+  "return-home": { name: "Return", obeyed: ({ state }) => ENDING.has(state) && state !== "aborted" },
+  clear: { name: "Stop", obeyed: ({ pending, target }) => pending.length === 0 && target === null },
+  land: { name: "Land", obeyed: ({ state }) => ENDING.has(state) && state !== "returning" },
 };
 
 export interface Sample {
@@ -44,90 +56,30 @@ export interface Sample {
   battery: number | null;
 }
 
+/** Stages of a command, the least settled first. */
+const STAGES = ["refused", "unanswered", "asked", "accepted", "unconfirmed", "done"] as const;
+export type Stage = (typeof STAGES)[number];
+
+/** A command to one drone or several, with what became of it. */
 export interface Order {
   id: number;
-  robot: string;
   what: string;
-  /** asked, accepted by the drone, done as seen in its state, refused with a reason, or without an
-   *  answer. */
-  stage: "asked" | "accepted" | "done" | "refused" | "unconfirmed" | "unanswered";
-  text: string;
   at: number;
-  took: number | null;
-  seen: (status: StatusOut) => string | null;
+  drones: { robot: string; stage: Stage; text: string; seconds: number | null }[];
+  /** What was seen of the drone by which it obeyed; null before. */
+  seen(status: StatusOut): string | null;
 }
 
-export interface Alert {
-  id: number;
-  /** Whose it is, where several flights are shown; empty for the one that is. */
-  source: string;
-  kind: string;
-  text: string;
-  count: number;
-  acknowledged: boolean;
+/** The stage of the drone that is least far. */
+export function stageOf({ drones }: Order): Stage {
+  return STAGES.find((stage) => drones.some((one) => one.stage === stage)) ?? "done";
 }
 
-/** States in which no waypoint is flown to any more: the mission's state machine leaves them for the
- *  ground alone. */
-const ENDING = new Set(["returning", "landing", "landed", "aborted"]);
-/** Whether a drone was seen to obey. */
-export const SEEN: Record<Word, (status: StatusOut) => boolean> = {
-  pause: (status) => status.state === "paused",
-  resume: (status) => status.state !== "paused",
-  clear: (status) => status.pending.length === 0 && status.target === null,
-  "return-home": ({ state }) => ENDING.has(state) && state !== "aborted",
-  land: (status) => ["landing", "landed", "aborted"].includes(status.state),
-};
-
-/** Alerts by which a flight records the commands that it was given. */
-export const COMMAND_KIND = "console_command";
-export const MOST_ALERTS = 100;
-
-/** Alerts, newest first; the commands that a flight was given are a list of their own. */
-export class AlertLog {
-  alerts: Alert[] = [];
-  commands: string[] = [];
-  private told = new Map<string, string[]>();
-
-  /** Take the newest alerts that a server tells of a source, oldest first; those that it told before
-   *  are known by where they overlap. */
-  take(texts: string[], source = ""): void {
-    const told = this.told.get(source) ?? [];
-    let shared = Math.min(texts.length, told.length);
-    const same = (count: number): boolean =>
-      told.slice(-count).every((text, place) => text === texts[place]);
-    while (shared > 0 && !same(shared)) shared -= 1;
-    for (const line of texts.slice(shared)) {
-      const [kind = "", ...rest] = line.split(": ");
-      this.add(kind, rest.join(": ") || line, source);
-    }
-    this.told.set(source, texts);
-  }
-
-  private add(kind: string, text: string, source: string): void {
-    if (kind === COMMAND_KIND) {
-      this.commands = [text, ...this.commands].slice(0, MOST_ALERTS);
-      return;
-    }
-    const before = this.alerts.find(
-      (one) => one.kind === kind && one.text === text && one.source === source,
-    );
-    const id = (this.alerts[0]?.id ?? 0) + 1;
-    const newest: Alert = { id, source, kind, text, count: 1, acknowledged: false };
-    if (before && !before.acknowledged) before.count += 1;
-    else this.alerts = [newest, ...this.alerts].slice(0, MOST_ALERTS);
-  }
-
-  acknowledge(id: number | null): void {
-    for (const one of this.alerts) if (id === null || one.id === id) one.acknowledged = true;
-  }
-}
-
-/** Milliseconds by which the viewer's clock is ahead of the server's, as far as messages tell. */
+/** Milliseconds by which the viewer's clock is ahead of the server's, as far as messages show. */
 export class ClockOffset {
   private least = Infinity;
 
-  take(serverNs: number): void {
+  receive(serverNs: number): void {
     this.least = Math.min(this.least, Date.now() - serverNs / 1e6);
   }
 
@@ -136,10 +88,24 @@ export class ClockOffset {
   }
 }
 
+/** A drone as the map draws it. */
+export interface Vehicle {
+  id: string;
+  /** What its mission says; undefined between missions. */
+  status: StatusOut | undefined;
+  position: Spot | null;
+  trail: Spot[];
+  stale: boolean;
+  /** Class of its colour. */
+  tone: string;
+}
+
 export class Flight {
-  mission: MissionOut;
+  missions: MissionOut[] = [];
+  robots: RobotOut[] = [];
   connected = false;
   over = false;
+  /** When the state came that is shown, by this machine's clock. */
   heard = Date.now();
   trails = new Map<string, Spot[]>();
   history = new Map<string, Sample[]>();
@@ -148,35 +114,27 @@ export class Flight {
   /** What the analytics scheduler had done by each time. */
   analytics: AnalyticsOut[] = [];
   readonly clock = new ClockOffset();
-  /** Where what was seen stands. */
+  /** Where detected objects stand. */
   readonly marks = new GroundMarks();
-  private orderCount = 0;
 
   constructor(
-    mission: MissionOut,
+    first: MissionOut[],
     readonly source: Source,
-    readonly token: string,
-    private readonly changed: () => void,
+    readonly changed: () => void,
   ) {
-    this.mission = mission;
-    this.take(mission);
+    this.receive({ missions: first, robots: [], now: null });
     source.follow({
-      mission: (told, now) => {
-        this.clock.take(now);
-        this.take(told);
-        this.changed();
+      onState: (snapshot) => {
+        this.receive(snapshot);
+        changed();
       },
-      moment: (told, past) => {
-        this.show(told, past);
-        this.changed();
-      },
-      end: () => {
+      onEnd: () => {
         this.over = true;
-        this.changed();
+        changed();
       },
-      up: (connected) => {
+      onConnected: (connected) => {
         this.connected = connected;
-        this.changed();
+        changed();
       },
     });
   }
@@ -185,187 +143,234 @@ export class Flight {
     this.source.close();
   }
 
-  /** Whether what is shown was recorded. */
-  get recorded(): boolean {
-    return this.source.recorded;
+  /** The mission that is shown, where only one is. */
+  get mission(): MissionOut {
+    return this.missions[0] as MissionOut;
   }
 
-  /** Whether what is shown may not be so any more. */
+  get recorded(): boolean {
+    return this.source.kind === "recording";
+  }
+
+  /** Whether what is shown may be out of date. */
   get stale(): boolean {
-    return !this.recorded && !this.over && (!this.connected || Date.now() - this.heard > STALE);
+    const silent = Date.now() - this.heard > STALE[this.source.kind];
+    return !this.recorded && !this.over && (!this.connected || silent);
   }
 
   /** Mission seconds of what is shown. */
   get now(): number {
-    return Math.max(...Object.values(this.mission.status).map((status) => status.time), 0);
+    return Math.max(...this.statuses.map((status) => status.time), 0);
   }
 
-  /** Take what was found in a picture. */
-  see(message: Record<string, unknown>): void {
-    this.marks.take(message);
-    // Of a live flight, the next state draws it.
-    if (this.recorded) this.changed();
+  get statuses(): StatusOut[] {
+    return this.vehicles().flatMap(({ status }) => status ?? []);
+  }
+
+  /** The mission that flies a robot. */
+  missionOf(robot: string): MissionOut | undefined {
+    if (this.source.kind !== "fleet") return this.mission;
+    return this.missions.find((one) => one.phase === "flying" && concerns(one, robot));
   }
 
   status(robot: string): StatusOut | undefined {
-    return this.mission.status[robot];
+    return this.missionOf(robot)?.status[robot];
   }
 
-  command(robot: string, command: Word): void {
-    const body: CommandIn = { robot, command };
-    this.give(robot, NAMES[command], "commands", body, (status) =>
-      SEEN[command](status) ? status.state.replace("_", " ") : null,
+  /** Milliseconds since a robot was heard; null if it never was. */
+  age(robot: string): number | null {
+    const known = this.robots.find((one) => one.id === robot)?.heard ?? null;
+    const heard = this.missionOf(robot)?.told[robot] ?? known;
+    return heard === null ? null : this.clock.age(heard * 1e9);
+  }
+
+  vehicles(): Vehicle[] {
+    if (this.source.kind !== "fleet") {
+      return this.mission.robots.map((id, number) => this.vehicle(id, null, `r${number % 6}`));
+    }
+    return this.robots.map((robot) => {
+      const status = this.status(robot.id);
+      return this.vehicle(robot.id, robot.position, robot.link === "lost" ? "bad" : toneOf(status));
+    });
+  }
+
+  private vehicle(id: string, parked: Spot | null, tone: string): Vehicle {
+    const status = this.status(id);
+    const position = status ? spotOf(status) : parked;
+    const silent = this.source.kind === "fleet" && (this.age(id) ?? 0) > STALE_DRONE;
+    const stale = this.stale || (status !== undefined && silent);
+    return { id, status, position, trail: this.trails.get(id) ?? [], stale, tone };
+  }
+
+  command(robots: string[], command: Word): void {
+    const { name, obeyed } = COMMANDS[command];
+    this.order(robots, name, "commands", (robot): CommandIn => ({ robot, command }), (status) =>
+      obeyed(status) ? wordsOf(status.state) : null,
     );
   }
 
-  visit(navigation: NavigationIn): void {
-    const waypoint = navigation.waypoints[0];
-    const what = `${waypoint.id}: ${waypoint.x.toFixed(1)} E, ${waypoint.y.toFixed(1)} N`;
-    this.fly(navigation, what, (status) =>
-      status.visited.includes(waypoint.id) ? "visited" : null,
-    );
-  }
-
-  /** Add waypoints; `seen` tells from the drone's status when that has taken effect. */
+  /** Add waypoints; `seen` has what shows in the drone's status that this has taken effect. */
   fly(navigation: NavigationIn, what: string, seen: Order["seen"]): void {
-    this.give(navigation.robot, what, "navigation", navigation, seen);
+    this.order([navigation.robot], what, "navigation", () => navigation, seen);
   }
 
   rearrange(change: RearrangeIn, what: string, seen: Order["seen"]): void {
-    this.give(change.robot, what, "plan", change, seen);
-  }
-
-  /** Plan a survey; nothing is flown. Throws Refused with the reason. */
-  survey(wanted: SurveyIn): Promise<SurveyOut> {
-    return ask<SurveyOut>(`v1/missions/${this.mission.id}/survey`, this.token, wanted);
+    this.order([change.robot], what, "plan", () => change, seen);
   }
 
   /** The connection by which a robot is flown by hand. */
   controls(robot: string): WebSocket {
-    const query = new URLSearchParams({ robot });
-    return openSocket(`v1/missions/${this.mission.id}/controls?${query}`, this.token);
+    return openSocket(`v1/missions/${this.mission.id}/controls?${new URLSearchParams({ robot })}`);
   }
 
-  acknowledge(id: number | null): void {
+  readonly acknowledge = (id: number | null): void => {
     this.log.acknowledge(id);
     this.changed();
-  }
+  };
 
-  private give(
-    robot: string,
+  private order(
+    robots: string[],
     what: string,
     route: string,
-    body: CommandIn | NavigationIn | RearrangeIn,
+    body: (robot: string) => CommandIn | NavigationIn | RearrangeIn,
     seen: Order["seen"],
   ): void {
-    const order: Order = {
-      id: (this.orderCount += 1),
-      robot,
-      what,
-      stage: "asked",
-      text: "",
-      at: Date.now(),
-      took: null,
-      seen,
-    };
-    this.orders = [order, ...this.orders].slice(0, 20);
+    const drones = robots.map((robot) => ({ robot, stage: "asked" as Stage, text: "", seconds: null }));
+    const order: Order = { id: (this.orders[0]?.id ?? 0) + 1, what, at: Date.now(), drones, seen };
+    this.orders = [order, ...this.orders].slice(0, MOST_ORDERS);
     this.changed();
-    const path = `v1/missions/${this.mission.id}/${route}`;
-    ask<Answer>(path, this.token, body, AbortSignal.timeout(ANSWER))
-      .then((answer) => {
-        if (order.stage === "asked") order.stage = answer.accepted ? "accepted" : "refused";
-        const each = Object.entries(answer.refused).map(([id, why]) => `${id}: ${why}`);
-        order.text = [answer.text, ...each].filter(Boolean).join("; ");
-      })
-      .catch((error: unknown) => {
-        const lost = error instanceof Refused && error.status === 0;
-        order.stage = lost ? "unanswered" : "refused";
-        order.text = error instanceof Refused ? error.message : String(error);
-      })
-      .finally(() => this.changed());
+    for (const one of drones) {
+      const path = `v1/missions/${this.missionOf(one.robot)?.id}/${route}`;
+      ask<Answer>(path, body(one.robot), AbortSignal.timeout(ANSWER))
+        .then((answer) => {
+          if (one.stage === "asked") one.stage = answer.accepted ? "accepted" : "refused";
+          const each = Object.entries(answer.refused).map(([id, why]) => `${id}: ${why}`);
+          one.text = [answer.text, ...each].filter(Boolean).join("; ");
+        })
+        .catch((error: unknown) => {
+          one.stage = error instanceof Refused && error.status === 0 ? "unanswered" : "refused";
+          one.text = messageOf(error);
+        })
+        .finally(() => this.changed());
+    }
   }
 
-  /** Show a moment of a recording, with what came before it. */
-  private show(mission: MissionOut, past: Past): void {
-    this.mission = mission;
-    this.over = false;
-    Object.assign(this, past);
-  }
-
-  private take(mission: MissionOut): void {
-    this.mission = mission;
-    this.heard = this.newest(mission);
-    this.over = ["landed", "failed", "cancelled", "refused"].includes(mission.phase);
-    for (const [robot, status] of Object.entries(mission.status)) this.follow(robot, status);
-    const sums = mission.analytics;
+  private receive({ missions, robots, now, past }: Snapshot): void {
+    if (now !== null) this.clock.receive(now);
+    this.missions = missions;
+    this.robots = robots;
+    if (past) {
+      Object.assign(this, past, { over: false });
+      return;
+    }
+    const fleet = this.source.kind === "fleet";
+    this.over = !fleet && OVER.has(this.mission.phase);
+    for (const { id, status, position, trail } of this.vehicles()) {
+      // A fleet's trails are those of the missions in flight.
+      if (!status) this.trails.delete(id);
+      else this.extend(id, status, position, trail);
+    }
+    const ages = fleet ? [] : this.flying().map(({ id }) => this.age(id) ?? 0);
+    // A server repeats what it knows of a flight whose process hangs.
+    this.heard = Date.now() - Math.max(0, ...ages);
+    const sums = fleet ? null : this.mission.analytics;
     if (sums && sums.time >= (this.analytics.at(-1)?.time ?? -SUMS) + SUMS) {
       this.analytics = [...this.analytics, sums].slice(-HISTORY);
     }
-    this.log.take(mission.alerts);
+    for (const one of missions) {
+      if (!fleet) this.log.receive(one.alerts);
+      else if (one.phase === "flying") this.log.receive(one.alerts, one.name);
+    }
     for (const order of this.orders) this.confirm(order);
   }
 
-  /** When every drone in the air had told something: a server repeats what it knows of a flight
-   *  whose process hangs. */
-  private newest(mission: MissionOut): number {
-    const ages = Object.entries(mission.told)
-      .filter(([robot]) => !GROUNDED.has(mission.status[robot]?.state ?? "idle"))
-      .map(([, moment]) => this.clock.age(moment * 1e9) ?? 0);
-    return Date.now() - Math.max(0, ...ages);
+  /** The drones in the air. */
+  flying(): Vehicle[] {
+    return this.vehicles().filter(({ status }) => !GROUNDED.has(status?.state ?? "idle"));
   }
 
-  private follow(robot: string, status: StatusOut): void {
-    const [east, north, up] = status.position ?? [];
-    if (east != null && north != null) {
-      const trail = this.trails.get(robot) ?? [];
-      const spot: Spot = [east, north, up ?? 0];
-      if (shifted(trail.at(-1), spot)) trail.push(spot);
+  private extend(robot: string, status: StatusOut, position: Spot | null, trail: Spot[]): void {
+    if (position && isStep(trail.at(-1), position)) {
+      trail.push(position);
       this.trails.set(robot, trail.length > TRAIL ? trail.filter((_, n) => n % 2 === 0) : trail);
     }
     const samples = this.history.get(robot) ?? [];
-    const newest = samples[samples.length - 1];
-    if (!newest || status.time > newest.time + 0.1) {
-      samples.push({
-        time: status.time,
-        height: up ?? null,
-        speed: speedOf(status),
-        battery: status.battery,
-      });
-    }
-    this.history.set(robot, samples.slice(-HISTORY));
+    const newest = samples.at(-1);
+    if (newest && status.time <= newest.time + 0.1) return;
+    const { time, battery } = status;
+    const sample = { time, height: position?.[2] ?? null, speed: speedOf(status), battery };
+    this.history.set(robot, [...samples, sample].slice(-HISTORY));
   }
 
   private confirm(order: Order): void {
-    const status = this.mission.status[order.robot];
-    if (!status || order.stage !== "accepted") return;
-    const seen = order.seen(status);
-    if (seen !== null) {
-      order.stage = "done";
-      order.text = seen;
-      order.took = Date.now() - order.at;
-    } else if (this.over && Date.now() - order.at > CONFIRMING) {
-      order.stage = "unconfirmed";
+    for (const one of order.drones) {
+      if (one.stage !== "accepted") continue;
+      const status = this.status(one.robot);
+      // A fleet's drone that has no state any more has ended its mission.
+      const ended = this.source.kind === "fleet" ? "its mission is over" : null;
+      const seen = status ? order.seen(status) : ended;
+      if (seen !== null) {
+        Object.assign(one, { stage: "done", text: seen, seconds: (Date.now() - order.at) / 1000 });
+      } else if (this.over && Date.now() - order.at > CONFIRMING) {
+        one.stage = "unconfirmed";
+      }
     }
   }
 }
 
-/** Whether a place is far enough from the last one of a trail to be one of its own. */
-export function shifted(last: Spot | undefined, [east, north, up]: Spot): boolean {
+/** Follow a source, drawing again at each change; null before the first one. */
+export function useFlight(key: string, first: MissionOut[], open: () => Source): Flight | null {
+  const [, draw] = useState(0);
+  const [flight, setFlight] = useState<Flight | null>(null);
+  const changed = useCallback(() => draw((count) => count + 1), []);
+  useEffect(() => {
+    const opened = new Flight(first, open(), changed);
+    setFlight(opened);
+    // Silence has to show, too.
+    const timer = setInterval(changed, 500);
+    return () => {
+      clearInterval(timer);
+      opened.close();
+    };
+  }, [key, changed]);
+  return flight;
+}
+
+/** Whether a mission flies a robot, or is to; one that is attached to another one does not. */
+export function concerns({ attach, robots }: MissionOut, robot: string): boolean {
+  return attach === null && robots.includes(robot);
+}
+
+/** Where a drone is; null while that is not known. */
+export function spotOf({ position }: Pick<StatusOut, "position">): Spot | null {
+  const [east, north, up] = position ?? [];
+  return east == null || north == null ? null : [east, north, up ?? 0];
+}
+
+/** Whether a place is far enough from the last one of a trail to be added. */
+export function isStep(last: Spot | undefined, [east, north, up]: Spot): boolean {
   return !last || Math.hypot(last[0] - east, last[1] - north, last[2] - up) >= STEP;
 }
 
 /** Whether a drone goes home, lands or has landed: its plan is over, whatever is left of it. */
-export function ending({ state }: StatusOut): boolean {
+export function isEnding({ state }: StatusOut): boolean {
   return ENDING.has(state);
 }
 
 /** Waypoints that lie ahead, the one being flown to first. */
 export function aheadOf(status: StatusOut): string[] {
-  if (ending(status)) return [];
+  if (isEnding(status)) return [];
   return status.target === null ? status.pending : [status.target, ...status.pending];
 }
 
-export function speedOf(status: Pick<StatusOut, "velocity">): number | null {
-  const [east, north, up] = status.velocity ?? [];
+export function speedOf({ velocity }: Pick<StatusOut, "velocity">): number | null {
+  const [east, north, up] = velocity ?? [];
   return east == null || north == null || up == null ? null : Math.hypot(east, north, up);
+}
+
+/** Class of a state's colour. */
+export function toneOf(status: StatusOut | undefined): string {
+  if (!status) return "muted";
+  if (status.state === "aborted" || status.mode === "lost") return "bad";
+  return ["paused", "returning", "diverted"].includes(status.state) ? "warn" : "good";
 }

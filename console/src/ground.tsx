@@ -1,8 +1,8 @@
 // What analyses saw, where it stands on the ground: marks on the map that fade as they age.
 
 import { colourOf } from "./paint";
-import { type Detection, detectionsOf } from "./pictures";
-import { type Sight, px } from "./sight";
+import { LETTER, Labels, type Sight, px } from "./sight";
+import type { Detection, ItemMessage } from "./wire";
 
 /** Seconds after which a mark is gone. */
 const KEPT = 5;
@@ -10,16 +10,10 @@ const KEPT = 5;
 const AHEAD = 1;
 /** Most marks that are drawn, the surest first. */
 const MOST = 100;
-/** Pixels of a label's letter across and of its line; a label that would cover another is not drawn. */
-const LETTER = 7;
-const LINE = 13;
 /** Standard deviations of an ellipse, as of a drone's circle. */
 const SIGMAS = 2;
 /** Metres within which what a tracker knows is not marked again, nameless, by its detector. */
 const SAME = 1;
-
-/** East, north and up, metres; standard deviations, metres; the longer one's direction, radians. */
-type Place = [number, number, number, number, number, number];
 
 export interface Mark {
   key: string;
@@ -27,19 +21,17 @@ export interface Mark {
   source: string;
   /** Mission seconds of capture. */
   time: number;
-  place: Place;
+  place: NonNullable<ItemMessage["places"][number]>;
 }
 
 /** The newest places, of each track and of what each analysis found without one. */
 export class GroundMarks {
   private readonly streams = new Map<string, Map<string, Mark>>();
 
-  /** Take what a stream has found in a frame. */
-  take(message: Record<string, unknown>): void {
-    const places = message["places"] as (Place | null)[] | undefined;
-    if (!places) return;
-    const stream = message["stream"] as string;
-    const { header, found } = detectionsOf(message);
+  /** Add what a stream has found in a frame. */
+  add({ item, stream, places }: ItemMessage): void {
+    if (item.is !== "Detections") return;
+    const { header, items } = item.of;
     const time = header.stamp / 1e9;
     const known = [...(this.streams.get(`${stream} ${header.source}`)?.values() ?? [])];
     // A track stays where it was seen last; of a recording, what was seen later is not so any more.
@@ -47,13 +39,17 @@ export class GroundMarks {
       (one) => one.what.track_id !== null && one.time <= time && time - one.time < KEPT,
     );
     const marks = new Map(kept.map((one) => [one.key, one]));
-    found.forEach((what, number) => {
+    items.forEach((what, number) => {
       const key = `${stream} ${header.source} ${what.track_id ?? `nameless ${number}`}`;
       const place = places[number];
       if (place) marks.set(key, { key, what, source: header.source, time, place });
       else marks.delete(key);
     });
     this.streams.set(`${stream} ${header.source}`, marks);
+  }
+
+  clear(): void {
+    this.streams.clear();
   }
 
   /** What is to be drawn at a mission time, the least sure first. */
@@ -88,17 +84,13 @@ interface MarksProps {
 
 /** Those of marks, the least sure first, whose labels cover no surer one's. */
 function labelled(marks: Mark[], sight: Sight): Set<Mark> {
-  const placed: { mark: Mark; x: number; y: number; wide: number }[] = [];
-  for (const mark of [...marks].reverse()) {
-    const [east, north, up] = mark.place;
-    const label = { mark, x: sight.x(east), y: sight.y(north, up), wide: LETTER * nameOf(mark.what).length };
-    const covers = placed.some(
-      ({ x, y, wide }) =>
-        Math.abs(y - label.y) < LINE && label.x < x + wide && x < label.x + label.wide,
-    );
-    if (!covers) placed.push(label);
-  }
-  return new Set(placed.map(({ mark }) => mark));
+  const labels = new Labels();
+  return new Set(
+    [...marks].reverse().filter(({ what, place: [east, north, up] }) => {
+      const half = (LETTER * nameOf(what).length) / 2;
+      return labels.add(sight.x(east) + half, sight.y(north, up), half);
+    }),
+  );
 }
 
 export function MarkLayer({ marks, now, stale, sight }: MarksProps) {

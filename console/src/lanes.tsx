@@ -2,12 +2,16 @@
 
 import { useMemo } from "preact/hooks";
 import { lastBefore } from "./playback";
+import { wordsOf } from "./widgets";
 import type { AnalyticsOut, RecordedOut, StatusOut } from "./wire";
 
 const BINS = 120;
 /** Share of the timeline below which a band is not drawn by itself. */
 const NARROW = 0.001;
 const TICKS = 6;
+/** Pixels beside the lanes, and of a letter in them. */
+const MARGIN = 60;
+const LETTER = 6.5;
 
 export interface RecordedDrone {
   flight: RecordedOut;
@@ -39,6 +43,8 @@ export function Lanes({ drone, begin, end, now, ticks }: LanesProps) {
   const whole = Math.max(end - begin, 0.001);
   const share = (time: number) => `${(100 * (time - begin)) / whole}%`;
   const width = (seconds: number) => `${(100 * seconds) / whole}%`;
+  const fits = ({ state, begin: from, end: to }: Band) =>
+    ((to - from) / whole) * (innerWidth - MARGIN) > LETTER * (state.length + 1);
   return (
     <svg aria-hidden="true" width="100%" height={ticks ? 66 : 52}>
       {bands.map((band) => (
@@ -51,9 +57,11 @@ export function Lanes({ drone, begin, end, now, ticks }: LanesProps) {
         >
           <title>{`${band.state} from ${band.begin.toFixed(1)} s`}</title>
           <rect class={`band ${band.state}`} width="100%" height="100%" />
-          <text x="5" y="15">
-            {band.state.replaceAll("_", " ")}
-          </text>
+          {fits(band) && (
+            <text x="5" y="15">
+              {wordsOf(band.state)}
+            </text>
+          )}
         </svg>
       ))}
       {bins.map((bin) => (
@@ -106,7 +114,7 @@ export function eventsOf(drone: RecordedDrone): number[] {
 export function stateAt(drone: RecordedDrone, time: number): string {
   const statuses = statusesOf(drone);
   const status = statuses[lastBefore(statuses, time, (one) => one.time)];
-  return status?.state.replaceAll("_", " ") ?? "";
+  return status ? wordsOf(status.state) : "";
 }
 
 const NONE: StatusOut[] = [];

@@ -1,28 +1,67 @@
-// What the map draws of a flight: its plan, its drones, and the grid below them.
+// What the map draws of a place and its drones: fences, plans, drones with their names, and the grid.
 
-import { aheadOf } from "./flight";
-import type { Spot } from "./place";
-import { type Sight, px } from "./sight";
-import type { StatusOut } from "./wire";
+import { useMemo } from "preact/hooks";
+import { type Vehicle, aheadOf, spotOf } from "./flight";
+import type { LeasedArea, Point, Spot } from "./place";
+import { LETTER, LINE, Labels, type Sight, px } from "./sight";
+import type { RobotConfig, StatusOut } from "./wire";
 
 /** Most waypoints with their names beside them; a survey has more than can be read. */
 const LABELS = 24;
-/** Standard deviations of the circle around a drone that says how well its place is known. */
+/** Standard deviations of the circle around a drone that shows how well its place is known. */
 const SIGMAS = 2;
+/** Pixels below a drone where its name may stand; the first where it covers no other name. */
+const NAME_PLACES = [-20, 26, -36, 42];
+/** Pixels of the upper left corner that north's arrow needs. */
+const CORNER = 55;
+
+/** Home, the fences and no-fly zones of an environment, and the areas of leases. */
+export function PlaceLayer(props: { robots: RobotConfig[]; areas: LeasedArea[]; sight: Sight }) {
+  const { robots, areas, sight } = props;
+  // Drones that share a fence have it drawn once.
+  const fences = useMemo(() => {
+    const all = robots.map(({ limits: { geofence } }) => [JSON.stringify(geofence), geofence] as const);
+    return [...new Map(all)];
+  }, [robots]);
+  return (
+    <>
+      {fences.map(([key, { polygon, no_fly }]) => (
+        <g key={key}>
+          {polygon.length > 2 && <polygon class="fence" points={sight.line(polygon)} />}
+          {no_fly.map((zone, number) => (
+            <polygon key={number} class="nofly" points={sight.line(zone)} />
+          ))}
+        </g>
+      ))}
+      {areas.map(({ lease, polygon, title }) => (
+        <g key={lease} class="area" data-lease={lease}>
+          <polygon points={sight.line(polygon)} />
+          <text {...belowTop(polygon, sight)}>{title}</text>
+        </g>
+      ))}
+      <g class="home" transform={`translate(${sight.x(0)} ${sight.y(0)})`}>
+        <circle r="9" />
+        <text dy="4">H</text>
+      </g>
+    </>
+  );
+}
+
+/** Where an area's name stands: below its upper edge. */
+function belowTop(polygon: Point[], sight: Sight): { x: string; y: string } {
+  const xs = polygon.map(([east]) => sight.x(east));
+  const top = Math.min(...polygon.map(([, north]) => sight.y(north)));
+  return { x: px((Math.min(...xs) + Math.max(...xs)) / 2), y: px(top + LINE) };
+}
 
 /** The line from a drone along the waypoints that lie ahead of it. */
-export function Way({ status, sight }: { status: StatusOut; sight: Sight }) {
+function Way({ status, sight }: { status: StatusOut; sight: Sight }) {
   const ahead = aheadOf(status);
-  const [east, north, up] = status.position ?? [];
-  const way: Spot[] = east != null && north != null ? [[east, north, up ?? 0]] : [];
-  for (const id of ahead) {
-    const place = status.places[id];
-    if (place) way.push(place);
-  }
+  const way = [spotOf(status), ...ahead.map((id) => status.places[id])].filter((one) => one != null);
   return ahead.length > 0 ? <polyline class="way" points={sight.line(way)} /> : null;
 }
 
-export function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
+function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
   const ahead = aheadOf(status);
   const known = Object.entries(status.places);
   return (
@@ -61,81 +100,147 @@ function Stem({ place, sight }: { place: Spot; sight: Sight }) {
   return <path class="stem" d={`M${px(sight.x(east))} ${px(sight.y(north))}V${px(sight.y(north, up))}`} />;
 }
 
-interface DroneProps {
-  name: string;
-  status: Pick<StatusOut, "position" | "velocity" | "yaw" | "position_sigma">;
+interface DronesProps {
+  vehicles: Vehicle[];
+  chosen: string | null;
+  /** Whether the plans of all are drawn, not only of the chosen one. */
+  plans: boolean;
   sight: Sight;
-  chosen: boolean;
-  stale: boolean;
-  /** Whether its name stands below it: names of drones side by side would cover each other. */
-  below?: boolean;
 }
 
-export function Drone({ name, status, sight, chosen, stale, below = false }: DroneProps) {
-  const [east, north, up] = status.position ?? [];
-  if (east == null || north == null) return null;
-  const turn = 90 - ((status.yaw ?? Math.PI / 2) * 180) / Math.PI;
-  const [ve, vn] = status.velocity ?? [];
-  const unsure = SIGMAS * (status.position_sigma ?? 0) * sight.view.scale;
+/** Drones with their trails and plans. */
+export function Drones({ vehicles, chosen, plans, sight }: DronesProps) {
+  const named = namePlaces(vehicles, chosen, sight);
   return (
     <>
-      {sight.tilted && <Stem place={[east, north, up ?? 0]} sight={sight} />}
+      {vehicles.map((one) => {
+        const { id, status, trail, tone } = one;
+        return (
+          <g key={id} class={`robot ${tone}`}>
+            <polyline class="trail" points={sight.line(trail)} />
+            {status &&
+              (plans || id === chosen ? (
+                <Plan status={status} sight={sight} />
+              ) : (
+                <Way status={status} sight={sight} />
+              ))}
+            <Drone vehicle={one} chosen={id === chosen} name={named.get(id)} sight={sight} />
+          </g>
+        );
+      })}
+    </>
+  );
+}
+
+/** A drone's name, with its height in flight. */
+function nameOf({ id, status, position }: Vehicle): [name: string, height: string] {
+  return [id, status && position ? ` ${position[2].toFixed(1)} m` : ""];
+}
+
+/** Pixels right of a drone and below it. */
+type Shift = [dx: number, dy: number];
+
+/** Where the drones' names stand; the chosen one's first, then those in flight. */
+function namePlaces(vehicles: Vehicle[], chosen: string | null, sight: Sight): Map<string, Shift> {
+  const rank = ({ id, status }: Vehicle) => (id === chosen ? 0 : status ? 1 : 2);
+  const labels = new Labels();
+  const found = new Map<string, Shift>();
+  for (const one of [...vehicles].sort((first, second) => rank(first) - rank(second))) {
+    if (!one.position) continue;
+    const [east, north, up] = one.position;
+    const half = (LETTER * nameOf(one).join("").length) / 2;
+    const [x, y, { width }] = [sight.x(east), sight.y(north, up), sight.size];
+    // A name is not cut off by the map's edge.
+    const dx = x < 0 || x > width ? 0 : Math.max(half - x, Math.min(0, width - half - x));
+    const free = NAME_PLACES.find((dy) => labels.add(x + dx, y + dy, half));
+    found.set(one.id, [dx, free ?? (NAME_PLACES[0] as number)]);
+  }
+  return found;
+}
+
+interface DroneProps {
+  vehicle: Vehicle;
+  chosen: boolean;
+  name: Shift | undefined;
+  sight: Sight;
+}
+
+function Drone({ vehicle, chosen, name, sight }: DroneProps) {
+  const { id, status, position, stale } = vehicle;
+  if (!position) return null;
+  const [east, north, up] = position;
+  const turn = 90 - ((status?.yaw ?? Math.PI / 2) * 180) / Math.PI;
+  const [ve, vn] = status?.velocity ?? [];
+  const unsure = SIGMAS * (status?.position_sigma ?? 0) * sight.view.scale;
+  const [text, height] = nameOf(vehicle);
+  return (
+    <>
+      {sight.tilted && <Stem place={position} sight={sight} />}
       <g
         class={`drone ${chosen ? "chosen" : ""} ${stale ? "stale" : ""}`}
-        transform={`translate(${sight.x(east)} ${sight.y(north, up ?? 0)})`}
-        data-drone={name}
+        transform={`translate(${sight.x(east)} ${sight.y(north, up)})`}
+        data-drone={id}
       >
         {unsure > 0 && <ellipse class="unsure" rx={px(unsure)} ry={px(unsure * sight.lies)} />}
         {ve != null && vn != null && (
           <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14 * sight.lies}`} />
         )}
-        <path
-          class="body"
-          d="M0-14L9 10L0 5L-9 10Z"
-          transform={`scale(1 ${sight.lies}) rotate(${turn})`}
-        />
-        <text y={below ? 26 : -20}>
-          {name}
-          {up != null && <tspan class="small"> {up.toFixed(1)} m</tspan>}
+        <path class="body" d="M0-14L9 10L0 5L-9 10Z" transform={`scale(1 ${sight.lies}) rotate(${turn})`} />
+        <text x={name?.[0]} y={name?.[1]}>
+          {text}
+          {height && <tspan class="small">{height}</tspan>}
         </text>
       </g>
     </>
   );
 }
 
-export function Grid({ sight }: { sight: Sight }) {
-  const { size, view } = sight;
+/** Multiples of the grid's step in sight: metres east, and metres north. */
+function gridOf({ size, view, lies }: Sight): [east: number[], north: number[]] {
   const step = niceStep(70 / view.scale);
-  const lines = [];
-  const half = size.width / 2 / view.scale;
-  const high = size.height / 2 / view.scale / sight.lies;
-  const from = Math.ceil((view.east - half) / step);
-  const to = Math.floor((view.east + half) / step);
-  for (let n = from; n <= to; n += 1) {
-    const at = sight.x(n * step);
-    lines.push(
-      <g key={`e${n}`}>
-        <path class={n === 0 ? "axis" : "grid"} d={`M${at} 0V${size.height}`} />
-        <text class="coordinate" x={at + 3} y={size.height - 5}>
-          {label(n * step)}
+  const between = (middle: number, pixels: number) => {
+    const half = pixels / 2 / view.scale;
+    const [from, to] = [Math.ceil((middle - half) / step), Math.floor((middle + half) / step)];
+    return Array.from({ length: Math.max(0, to - from + 1) }, (_, place) => (from + place) * step);
+  };
+  return [between(view.east, size.width), between(view.north, size.height / lies)];
+}
+
+export function Grid({ sight }: { sight: Sight }) {
+  const [easts, norths] = gridOf(sight);
+  const { width, height } = sight.size;
+  const kind = (value: number) => (value === 0 ? "axis" : "grid");
+  return (
+    <g>
+      {easts.map((east) => (
+        <path key={`e${east}`} class={kind(east)} d={`M${px(sight.x(east))} 0V${height}`} />
+      ))}
+      {norths.map((north) => (
+        <path key={`n${north}`} class={kind(north)} d={`M0 ${px(sight.y(north))}H${width}`} />
+      ))}
+    </g>
+  );
+}
+
+/** Numbers of the grid at the lower and the left edge, above the scenery; north's arrow has the corner. */
+export function Coordinates({ sight }: { sight: Sight }) {
+  const [easts, norths] = gridOf(sight);
+  return (
+    <g>
+      {easts.map((east) => (
+        <text key={`e${east}`} class="coordinate" x={px(sight.x(east) + 3)} y={sight.size.height - 5}>
+          {label(east)}
         </text>
-      </g>,
-    );
-  }
-  const low = Math.ceil((view.north - high) / step);
-  const top = Math.floor((view.north + high) / step);
-  for (let n = low; n <= top; n += 1) {
-    const at = sight.y(n * step);
-    lines.push(
-      <g key={`n${n}`}>
-        <path class={n === 0 ? "axis" : "grid"} d={`M0 ${at}H${size.width}`} />
-        <text class="coordinate" x="4" y={at - 3}>
-          {label(n * step)}
-        </text>
-      </g>,
-    );
-  }
-  return <g>{lines}</g>;
+      ))}
+      {norths
+        .filter((north) => sight.y(north) > CORNER)
+        .map((north) => (
+          <text key={`n${north}`} class="coordinate" x="4" y={px(sight.y(north) - 3)}>
+            {label(north)}
+          </text>
+        ))}
+    </g>
+  );
 }
 
 export function Scale({ scale }: { scale: number }) {

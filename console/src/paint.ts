@@ -1,6 +1,7 @@
 // What was found in a picture, drawn on it: depth, boxes, labels and the skeletons of bodies.
 
-import type { Detection, Picture, Target } from "./pictures";
+import type { Picture } from "./pictures";
+import type { Detection, TargetItem } from "./wire";
 
 const COLOURS = ["#ffb000", "#00c2a8", "#ff5d8f", "#6aa8ff", "#c6e03a", "#d58bff"];
 const SHADOW = "#10151c";
@@ -52,7 +53,7 @@ function once(found: Detection[]): Detection[] {
   const tracked = found.filter((one) => one.track_id !== null);
   return found.filter(
     (one) =>
-      one.track_id !== null || one.points.length > 0 || !tracked.some((other) => same(one, other)),
+      one.track_id !== null || one.keypoints?.length || !tracked.some((other) => same(one, other)),
   );
 }
 
@@ -61,7 +62,7 @@ function same(one: Detection, other: Detection): boolean {
   return close && one.label === other.label;
 }
 
-const MARKS: Record<Target["state"], string> = {
+const MARKS: Record<TargetItem["state"], string> = {
   sure: "followed",
   likely: "followed?",
   uncertain: "",
@@ -71,7 +72,7 @@ const MARKS: Record<Target["state"], string> = {
 /** Draw corners around what is followed, dashed where that is not sure, and the word below it. */
 function drawTarget(
   pen: CanvasRenderingContext2D,
-  { state }: Target,
+  { state }: TargetItem,
   box: Detection["box"],
   width: number,
   height: number,
@@ -133,7 +134,8 @@ function drawBox(pen: CanvasRenderingContext2D, one: Detection, width: number): 
 
 /** Draw the keypoints that are seen, and a body's bones between them; returns how many points. */
 function drawBody(pen: CanvasRenderingContext2D, one: Detection, width: number): number {
-  const { points } = one;
+  // A model that does not know a point gives null.
+  const points = (one.keypoints ?? []).map(([u, v, sure]) => [u ?? NaN, v ?? NaN, sure ?? 0] as const);
   const seen = points.map(([u, v, sure]) => sure >= VISIBLE && Number.isFinite(u + v));
   // A body far away is a few pixels wide.
   const thick = Math.min(Math.max(2, width / 320), Math.max(1, (one.box[3] - one.box[1]) / 40));

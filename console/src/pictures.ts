@@ -1,7 +1,10 @@
 // Pictures of a camera with what was found in each: boxes belong to the frame they were made from.
 
 import { type Depth, coloured } from "./depth";
-import { VideoPictures } from "./video_pictures";
+import { VideoDecoding } from "./video_decoder";
+import type { Detection, ItemMessage, PictureItem, TargetItem } from "./wire";
+
+type Header = PictureItem["header"];
 
 /** Pictures that are kept while what is found in them is under way. */
 export const KEPT = 16;
@@ -10,22 +13,6 @@ const BEHIND = 1.5e9;
 /** And one with more analyses in it than the newest analysed one. */
 const PATIENCE = 0.4e9;
 
-export interface Detection {
-  box: [number, number, number, number];
-  label: string;
-  score: number;
-  track_id: number | null;
-  /** Pixels right and down, and confidence, 0 to 1; none where the model gives none. */
-  points: [number, number, number][];
-}
-
-/** What a drone follows, of the frame that its command was made from. */
-export interface Target {
-  state: "sure" | "likely" | "uncertain" | "unseen";
-  /** Left, top, right, bottom; null where it is not known. */
-  box: Detection["box"] | null;
-}
-
 export interface Picture {
   bitmap: ImageBitmap;
   source: string;
@@ -33,53 +20,23 @@ export interface Picture {
   captured: number;
   camera: string;
   found: Map<string, Detection[]>;
-  target: Target | undefined;
+  target: TargetItem | undefined;
   /** Whether the camera measured depth with it. */
   measured: boolean;
   depth: Depth | undefined;
 }
 
-export interface Header {
-  /** Mission nanoseconds. */
-  stamp: number;
-  source: string;
-}
-
 /** What came before its picture. */
 interface Early {
   found: Map<string, Detection[]>;
-  target: Target | undefined;
+  target: TargetItem | undefined;
   depth: Depth | undefined;
-}
-
-interface PictureItem {
-  is: "Picture" | "Frame" | "Depth";
-  header: Header;
-  bytes: number[];
-  format?: string;
-  depth?: boolean;
-  range?: number;
-}
-
-/** A detection as the wire has it. */
-type WireDetection = Omit<Detection, "points"> & { keypoints: [number, number, number][] | null };
-
-/** What was found, and in which frame. */
-export function detectionsOf(message: Record<string, unknown>): {
-  header: Header;
-  found: Detection[];
-} {
-  const item = message["item"] as { of: { header: Header; items: WireDetection[] } };
-  const found = item.of.items.map(({ box, label, score, track_id, keypoints }) => {
-    return { box, label, score, track_id, points: keypoints ?? [] };
-  });
-  return { header: item.of.header, found };
 }
 
 export class Pictures {
   private kept: Picture[] = [];
   private early = new Map<string, Early>();
-  private readonly video = new VideoPictures();
+  private readonly video = new VideoDecoding();
   /** Stamp of the picture that was shown last: none before it comes back. */
   private shown = 0;
 
@@ -94,19 +51,22 @@ export class Pictures {
     for (const one of this.kept.splice(0)) one.bitmap.close();
   }
 
-  /** Take a picture or its depth. */
-  async take(message: Record<string, unknown>, data: ArrayBuffer): Promise<void> {
-    const item = message["item"] as PictureItem;
-    const { header } = item;
+  /** Add a picture, its depth, or what was found or is followed in it. */
+  async add(message: ItemMessage, data: ArrayBuffer | null): Promise<void> {
+    const { item, stream } = message;
+    if (item.is === "Detections") this.of(item.of.header).found.set(stream, item.of.items);
+    if (item.is === "Target") this.of(item.header).target = item;
+    if (!data || !("bytes" in item)) return;
     const bytes = new Uint8Array(data, 0, item.bytes[0]);
     if (item.is === "Depth") {
-      const depth = await coloured(new Blob([bytes], { type: "image/png" }), item.range ?? 0);
-      this.of(header).depth = depth;
+      const depth = await coloured(new Blob([bytes], { type: "image/png" }), item.range);
+      this.of(item.header).depth = depth;
       return;
     }
+    const { header } = item;
     const bitmap =
       item.format === "h264"
-        ? await this.video.decoded(bytes, message["key"] === true)
+        ? await this.video.decoded(bytes, message.key)
         : await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }));
     if (!bitmap) return;
     // The same frame comes again where a recording's moments share it.
@@ -114,25 +74,13 @@ export class Pictures {
     this.early.delete(nameOf(header));
     this.kept.push({
       ...{ bitmap, found, target, depth, source: header.source, stamp: header.stamp },
-      measured: item.depth === true,
-      captured: message["captured"] as number,
-      camera: message["stream"] as string,
+      measured: item.depth,
+      captured: message.captured,
+      camera: stream,
     });
     // Of a live flight, several are decoded at a time.
     if (this.most > 1) this.kept.sort((one, other) => one.stamp - other.stamp);
     while (this.kept.length > this.most) this.kept.shift()?.bitmap.close();
-  }
-
-  /** Take what was found, or what is followed, in a picture. */
-  found(message: Record<string, unknown>): void {
-    const item = message["item"] as { is?: string; header: Header } & Target;
-    if (item.is !== "Target") {
-      const { header, found } = detectionsOf(message);
-      this.of(header).found.set(message["stream"] as string, found);
-    } else {
-      const { header, state, box } = item;
-      this.of(header).target = { state, box };
-    }
   }
 
   /**

@@ -1,8 +1,9 @@
 // The coming waypoints: dragged or moved by keys into another order, or left out.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { type Flight, aheadOf, ending } from "./flight";
+import { type Flight, aheadOf, isEnding } from "./flight";
 import type { StatusOut } from "./wire";
+import { Button, Card, wordsOf } from "./widgets";
 
 /** Milliseconds after the last key before the order is asked for. */
 const PAUSE = 600;
@@ -18,7 +19,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   const [dragged, setDragged] = useState<string | null>(null);
   const list = useRef<HTMLOListElement>(null);
   const timer = useRef(0);
-  const over = status !== undefined && ending(status);
+  const over = status !== undefined && isEnding(status);
   const mayFly = props.mayFly && !over;
   useEffect(() => () => clearTimeout(timer.current), []);
   if (!status || (target === null && coming.length === 0)) return null;
@@ -68,18 +69,16 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   };
 
   const left = coming.length + (target === null ? 0 : 1);
+  const now = target === null ? "" : `, now ${target}`;
+  const head = (
+    <span class="badge" data-testid="to-go">
+      {over ? `${wordsOf(status.state)}: ${left} left out` : `${left} to go${now}`}
+    </span>
+  );
   return (
-    <section class={`card plan ${over ? "over" : ""}`} aria-label="Plan">
-      <header>
-        <h2>Plan</h2>
-        <span class="badge" data-testid="to-go">
-          {over
-            ? `${status.state}: ${left} left out`
-            : `${left} to go${target !== null ? `, now ${target}` : ""}`}
-        </span>
-      </header>
+    <Card kind={`plan ${over ? "over" : ""}`} label="Plan" head={head}>
       {mayFly && shown.length > 0 && (
-        <p class="hint">Drag into another order; or arrow keys on a handle, Delete leaves out.</p>
+        <p class="hint">Drag a waypoint to another place, or use the arrow keys on its handle; Delete removes it.</p>
       )}
       <ol ref={list} data-testid="plan">
         {target !== null && (
@@ -130,7 +129,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
           </li>
         ))}
       </ol>
-    </section>
+    </Card>
   );
 }
 
@@ -151,15 +150,7 @@ function Place({ status, id }: { status: StatusOut; id: string }) {
 function Remove(props: { id: string; word: string; onRemove(id: string): void }) {
   const { id, word, onRemove } = props;
   return (
-    <button
-      type="button"
-      class="plain"
-      title={word}
-      aria-label={`${word}: ${id}`}
-      onClick={() => onRemove(id)}
-    >
-      ✕
-    </button>
+    <Button class="plain" title={word} label={`${word}: ${id}`} onClick={() => onRemove(id)}>✕</Button>
   );
 }
 
@@ -181,8 +172,8 @@ function between(before: string[], after: string[]): string[] {
 /** Whether those that are still ahead are so in this order. */
 function inOrder(status: StatusOut, order: string[]): boolean {
   const left = aheadOf(status);
-  const wanted = order.filter((one) => left.includes(one));
-  return left.filter((one) => order.includes(one)).every((one, place) => one === wanted[place]);
+  const expected = order.filter((one) => left.includes(one));
+  return left.filter((one) => order.includes(one)).every((one, place) => one === expected[place]);
 }
 
 function named(ids: string[]): string {

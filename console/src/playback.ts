@@ -1,18 +1,11 @@
-// A recorded flight as a source: the same words as from the live socket, at any moment asked for.
+// A recorded flight as a data source: the same messages as from the live socket, at any moment.
 
+import { AlertLog } from "./alerts";
 import { answered } from "./connection";
-import {
-  type Alert,
-  AlertLog,
-  COMMAND_KIND,
-  MOST_ALERTS,
-  type Sample,
-  shifted,
-  speedOf,
-} from "./flight";
+import { type Sample, isStep, speedOf, spotOf } from "./flight";
 import type { Spot } from "./place";
-import type { FlightEars, ItemEars, Past, Source, Wanted } from "./source";
-import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
+import type { Past, PictureListener, Source, StateListener, Watched } from "./source";
+import type { AnalyticsOut, ItemMessage, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
 
 /** Milliseconds between two moments shown while it plays, and between two pictures asked for. */
 const STEP = 50;
@@ -42,11 +35,11 @@ export function lastBefore<T>(items: readonly T[], time: number, of: (item: T) =
 }
 
 export class Playback implements Source {
-  readonly recorded = true;
+  readonly kind = "recording";
   time: number;
   playing = false;
   speed = 1;
-  private ears: FlightEars | undefined;
+  private listener: StateListener | undefined;
   private readonly watchers = new Set<() => void>();
   private readonly tracks: [string, Track][];
   private asked = 0;
@@ -58,17 +51,16 @@ export class Playback implements Source {
   constructor(
     private readonly mission: MissionOut,
     readonly flight: RecordedOut,
-    private readonly token: string,
     begin: number | null,
   ) {
     this.tracks = Object.entries(flight.tracks).map(([robot, one]) => [robot, new Track(one)]);
     this.time = this.within(begin ?? openingOf(flight));
   }
 
-  follow(ears: FlightEars): void {
-    this.ears = ears;
-    ears.up(true);
-    this.tell();
+  follow(listener: StateListener): void {
+    this.listener = listener;
+    listener.onConnected(true);
+    this.publish();
   }
 
   /** Have another recording show the same mission time from now on; it takes no time of its own. */
@@ -76,7 +68,7 @@ export class Playback implements Source {
     this.led = other;
     other.leader = this;
     this.time = this.within(this.time);
-    this.tell();
+    this.publish();
   }
 
   /** Mission seconds at which there is something to be seen for the first time. */
@@ -99,20 +91,20 @@ export class Playback implements Source {
     this.playing = true;
     this.before = performance.now();
     cancelAnimationFrame(this.asked);
-    this.asked = requestAnimationFrame(this.turn);
-    this.tell();
+    this.asked = requestAnimationFrame(this.onFrame);
+    this.publish();
   }
 
   pause(): void {
     this.playing = false;
     cancelAnimationFrame(this.asked);
-    this.tell();
+    this.publish();
   }
 
   close(): void {
     this.playing = false;
     cancelAnimationFrame(this.asked);
-    this.ears = undefined;
+    this.listener = undefined;
   }
 
   /** What was decided by a moment: the last sums at or before it. */
@@ -121,79 +113,75 @@ export class Playback implements Source {
     return rows[lastBefore(rows, this.time, (one) => one.time)];
   }
 
-  watch({ camera, depth }: Wanted, ears: ItemEars): () => void {
+  watch({ camera, depth }: Watched, listener: PictureListener): () => void {
     const gone = new AbortController();
     let shown = -1;
     let busy = false;
-    const look = async (): Promise<void> => {
+    const load = async (): Promise<void> => {
       if (busy) return;
       busy = true;
       while (!gone.signal.aborted && shown !== this.time) {
         const began = performance.now();
         shown = this.time;
-        await this.picture(camera, depth, shown, ears, gone.signal).catch(() => undefined);
+        await this.loadPicture(camera, depth, listener, gone.signal).catch(() => undefined);
         const rest = STEP - (performance.now() - began);
         if (rest > 0) await new Promise((done) => setTimeout(done, rest));
       }
       busy = false;
     };
-    const changed = () => void look();
-    this.watchers.add(changed);
-    changed();
+    const onTime = () => void load();
+    this.watchers.add(onTime);
+    onTime();
     return () => {
-      this.watchers.delete(changed);
+      this.watchers.delete(onTime);
       gone.abort();
     };
   }
 
-  private async picture(
+  private async loadPicture(
     camera: string,
     depth: boolean,
-    time: number,
-    ears: ItemEars,
+    listener: PictureListener,
     signal: AbortSignal,
   ): Promise<void> {
-    const at = String(Math.max(0, Math.round(time * 1e9)));
+    const at = String(Math.max(0, Math.round(this.time * 1e9)));
     const query = new URLSearchParams({ stream: camera, at, depth: String(depth) });
     const path = `v1/missions/${this.mission.id}/playback/picture?${query}`;
-    const answer = await answered(path, this.token, undefined, signal);
-    const data = await answer.arrayBuffer();
+    const data = await (await answered(path, undefined, signal)).arrayBuffer();
     if (signal.aborted) return;
     const end = new Uint8Array(data).indexOf(NEWLINE);
     const text = new TextDecoder().decode(new Uint8Array(data, 0, end));
-    const messages = JSON.parse(text) as Record<string, unknown>[];
-    if (messages.length === 0) ears.nothing();
+    const messages = JSON.parse(text) as ItemMessage[];
+    if (messages.length === 0) listener.onNothing();
     let from = end + 1;
     for (const message of messages) {
-      if (message["blob"] === true) {
-        const [size = 0] = (message["item"] as { bytes: number[] }).bytes;
-        await ears.picture(message, data.slice(from, from + size));
-        from += size;
-      } else ears.found(message);
+      const size = "bytes" in message.item ? message.item.bytes[0] : 0;
+      await listener.onItem(message, data.slice(from, from + size));
+      from += size;
     }
   }
 
-  private readonly turn = (now: number): void => {
+  private readonly onFrame = (now: number): void => {
     if (!this.playing) return;
-    this.asked = requestAnimationFrame(this.turn);
+    this.asked = requestAnimationFrame(this.onFrame);
     // A tab in the background does not run on.
     const step = Math.min(LONGEST_STEP, Math.max(0, (now - this.before) / 1000));
     this.before = now;
     this.time = this.within(this.time + step * this.speed);
     if (this.time >= this.end) this.pause();
-    else if (now - this.shown >= STEP) this.tell();
+    else if (now - this.shown >= STEP) this.publish();
   };
 
   private show(time: number): void {
     this.time = this.within(time);
-    this.tell();
+    this.publish();
   }
 
   private within(time: number): number {
     return Math.min(this.end, Math.max(this.begin, time));
   }
 
-  private tell(): void {
+  private publish(): void {
     this.shown = performance.now();
     const status: Record<string, StatusOut> = {};
     const past: Past = {
@@ -210,32 +198,18 @@ export class Playback implements Source {
     }
     const robots = this.tracks.map(([robot]) => robot);
     const { name, streams } = this.flight;
-    this.ears?.moment({ ...this.mission, name, robots, status, streams }, past);
+    const mission = { ...this.mission, name, robots, status, streams };
+    this.listener?.onState({ missions: [mission], robots: [], now: null, past });
     for (const one of this.watchers) one();
     this.led?.show(this.time);
   }
 
-  /** Commands and alerts until now, the newest first; an alert that repeats itself counts up. */
+  /** Commands and alerts until now. */
   private log(): AlertLog {
-    const known = new Map<string, Alert>();
-    const commands: string[] = [];
+    const log = new AlertLog();
     const until = lastBefore(this.flight.alerts, this.time, (one) => one.time);
-    for (const { kind, text } of this.flight.alerts.slice(0, until + 1)) {
-      if (kind === COMMAND_KIND) {
-        commands.push(text);
-        continue;
-      }
-      const key = `${kind}: ${text}`;
-      const before = known.get(key);
-      known.delete(key);
-      const count = (before?.count ?? 0) + 1;
-      known.set(key, { id: known.size + 1, source: "", kind, text, count, acknowledged: true });
-    }
-    const newest = <T>(list: T[]) => list.reverse().slice(0, MOST_ALERTS);
-    return Object.assign(new AlertLog(), {
-      alerts: newest([...known.values()]),
-      commands: newest(commands),
-    });
+    for (const { kind, text } of this.flight.alerts.slice(0, until + 1)) log.add(kind, text);
+    return log;
   }
 }
 
@@ -252,10 +226,8 @@ class Track {
       battery: track.battery[row] ?? null,
     }));
     track.time.forEach((time, row) => {
-      const [east, north, up] = track.position[row] ?? [];
-      if (east == null || north == null) return;
-      const spot: Spot = [east, north, up ?? 0];
-      if (shifted(this.way.at(-1)?.spot, spot)) this.way.push({ time, spot });
+      const spot = spotOf({ position: track.position[row] ?? null });
+      if (spot && isStep(this.way.at(-1)?.spot, spot)) this.way.push({ time, spot });
     });
     while (this.way.length > TRAIL) this.way = this.way.filter((_, place) => place % 2 === 0);
   }
@@ -265,8 +237,8 @@ class Track {
     return this.way.slice(0, until + 1).map((one) => one.spot);
   }
 
-  /** Other aircraft at a time: where the last word put them, and on from there. */
-  private heard(time: number): TrafficOut[] {
+  /** Other aircraft at a time: from their last known place on, at their last known velocity. */
+  private trafficAt(time: number): TrafficOut[] {
     const last = this.track.traffic[lastBefore(this.track.traffic, time, (one) => one.since)];
     const later = time - (last?.since ?? 0);
     // Where the recording has no states any more, nothing is heard either.
@@ -301,7 +273,7 @@ class Track {
       satellites: this.track.gps[row]?.satellites ?? null,
       position_sigma: this.track.gps[row]?.position_sigma ?? null,
       places: Object.fromEntries(known),
-      traffic: this.heard(time),
+      traffic: this.trafficAt(time),
     };
   }
 }

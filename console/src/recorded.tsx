@@ -1,52 +1,34 @@
-// A finished mission's recording is opened: how far it has been read, and then what it shows.
+// Opens the recording of a finished mission: shows how far it has been read, and then what it holds.
 
-import { useEffect, useState } from "preact/hooks";
-import { ask } from "./connection";
+import type { ComponentChildren } from "preact";
+import { ask, messageOf, usePolled } from "./connection";
 import type { MissionOut, PlaybackOut, RecordedOut } from "./wire";
 
-const AGAIN = 300;
+/** Milliseconds between two requests while a recording is read. */
+const PAUSE = 300;
 
-export function Recorded(props: {
-  mission: MissionOut;
-  token: string;
-  children(flight: RecordedOut): preact.ComponentChildren;
-}) {
-  const { mission, token } = props;
-  const [read, setRead] = useState(0);
-  const [flight, setFlight] = useState<RecordedOut | null>(null);
-  const [problem, setProblem] = useState("");
-  useEffect(() => {
-    let gone = false;
-    let timer = 0;
-    const look = async () => {
-      try {
-        const found = await ask<PlaybackOut>(`v1/missions/${mission.id}/playback`, token);
-        if (gone) return;
-        setRead(found.read);
-        setFlight(found.flight);
-        if (found.flight === null) timer = setTimeout(() => void look(), AGAIN);
-      } catch (error) {
-        if (!gone) setProblem(error instanceof Error ? error.message : String(error));
-      }
-    };
-    void look();
-    return () => {
-      gone = true;
-      clearTimeout(timer);
-    };
-  }, [mission.id, token]);
-  if (flight) return <>{props.children(flight)}</>;
+export function Recorded(props: { mission: MissionOut; children(flight: RecordedOut): ComponentChildren }) {
+  const { mission, children } = props;
+  const path = `v1/missions/${mission.id}/playback`;
+  const { answer, error } = usePolled(
+    path,
+    (signal) => ask<PlaybackOut>(path, undefined, signal),
+    (found) => (found && found.flight === null ? PAUSE : null),
+  );
+  if (answer?.flight) return <>{children(answer.flight)}</>;
   return (
     <main class="start">
       <h1>AeroDaaS console</h1>
-      {problem ? (
+      {error !== null ? (
         <p class="banner bad" role="alert">
-          {problem}
+          {messageOf(error)}
         </p>
       ) : (
         <label class="reading">
-          <span>Reading the recording of {mission.name}: {Math.round(100 * read)} %</span>
-          <progress max="1" value={read} />
+          <span>
+            Reading the recording of {mission.name}: {Math.round(100 * (answer?.read ?? 0))} %
+          </span>
+          <progress max="1" value={answer?.read ?? 0} />
         </label>
       )}
     </main>

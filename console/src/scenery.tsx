@@ -1,7 +1,7 @@
 // What lies below a flight: the simulated world, as walls and crowns where the view is tilted.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
-import { ask } from "./connection";
+import { useMemo } from "preact/hooks";
+import { ask, usePolled } from "./connection";
 import type { Point } from "./place";
 import type { Sight } from "./sight";
 import { px } from "./sight";
@@ -15,20 +15,13 @@ const TOP = 0.25;
 /** Kinds that lie flat, below all that stands. */
 const FLAT = new Set(["road", "crops"]);
 
-/** The scenery that the server tells at a path, an empty one until then; or the recorded one. */
-export function useScenery(path: string, token: string, recorded?: SceneryOut): SceneryOut {
-  const [found, setFound] = useState<SceneryOut>({ shapes: [], tiles: null });
-  useEffect(() => {
-    if (recorded) return;
-    let gone = false;
-    ask<SceneryOut>(path, token)
-      .then((scenery) => !gone && setFound(scenery))
-      .catch(() => undefined); // The flight can be seen without.
-    return () => {
-      gone = true;
-    };
-  }, [path, token, recorded]);
-  return recorded ?? found;
+const EMPTY: SceneryOut = { shapes: [], tiles: null };
+
+/** The scenery at a path of the server, an empty one until it is there; or the recorded one. */
+export function useScenery(path: string, recorded?: SceneryOut): SceneryOut {
+  // The flight can be seen without.
+  const polled = usePolled(recorded ? "" : path, (signal) => ask<SceneryOut>(path, undefined, signal), () => null);
+  return recorded ?? polled.answer ?? EMPTY;
 }
 
 export function SceneryLayer({ shapes, sight }: { shapes: readonly ShapeOut[]; sight: Sight }) {

@@ -14,6 +14,9 @@ export interface Size {
   height: number;
 }
 
+/** Pixels of a label's letter across and of its line. */
+export const LETTER = 7;
+export const LINE = 13;
 /** Of the tilted view: how far 57° from the zenith shortens what lies, and lets stand what stands. */
 const LIES = 0.55;
 const STANDS = Math.sqrt(1 - LIES * LIES);
@@ -61,4 +64,18 @@ export class Sight {
 
 export function px(value: number): string {
   return value.toFixed(1);
+}
+
+/** Labels of which none covers another one. */
+export class Labels {
+  private readonly placed: { x: number; y: number; half: number }[] = [];
+
+  /** Place a label by its middle and half its width, pixels; false if it would cover another one. */
+  add(x: number, y: number, half: number): boolean {
+    const free = this.placed.every(
+      (one) => Math.abs(one.y - y) >= LINE || Math.abs(one.x - x) >= one.half + half,
+    );
+    if (free) this.placed.push({ x, y, half });
+    return free;
+  }
 }

@@ -1,48 +1,42 @@
 // An area to survey: drawn on the map or typed, planned by the server, flown by one command.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { ask, messageOf } from "./connection";
 import { type Flight, aheadOf } from "./flight";
-import { Field } from "./panels";
-import type { Abilities, Point } from "./place";
+import { type Point, camerasOf, surveyCamera } from "./place";
 import type { Drawn } from "./survey_map";
-import type { SurveyIn, SurveyOut, SurveyPhotosOut, Waypoint } from "./wire";
+import { Button, Field, type FieldProps, Figure, type FigureProps, Select, clock } from "./widgets";
+import type { RobotConfig, SurveyIn, SurveyOut, Waypoint } from "./wire";
 
 /** Milliseconds without a change before a plan is asked for. */
 const PAUSE = 250;
 const CORNERS = 30;
 const NOWHERE: Point[] = [];
-/** Centimetres of ground in a pixel that are suggested. */
-const RESOLUTION = 2;
+const RADIANS = Math.PI / 180;
+/** Metres of ground in a pixel that are suggested. */
+const RESOLUTION = 0.02;
+/** Degrees that a camera sees whose field of view is not known. */
+const FIELD_OF_VIEW = 82.6;
+const CEILING = 120;
 
-interface Settings {
-  /** Id of the camera that takes pictures; null for none. */
-  camera: string | null;
-  height: number;
-  /** Centimetres of ground in a pixel, by which the height is chosen; null to give the height. */
-  resolution: number | null;
-  /** Percent of a picture that the next one on its line, and the one beside it, show, too. */
-  frontOverlap: number;
-  sideOverlap: number;
-  fieldOfView: number;
-  overlap: number;
-  /** Metres; null for what the camera sees. */
-  width: number | null;
-  /** Degrees clockwise from north; null for the shortest path. */
-  direction: number | null;
-  speed: number | null;
-  around: boolean;
-}
+/** How an area is surveyed. */
+type Settings = Omit<SurveyIn, "robot" | "area" | "name">;
+
+/** Settings of a survey by a camera, and of one without pictures. */
+const byCamera = (camera: string) => ({ camera, overlap: 0.65, front_overlap: 0.75 });
+const byView = (degrees: number) => ({
+  ...{ camera: null, ground_resolution: null, overlap: 0.2 },
+  ...{ field_of_view: degrees * RADIANS, width: null },
+});
 
 /** The survey being drawn; null while none is. */
 export interface Survey extends Drawn {
-  flight: Flight;
   robot: string;
-  /** Of the robot. */
-  cameras: string[];
+  config: RobotConfig | undefined;
   settings: Settings;
   plan: SurveyOut | null;
   problem: string;
-  set(settings: Partial<Settings>): void;
+  set(settings: Settings): void;
   fly(): void;
 }
 
@@ -50,27 +44,21 @@ export function useSurvey(
   flight: Flight | null,
   robot: string,
   height: number,
-  abilities: Abilities | undefined,
+  config: RobotConfig | undefined,
 ): { survey: Survey | null; begin(): void } {
   const [area, setArea] = useState<Point[] | null>(null);
-  const [settings, setSettings] = useState<Settings | null>(null);
-  const [answer, setAnswer] = useState<{ asked: string; plan: SurveyOut } | null>(null);
-  const [refusal, setRefusal] = useState<{ asked: string; text: string } | null>(null);
+  const [settings, setSettings] = useState<Settings>({});
+  const [answer, setAnswer] = useState<{ asked: string; plan: SurveyOut | null; problem: string } | null>(null);
   const name = useRef("");
-  const wanted = area && settings ? request(robot, area, settings, name.current) : null;
-  const asked = wanted ? JSON.stringify(wanted) : "";
+  const asked = area && area.length > 2 ? JSON.stringify(requestOf(robot, area, settings, name.current)) : "";
 
   useEffect(() => {
     if (!flight || !asked) return;
     let gone = false;
     const timer = setTimeout(() => {
-      flight
-        .survey(JSON.parse(asked) as SurveyIn)
-        .then((plan) => gone || setAnswer({ asked, plan }))
-        .catch((error: unknown) => {
-          const text = error instanceof Error ? error.message : String(error);
-          if (!gone) setRefusal({ asked, text });
-        });
+      ask<SurveyOut>(`v1/missions/${flight.mission.id}/survey`, JSON.parse(asked))
+        .then((plan) => gone || setAnswer({ asked, plan, problem: "" }))
+        .catch((error: unknown) => gone || setAnswer({ asked, plan: null, problem: messageOf(error) }));
     }, PAUSE);
     return () => {
       gone = true;
@@ -80,8 +68,7 @@ export function useSurvey(
   // Another drone is another survey.
   useEffect(() => setArea(null), [robot]);
 
-  const plan = answer !== null && answer.asked === asked ? answer.plan : null;
-  const problem = refusal !== null && refusal.asked === asked ? refusal.text : "";
+  const { plan, problem } = answer?.asked === asked ? answer : { plan: null, problem: "" };
   const path = useMemo<Point[]>(() => plan?.waypoints.map((one) => [one.x, one.y]) ?? [], [plan]);
   const photos = plan?.photos?.places ?? NOWHERE;
   const begin = () => {
@@ -89,32 +76,13 @@ export function useSurvey(
     document.querySelector(".map")?.scrollIntoView({ block: "nearest" });
     name.current = `s${Date.now().toString(36).slice(-4)}`;
     setArea([]);
-    setSettings({
-      camera: abilities?.surveys ?? null,
-      height: Number(height.toFixed(1)),
-      resolution: null,
-      frontOverlap: 75,
-      sideOverlap: 65,
-      fieldOfView: abilities?.fieldOfView ?? 82.6,
-      overlap: 20,
-      width: null,
-      direction: null,
-      speed: null,
-      around: false,
-    });
+    const camera = surveyCamera(config);
+    const how = camera ? byCamera(camera.id) : byView(viewOf(config));
+    setSettings({ height: Number(height.toFixed(1)), ...how });
   };
-  if (!flight || !area || !settings) return { survey: null, begin };
+  if (!flight || !area) return { survey: null, begin };
   const survey: Survey = {
-    flight,
-    robot,
-    cameras: abilities?.cameras ?? [],
-    area,
-    path,
-    photos,
-    settings,
-    plan,
-    problem,
-    refused: problem !== "",
+    ...{ robot, config, area, path, photos, settings, plan, problem, refused: problem !== "" },
     add: (point) => area.length < CORNERS && setArea([...area, round(point)]),
     move: (corner, to) => setArea(area.map((one, place) => (place === corner ? round(to) : one))),
     undo: () => setArea(area.slice(0, -1)),
@@ -122,13 +90,12 @@ export function useSurvey(
     set: (some) => setSettings({ ...settings, ...some }),
     fly: () => {
       const waypoints = plan?.waypoints ?? [];
-      const [first, ...rest] = waypoints;
-      if (!first) return;
-      const last = waypoints[waypoints.length - 1]?.id ?? first.id;
-      const list: [Waypoint, ...Waypoint[]] = [first, ...rest];
+      const last = waypoints.at(-1);
+      if (!last) return;
+      const list = waypoints as [Waypoint, ...Waypoint[]];
       flight.fly({ robot, waypoints: list }, `survey ${name.current}`, (status) => {
         const known = [...aheadOf(status), ...status.visited];
-        return known.includes(last) ? `its ${waypoints.length} waypoints are in the plan` : null;
+        return known.includes(last.id) ? `its ${waypoints.length} waypoints are in the plan` : null;
       });
       setArea(null);
     },
@@ -136,49 +103,81 @@ export function useSurvey(
   return { survey, begin };
 }
 
-function request(robot: string, area: Point[], how: Settings, name: string): SurveyIn | null {
-  const corners = area.map(([east, north]): [number, number] => [east, north]);
-  const [a, b, c, ...more] = corners;
-  const planned = how.camera !== null && how.resolution !== null ? how.resolution : how.height;
-  if (!a || !b || !c || !(planned > 0)) return null;
-  const radians = Math.PI / 180;
-  return {
-    robot,
-    area: [a, b, c, ...more],
-    ...(how.camera !== null && how.resolution !== null
-      ? { ground_resolution: how.resolution / 100 }
-      : { height: how.height }),
-    ...strips(how),
-    angle: how.direction === null ? null : (90 - how.direction) * radians,
-    speed: how.speed,
-    around: how.around,
-    name,
-  };
+/** Degrees that a robot's first camera sees from side to side. */
+function viewOf(config: RobotConfig | undefined): number {
+  return camerasOf(config)[0]?.settings.horizontal_fov ?? FIELD_OF_VIEW;
 }
 
-/** What decides how far the lines lie apart. */
-function strips(how: Settings): Partial<SurveyIn> {
-  if (how.camera !== null) {
-    return {
-      camera: how.camera,
-      overlap: how.sideOverlap / 100,
-      front_overlap: how.frontOverlap / 100,
-    };
-  }
-  const overlap = how.overlap / 100;
-  return how.width === null
-    ? { field_of_view: (how.fieldOfView * Math.PI) / 180, overlap }
-    : { width: how.width, overlap };
+function requestOf(robot: string, area: Point[], settings: Settings, name: string): SurveyIn {
+  const corners = area.map(([east, north]) => [east, north]) as SurveyIn["area"];
+  // A width, a camera or its field of view decide how far the lines lie apart.
+  const view = settings.camera || settings.width ? { field_of_view: null } : {};
+  return { robot, area: corners, name, ...settings, ...view };
 }
 
 function round([east, north]: Point): Point {
   return [Number(east.toFixed(2)), Number(north.toFixed(2))];
 }
 
-export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boolean }) {
-  const { survey, ceiling, zones } = props;
-  const { settings, plan, area } = survey;
-  const given = (value: string) => (value === "" ? null : Number(value));
+type NumberSetting = "height" | "ground_resolution" | "front_overlap" | "overlap" | "field_of_view" | "width" | "speed";
+
+/** A setting that is a number, with how it is asked for. */
+interface NumberField extends Omit<FieldProps, "value"> {
+  setting: NumberSetting;
+  /** How many of its unit on the page are one of the request's. */
+  scale?: number;
+}
+
+const RESOLUTION_FIELD: NumberField = {
+  setting: "ground_resolution",
+  name: "resolution",
+  label: "Resolution, cm/pixel",
+  min: 0.05,
+  max: 1000,
+  step: "any",
+  scale: 100,
+};
+const OVERLAPS: NumberField[] = [
+  { setting: "front_overlap", name: "front", label: "Overlap ahead, %", min: 0, max: 95, step: "1", scale: 100 },
+  { setting: "overlap", name: "side", label: "Overlap aside, %", min: 0, max: 90, step: "1", scale: 100 },
+];
+const STRIPS: NumberField[] = [
+  { setting: "field_of_view", name: "fov", label: "Camera's view, °", min: 2, max: 170, scale: 1 / RADIANS },
+  { setting: "overlap", name: "overlap", label: "Overlap, %", min: 0, max: 90, step: "1", scale: 100 },
+  { setting: "width", name: "width", label: "Strips, m", min: 0.1, optional: "camera's" },
+];
+const SPEED: NumberField = { setting: "speed", name: "speed", label: "Speed, m/s", min: 0.1, optional: "cruise" };
+
+function SettingField({ survey, field }: { survey: Survey; field: NumberField }) {
+  const { setting, scale = 1, ...rest } = field;
+  const value = survey.settings[setting];
+  const given = (text: string) => (text === "" ? null : Number(text) / scale);
+  return (
+    <Field
+      {...rest}
+      value={value == null ? "" : String(Number((value * scale).toFixed(2)))}
+      onValue={(text) => survey.set({ [setting]: given(text) })}
+    />
+  );
+}
+
+export function SurveyPanel({ survey }: { survey: Survey }) {
+  const { settings, plan, area, config } = survey;
+  const { ceiling = CEILING, no_fly = [] } = config?.limits.geofence ?? {};
+  const cameras = camerasOf(config).map(({ id }): [string, string] => [id, `by ${id}`]);
+  const resolved = settings.ground_resolution != null;
+  const height: NumberField = { setting: "height", name: "height", label: "Height, m", min: 0.5, max: ceiling };
+  const fields = [resolved ? RESOLUTION_FIELD : height, ...(settings.camera ? OVERLAPS : STRIPS)];
+  const byHeight = {
+    height: settings.height ?? plan?.height ?? config?.limits.takeoff_height ?? 2,
+    ground_resolution: null,
+  };
+  const chooseHeight = (by: string) =>
+    survey.set(by === "height" ? byHeight : { height: null, ground_resolution: RESOLUTION });
+  const chooseCamera = (camera: string) => {
+    const how = resolved && camera ? {} : byHeight;
+    survey.set({ ...how, ...(camera ? byCamera(camera) : byView(viewOf(config))) });
+  };
   return (
     <form
       class="card surveyform"
@@ -191,66 +190,34 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
       <h2>Survey an area with {survey.robot}</h2>
       <p class="hint">
         {area.length < 3
-          ? "Click the corners on the map, or press Enter at its cross. Backspace takes one back."
-          : "Drag corners to change them, click for more."}
+          ? "Click the corners on the map, or press Enter at its cross. Backspace removes the last one."
+          : "Drag corners to change them, click to add more."}
       </p>
-      {survey.cameras.length > 0 && (
+      {cameras.length > 0 && (
         <label>
           <span>Pictures</span>
-          <select
+          <Select
             name="camera"
             value={settings.camera ?? ""}
-            onChange={(event) => survey.set({ camera: event.currentTarget.value || null })}
-          >
-            <option value="">none</option>
-            {survey.cameras.map((name) => (
-              <option key={name} value={name}>
-                by {name}
-              </option>
-            ))}
-          </select>
+            options={[["", "none"], ...cameras]}
+            onChoose={chooseCamera}
+          />
         </label>
       )}
-      {settings.camera !== null && (
+      {settings.camera && (
         <label>
           <span>Planned by</span>
-          <select
+          <Select
             name="by"
-            value={settings.resolution === null ? "height" : "resolution"}
-            onChange={(event) =>
-              survey.set({
-                resolution: event.currentTarget.value === "height" ? null : RESOLUTION,
-              })
-            }
-          >
-            <option value="height">height</option>
-            <option value="resolution">resolution</option>
-          </select>
+            value={resolved ? "resolution" : "height"}
+            options={[["height", "height"], ["resolution", "resolution"]]}
+            onChoose={chooseHeight}
+          />
         </label>
       )}
-      {settings.camera !== null && settings.resolution !== null ? (
-        <Field
-          key="resolution"
-          name="resolution"
-          label="Resolution, cm/pixel"
-          value={String(settings.resolution)}
-          min={0.05}
-          max={1000}
-          step="any"
-          onValue={(value) => survey.set({ resolution: Number(value) })}
-        />
-      ) : (
-        <Field
-          key="height"
-          name="height"
-          label="Height, m"
-          value={String(settings.height)}
-          min={0.5}
-          max={ceiling}
-          onValue={(value) => survey.set({ height: Number(value) })}
-        />
-      )}
-      {settings.camera === null ? <Strips survey={survey} /> : <Overlaps survey={survey} />}
+      {fields.map((field) => (
+        <SettingField key={field.name} survey={survey} field={field} />
+      ))}
       <Field
         name="direction"
         label="Direction, ° of north"
@@ -259,22 +226,15 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
         max={360}
         step="1"
         optional="shortest"
-        onValue={(value) => survey.set({ direction: given(value) })}
+        onValue={(text) => survey.set({ angle: text === "" ? null : (90 - Number(text)) * RADIANS })}
       />
-      <Field
-        name="speed"
-        label="Speed, m/s"
-        value=""
-        min={0.1}
-        optional="cruise"
-        onValue={(value) => survey.set({ speed: given(value) })}
-      />
-      {zones && (
+      <SettingField survey={survey} field={SPEED} />
+      {no_fly.length > 0 && (
         <label class="check">
           <input
             type="checkbox"
             name="around"
-            checked={settings.around}
+            checked={settings.around ?? false}
             onChange={(event) => survey.set({ around: event.currentTarget.checked })}
           />
           <span>Fly around no-fly zones</span>
@@ -286,80 +246,10 @@ export function SurveyPanel(props: { survey: Survey; ceiling: number; zones: boo
         <button type="submit" class="primary" disabled={plan === null}>
           Fly the survey
         </button>
-        <button type="button" disabled={area.length === 0} onClick={survey.undo}>
-          Undo corner
-        </button>
-        <button type="button" onClick={survey.cancel}>
-          Cancel
-        </button>
+        <Button disabled={area.length === 0} onClick={survey.undo}>Undo corner</Button>
+        <Button onClick={survey.cancel}>Cancel</Button>
       </div>
     </form>
-  );
-}
-
-/** Strips without pictures: of a given width, or as a camera sees. */
-function Strips({ survey }: { survey: Survey }) {
-  const { settings } = survey;
-  return (
-    <>
-      <Field
-        key="fov"
-        name="fov"
-        label="Camera's view, °"
-        value={String(settings.fieldOfView)}
-        min={2}
-        max={170}
-        onValue={(value) => survey.set({ fieldOfView: Number(value) })}
-      />
-      <Field
-        key="overlap"
-        name="overlap"
-        label="Overlap, %"
-        value={String(settings.overlap)}
-        min={0}
-        max={90}
-        step="1"
-        onValue={(value) => survey.set({ overlap: Number(value) })}
-      />
-      <Field
-        key="width"
-        name="width"
-        label="Strips, m"
-        value={settings.width === null ? "" : String(settings.width)}
-        min={0.1}
-        optional="as the camera sees"
-        onValue={(value) => survey.set({ width: value === "" ? null : Number(value) })}
-      />
-    </>
-  );
-}
-
-/** How much neighbouring pictures have in common. */
-function Overlaps({ survey }: { survey: Survey }) {
-  const { settings } = survey;
-  return (
-    <>
-      <Field
-        key="front"
-        name="front"
-        label="Overlap ahead, %"
-        value={String(settings.frontOverlap)}
-        min={0}
-        max={95}
-        step="1"
-        onValue={(value) => survey.set({ frontOverlap: Number(value) })}
-      />
-      <Field
-        key="side"
-        name="side"
-        label="Overlap aside, %"
-        value={String(settings.sideOverlap)}
-        min={0}
-        max={90}
-        step="1"
-        onValue={(value) => survey.set({ sideOverlap: Number(value) })}
-      />
-    </>
   );
 }
 
@@ -409,79 +299,41 @@ function Figures({ survey }: { survey: Survey }) {
       </p>
     );
   }
-  const short = plan.available !== null && plan.battery > plan.available;
+  const { photos, available, battery } = plan;
+  const short = available !== null && battery > available;
   const percent = (charge: number) => `${(100 * charge).toFixed(0)} %`;
+  const resolution = photos?.resolution;
+  const figures: FigureProps[] = [
+    { name: "Path", value: plan.length.toFixed(0), unit: "m" },
+    { name: "Time", value: clock(plan.seconds), unit: "min" },
+    { name: "Sweeps", value: String(plan.sweeps), unit: `of ${plan.width.toFixed(1)} m` },
+    { name: "Battery", value: percent(battery), unit: "with return", tone: short ? "bad" : "" },
+  ];
+  if (photos) {
+    figures.push(
+      { name: "Pictures", value: String(photos.places.length) },
+      { name: "One every", value: photos.interval.toFixed(1), unit: `s, ${photos.spacing.toFixed(1)} m` },
+      { name: "Resolution", value: resolution == null ? null : (100 * resolution).toPrecision(2), unit: "cm/pixel" },
+      { name: "Height", value: plan.height.toFixed(1), unit: "m" },
+    );
+  }
   return (
     <>
       <dl class="figures" data-testid="survey-plan" aria-live="polite">
-        <div class="figure">
-          <dt>Path</dt>
-          <dd>
-            {plan.length.toFixed(0)} <small>m</small>
-          </dd>
-        </div>
-        <div class="figure">
-          <dt>Time</dt>
-          <dd>{minutes(plan.seconds)}</dd>
-        </div>
-        <div class="figure">
-          <dt>Sweeps</dt>
-          <dd>
-            {plan.sweeps} <small>of {plan.width.toFixed(1)} m</small>
-          </dd>
-        </div>
-        <div class="figure">
-          <dt>Battery, and home</dt>
-          <dd class={short ? "bad" : ""}>{percent(plan.battery)}</dd>
-        </div>
-        {plan.photos && <Photos photos={plan.photos} height={plan.height} />}
+        {figures.map((figure) => (
+          <Figure key={figure.name} {...figure} />
+        ))}
       </dl>
-      {plan.photos?.warning && (
+      {photos?.warning && (
         <p class="problem" role="alert" data-testid="survey-warning">
-          {plan.photos.warning}.
+          {photos.warning}.
         </p>
       )}
       {short && (
         <p class="problem" role="alert">
-          Only {percent(plan.available ?? 0)} is there to spend: the drone will turn back before the
-          end.
+          The battery has only {percent(available)} to spend: the drone will return before the end.
         </p>
       )}
     </>
   );
-}
-
-function Photos({ photos, height }: { photos: SurveyPhotosOut; height: number }) {
-  return (
-    <>
-      <div class="figure">
-        <dt>Pictures</dt>
-        <dd>{photos.places.length}</dd>
-      </div>
-      <div class="figure">
-        <dt>One every</dt>
-        <dd>
-          {photos.interval.toFixed(1)} <small>s, {photos.spacing.toFixed(1)} m</small>
-        </dd>
-      </div>
-      <div class="figure">
-        <dt>Resolution</dt>
-        <dd>
-          {photos.resolution === null ? "–" : (100 * photos.resolution).toPrecision(2)}{" "}
-          <small>cm/pixel</small>
-        </dd>
-      </div>
-      <div class="figure">
-        <dt>Height</dt>
-        <dd>
-          {height.toFixed(1)} <small>m</small>
-        </dd>
-      </div>
-    </>
-  );
-}
-
-function minutes(seconds: number): string {
-  const whole = Math.round(seconds);
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
 }

@@ -2,6 +2,7 @@
 
 import { Compression, FetchSource, PMTiles, SharedPromiseCache } from "pmtiles";
 import { useEffect, useState } from "preact/hooks";
+import { messageOf, token } from "./connection";
 import type { TilesOut } from "./wire";
 
 /** Kinds of pictures by their number in the archive's header. */
@@ -74,7 +75,7 @@ interface ShownMap {
 }
 
 /** The tiles of a flight: those with an address each at once, an archive's once it is opened. */
-export function useArchive(tiles: TilesOut | null | undefined, token: string): ShownMap {
+export function useArchive(tiles: TilesOut | null): ShownMap {
   const [shown, setShown] = useState<ShownMap | null>(null);
   useEffect(() => {
     setShown(null);
@@ -82,13 +83,12 @@ export function useArchive(tiles: TilesOut | null | undefined, token: string): S
     let opened: TileArchive | null = null;
     let gone = false;
     const broken = (error: unknown) => {
-      const why = error instanceof Error ? error.message : String(error);
-      const problem = `the map's archive ${nameOf(tiles)} cannot be read: ${why}`;
+      const problem = `the map's archive ${nameOf(tiles)} cannot be read: ${messageOf(error)}`;
       if (!gone) setShown((before) => ({ tiles: null, archive: null, ...before, problem }));
     };
     // Nobody else is told the token.
     const own = new URL(tiles.url, document.baseURI).origin === location.origin;
-    const headers = new Headers(own ? { Authorization: `Bearer ${token}` } : {});
+    const headers = new Headers(own ? { Authorization: `Bearer ${token()}` } : {});
     const archive = new PMTiles(
       new FetchSource(tiles.url, headers),
       new SharedPromiseCache(KEPT_PARTS, true, unpacked),
@@ -109,9 +109,9 @@ export function useArchive(tiles: TilesOut | null | undefined, token: string): S
       gone = true;
       opened?.close();
     };
-  }, [tiles, token]);
+  }, [tiles]);
   if (tiles?.archive) return shown ?? { tiles: null, archive: null, problem: "" };
-  return { tiles: tiles ?? null, archive: null, problem: "" };
+  return { tiles, archive: null, problem: "" };
 }
 
 function nameOf({ url }: TilesOut): string {

@@ -2,9 +2,10 @@
 
 import { useEffect, useLayoutEffect, useMemo, useState } from "preact/hooks";
 import "./timeline.css";
-import { writeFragment } from "./connection";
+import { readFragment, writeFragment } from "./connection";
 import { Lanes, type RecordedDrone, clock, eventsOf, stateAt } from "./lanes";
 import { lastBefore, type Playback } from "./playback";
+import { Button, Select } from "./widgets";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const STEP = 1;
@@ -43,7 +44,7 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
     };
     const press = (event: KeyboardEvent) => {
       const act = keys[event.key];
-      if (!act || event.ctrlKey || event.metaKey || event.altKey || taken(event)) return;
+      if (!act || event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
       event.preventDefault();
       act(event);
     };
@@ -70,54 +71,30 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
   }, [playback]);
 
   const states = drones.map((one) => stateAt(one, playback.time)).filter(Boolean);
-  const said = [`${playback.time.toFixed(1)} of ${end.toFixed(1)} seconds`, ...states].join(", ");
+  const spoken = [`${playback.time.toFixed(1)} of ${end.toFixed(1)} seconds`, ...states].join(", ");
   return (
     <section class="card timeline" aria-label="Playback">
       <div class="player">
-        <button
-          type="button"
-          title="Event before ([)"
-          aria-label="Event before"
-          onClick={() => toEvent(false)}
-        >
+        <Button title="Event before ([)" label="Event before" onClick={() => toEvent(false)}>
           <Skip ahead={false} />
-        </button>
-        <button
-          type="button"
-          class="primary"
-          title="Play or pause (space)"
-          data-testid="play"
-          onClick={toggle}
-        >
+        </Button>
+        <Button class="primary" title="Play or pause (space)" testid="play" onClick={toggle}>
           {playback.playing ? "Pause" : "Play"}
-        </button>
-        <button
-          type="button"
-          title="Next event (])"
-          aria-label="Next event"
-          onClick={() => toEvent(true)}
-        >
+        </Button>
+        <Button title="Next event (])" label="Next event" onClick={() => toEvent(true)}>
           <Skip ahead />
-        </button>
-        <select
-          aria-label="Speed"
+        </Button>
+        <Select
+          label="Speed"
           value={String(playback.speed)}
-          onChange={(event) => {
-            playback.speed = Number(event.currentTarget.value);
-          }}
-        >
-          {SPEEDS.map((speed) => (
-            <option key={speed} value={String(speed)}>
-              {speed} ×
-            </option>
-          ))}
-        </select>
+          options={SPEEDS.map((speed) => [String(speed), `${speed} ×`])}
+          onChoose={(speed) => (playback.speed = Number(speed))}
+        />
         <output class="time" data-testid="time" data-time={playback.time}>
           {clock(playback.time)} <small>of {clock(end)}</small>
         </output>
         <span class="grow" />
-        <button
-          type="button"
+        <Button
           title="Copy a link to this moment; who opens it needs a token of their own"
           onClick={() => {
             writeFragment({ t: playback.time.toFixed(2) });
@@ -125,7 +102,7 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
           }}
         >
           {copied ? "Copied" : "Link"}
-        </button>
+        </Button>
       </div>
       <div
         class="lanes"
@@ -150,7 +127,7 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
         type="range"
         class="seek"
         aria-label="Mission time"
-        aria-valuetext={said}
+        aria-valuetext={spoken}
         min={begin}
         max={end}
         step="any"
@@ -180,13 +157,13 @@ function Skip({ ahead }: { ahead: boolean }) {
 
 /** The moment that the address names, mission seconds; null for none. */
 export function momentOfLink(): number | null {
-  const text = new URLSearchParams(location.hash.slice(1)).get("t");
+  const text = readFragment("t");
   const time = text === null ? NaN : Number(text);
   return Number.isFinite(time) ? time : null;
 }
 
 /** Whether what has the focus takes a key for itself. */
-function taken(event: KeyboardEvent): boolean {
+function isTyping(event: KeyboardEvent): boolean {
   const at = event.target;
   if (!(at instanceof HTMLElement)) return false;
   if (at instanceof HTMLInputElement) return at.type !== "range";

@@ -9,9 +9,9 @@ const OLD = 3;
 const SLOW = 0.5;
 
 /** The aircraft that the drones of a flight hear of, each once: as the chosen drone hears it. */
-export function trafficOf(statuses: Record<string, StatusOut>, chosen: string): TrafficOut[] {
+export function trafficOf(statuses: StatusOut[], chosen: StatusOut | undefined): TrafficOut[] {
   const found = new Map<number, TrafficOut>();
-  for (const status of [statuses[chosen], ...Object.values(statuses)]) {
+  for (const status of [chosen, ...statuses]) {
     for (const one of status?.traffic ?? []) {
       if (!found.has(one.address)) found.set(one.address, one);
     }

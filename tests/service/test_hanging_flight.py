@@ -28,7 +28,7 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
         flight = process_of(provider, id_)
         flight.suspend()
         try:
-            page.until(f"{_BANNER}?.innerText.includes('No word from the flight')")
+            page.until(f"{_BANNER}?.innerText.includes('The flight has been silent')")
             told = provider.mission(id_)["told"]["one"]
             time.sleep(1.0)
             # Who asks once sees how old it is.
@@ -36,7 +36,7 @@ def test_the_page_says_that_what_it_shows_is_old() -> None:
             assert time.time() - told > 2.5
             # The service is there: only the flight is not.
             assert page.run("document.querySelector('[data-testid=connection]').innerText") == (
-                "no word"
+                "silent"
             )
         finally:
             flight.resume()

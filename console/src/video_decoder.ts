@@ -12,13 +12,13 @@ const PARAMETERS = 7;
  * How pictures are asked for: H.264 takes a tenth of JPEG's bytes, but more of the drone's processor,
  * so not from this machine itself. The address' word `pictures` asks for one of them.
  */
-export async function wantedForm(): Promise<"h264" | "jpeg"> {
+export async function pictureForm(): Promise<"h264" | "jpeg"> {
   const local = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
   const word = readFragment("pictures") ?? (local ? "jpeg" : "h264");
   // A page that is neither local nor HTTPS may not decode.
   if (word !== "h264" || typeof VideoDecoder === "undefined") return "jpeg";
-  const told = await VideoDecoder.isConfigSupported({ codec: ASKED }).catch(() => null);
-  return told?.supported ? "h264" : "jpeg";
+  const support = await VideoDecoder.isConfigSupported({ codec: ASKED }).catch(() => null);
+  return support?.supported ? "h264" : "jpeg";
 }
 
 /** The name of a key frame's codec, by its sequence parameter set; empty without one. */
@@ -33,7 +33,7 @@ function codecOf(data: Uint8Array): string {
 }
 
 /** Decoder of one camera's video. */
-export class VideoPictures {
+export class VideoDecoding {
   private decoder: VideoDecoder | undefined;
   private codec = "";
   private count = 0;

@@ -3,8 +3,9 @@
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
 import { useEscape } from "./escape";
 import type { Flight } from "./flight";
-import { Hand, KEYS } from "./hand";
-import type { Abilities } from "./place";
+import { KEYS, ManualControl } from "./manual_control";
+import type { RobotConfig } from "./wire";
+import { Button } from "./widgets";
 
 const TURN = Math.PI / 4;
 const PAD: { key: string; face: string; name: string }[] = [
@@ -18,46 +19,46 @@ const PAD: { key: string; face: string; name: string }[] = [
   { key: "ArrowDown", face: "▼", name: "Descend" },
 ];
 
-export function HandPanel(props: {
+export function ManualControlPanel(props: {
   flight: Flight;
   robot: string;
   mayFly: boolean;
-  abilities: Abilities | undefined;
+  config: RobotConfig | undefined;
 }) {
-  const { flight, robot, mayFly, abilities } = props;
+  const { flight, robot, mayFly } = props;
+  const limits = props.config?.limits;
   const [, draw] = useState(0);
-  const [hand, setHand] = useState<Hand | null>(null);
-  const fastest = abilities?.maxSpeed ?? 5;
-  const [level, setLevel] = useState(Math.min(abilities?.cruiseSpeed ?? 1, fastest));
+  const [control, setControl] = useState<ManualControl | null>(null);
+  const fastest = limits?.max_speed ?? 5;
+  const [level, setLevel] = useState(Math.min(limits?.cruise_speed ?? 1, fastest));
   const speed = useRef(level);
   speed.current = level;
   const panel = useRef<HTMLElement>(null);
   const changed = useCallback(() => draw((count) => count + 1), []);
-  useEffect(() => () => hand?.release(), [hand, robot]);
+  useEffect(() => () => control?.release(), [control, robot]);
 
   const status = flight.status(robot);
-  const holds = hand !== null && !hand.over;
-  useEscape(holds ? () => hand.release("let go") : null);
+  const holds = control !== null && !control.over;
+  useEscape(holds ? () => control.release("let go") : null);
   const others = !holds && status?.pilot ? status.pilot : "";
-  const take = () => {
-    const climb = abilities?.maxClimb ?? 1.5;
-    const speeds = () => ({
-      level: speed.current,
-      climb: Math.min(speed.current, climb),
-      turn: TURN,
-    });
-    setHand(new Hand(flight.controls(robot), speeds, changed));
+  const takeOver = () => {
+    const climb = limits?.max_climb ?? 1.5;
+    const speeds = () => {
+      const level = speed.current;
+      return { forward: level, left: level, up: Math.min(level, climb), yaw_rate: TURN };
+    };
+    setControl(new ManualControl(flight.controls(robot), speeds, changed));
     panel.current?.focus();
   };
-  const press = (key: string) => hand?.held.add(key);
-  const lift = (key: string) => hand?.held.delete(key);
+  const press = (key: string) => control?.held.add(key);
+  const lift = (key: string) => control?.held.delete(key);
   const [tone, text] = !holds
     ? others
       ? ["warn", `${others} has the controls`]
       : ["", "nobody has the controls"]
-    : hand.silent
+    : control.silent
       ? ["bad", "no answer"]
-      : hand.taken
+      : control.granted
         ? ["good", "you have the controls"]
         : ["warn", "asking…"];
 
@@ -78,7 +79,7 @@ export function HandPanel(props: {
       onBlur={(event) => {
         // Keys that are lifted elsewhere are not heard of here.
         const to = event.relatedTarget;
-        if (!(to instanceof Node && event.currentTarget.contains(to))) hand?.held.clear();
+        if (!(to instanceof Node && event.currentTarget.contains(to))) control?.held.clear();
       }}
     >
       <header>
@@ -86,9 +87,9 @@ export function HandPanel(props: {
         <span class={`badge ${tone}`} role="status" data-testid="controls">
           {text}
         </span>
-        {holds && hand.lag !== null && <small>{hand.lag.toFixed(0)} ms</small>}
+        {holds && control.lag !== null && <small>{control.lag.toFixed(0)} ms</small>}
       </header>
-      {hand?.over && hand.text && <p class="why">{hand.text}</p>}
+      {control?.over && control.text && <p class="why">{control.text}</p>}
       {holds ? (
         <>
           <p class="hint">
@@ -100,7 +101,7 @@ export function HandPanel(props: {
               <button
                 key={key}
                 type="button"
-                class={hand.held.has(key) ? "held" : ""}
+                class={control.held.has(key) ? "held" : ""}
                 title={name}
                 aria-label={name}
                 onPointerDown={(event) => {
@@ -128,19 +129,16 @@ export function HandPanel(props: {
               onInput={(event) => setLevel(Number(event.currentTarget.value))}
             />
           </label>
-          <button type="button" class="release" onClick={() => hand.release("let go")}>
-            Let go
-          </button>
+          <Button class="release" onClick={() => control.release("let go")}>Let go</Button>
         </>
       ) : (
-        <button
-          type="button"
+        <Button
           class="take"
           disabled={!mayFly || flight.over || others !== "" || !IN_THE_AIR.has(status?.state ?? "")}
-          onClick={take}
+          onClick={takeOver}
         >
           Take over
-        </button>
+        </Button>
       )}
     </section>
   );

@@ -1,10 +1,12 @@
-// The camera: pictures of a live or a recorded flight with what was found in them, and their depth.
+// The camera: pictures of a drone in flight or of a recording, with what was found in them, and their depth.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { drawScale } from "./depth";
-import type { ClockOffset, Flight } from "./flight";
+import type { Flight } from "./flight";
 import { type Painted, paint } from "./paint";
-import { KEPT, Pictures, type Target } from "./pictures";
+import { KEPT, Pictures } from "./pictures";
+import { Button, Card, NameChoice } from "./widgets";
+import type { MissionOut, TargetItem } from "./wire";
 
 const STALE = 1500;
 
@@ -13,32 +15,37 @@ interface Seen extends Painted {
   stamp: number;
   captured: number;
   measured: boolean;
-  target: Target["state"] | null;
+  target: TargetItem["state"] | null;
   /** Metres at which the depth's colours end, where it is shown. */
   range: number | null;
 }
 
 /** What is said of the target in the picture that is shown. */
-const TARGETS: Record<Target["state"], { text: string; tone: string }> = {
+const TARGETS: Record<TargetItem["state"], { text: string; tone: string }> = {
   sure: { text: "◎ follows", tone: "good" },
   likely: { text: "◎ follows the likelier one", tone: "warn" },
   uncertain: { text: "target uncertain: holds", tone: "warn" },
   unseen: { text: "target not in sight", tone: "warn" },
 };
 
-interface VideoProps {
+interface CameraProps {
   flight: Flight;
+  /** Whose cameras are shown. */
+  mission: MissionOut;
+  /** The camera that is shown at first belongs to this robot, if it has one. */
+  robot?: string;
   /** Whether it takes the map's place; with what changes that, where it may. */
   large?: boolean;
   onLarge?(large: boolean): void;
 }
 
-export function Video({ flight, large = false, onLarge }: VideoProps) {
-  const streams = flight.mission.streams;
+export function Camera({ flight, mission, robot = "", large = false, onLarge }: CameraProps) {
+  const { id, streams } = mission;
   const names = Object.keys(streams).sort();
   const cameras = names.filter((name) => streams[name] === "pictures");
   const [chosen, setChosen] = useState("");
-  const camera = cameras.includes(chosen) ? chosen : (cameras[0] ?? "");
+  const first = cameras.find((name) => name.startsWith(`${robot}/`)) ?? cameras[0] ?? "";
+  const camera = cameras.includes(chosen) ? chosen : first;
   const canvas = useRef<HTMLCanvasElement>(null);
   const [seen, setSeen] = useState<Seen | null>(null);
   const [deep, setDeep] = useState(false);
@@ -48,9 +55,9 @@ export function Video({ flight, large = false, onLarge }: VideoProps) {
     if (!camera) return;
     // Of a recording, the picture of the moment is shown and no other one.
     const pictures = new Pictures(flight.recorded ? 1 : KEPT, deep);
-    let asked = false;
+    let requested = false;
     const draw = () => {
-      asked = false;
+      requested = false;
       const picture = pictures.newest(camera);
       if (!picture || !canvas.current) return;
       const { stamp, captured, measured } = picture;
@@ -58,75 +65,49 @@ export function Video({ flight, large = false, onLarge }: VideoProps) {
       const target = picture.target?.state ?? null;
       setSeen({ stamp, captured, measured, target, range, ...paint(canvas.current, picture) });
     };
-    const later = () => {
-      if (!asked) requestAnimationFrame(draw);
-      asked = true;
+    const redraw = () => {
+      if (!requested) requestAnimationFrame(draw);
+      requested = true;
     };
-    const wanted = { camera, finders: finders.split(","), depth: deep };
-    const leave = flight.source.watch(wanted, {
-      found: (message) => {
-        pictures.found(message);
-        flight.see(message);
-        later();
+    const leave = flight.source.watch({ mission: id, camera, finders: finders.split(","), depth: deep }, {
+      onItem: (message, blob) => {
+        flight.marks.add(message);
+        // Of a live flight, the next state draws it.
+        if (flight.recorded && message.item.is === "Detections") flight.changed();
+        return pictures.add(message, blob).then(redraw);
       },
-      picture: (message, data) => pictures.take(message, data).then(later),
-      nothing: () => setSeen(null),
+      onNothing: () => setSeen(null),
+      onTime: (now) => flight.clock.receive(now),
     });
     return () => {
       leave();
       pictures.close();
+      flight.marks.clear();
     };
-  }, [camera, finders, flight, deep]);
+  }, [id, camera, finders, flight, deep]);
 
-  if (cameras.length === 0) {
-    return (
-      <section class="card video" aria-label="Camera">
-        <p class="muted">This flight shows no camera</p>
-      </section>
-    );
-  }
+  if (cameras.length === 0) return null;
+  const head = (
+    <>
+      {cameras.length === 1 && <span class="muted">{camera}</span>}
+      <NameChoice label="Camera shown" names={cameras} value={camera} onChoose={setChosen} />
+      {(seen?.measured || deep) && (
+        <Button class="plain" pressed={deep} onClick={() => setDeep(!deep)}>Depth</Button>
+      )}
+      {onLarge && (
+        <Button class="plain enlarge" title="Swap camera and map" onClick={() => onLarge(!large)}>
+          {large ? "Small" : "Large"}
+        </Button>
+      )}
+      {/* Always there: what comes into it is read out. */}
+      <span role="status" data-testid="target">
+        {seen?.target && <span class={`badge ${TARGETS[seen.target].tone}`}>{TARGETS[seen.target].text}</span>}
+      </span>
+      {seen && !flight.recorded && <Age flight={flight} captured={seen.captured} />}
+    </>
+  );
   return (
-    <section class="card video" aria-label="Camera">
-      <header>
-        <h2>Camera</h2>
-        {cameras.length > 1 && (
-          <select
-            aria-label="Camera shown"
-            value={camera}
-            onChange={(event) => setChosen(event.currentTarget.value)}
-          >
-            {cameras.map((name) => (
-              <option key={name}>{name}</option>
-            ))}
-          </select>
-        )}
-        {cameras.length === 1 && <span class="muted">{camera}</span>}
-        {(seen?.measured || deep) && (
-          <button
-            type="button"
-            class="plain"
-            aria-pressed={deep}
-            onClick={() => setDeep(!deep)}
-          >
-            Depth
-          </button>
-        )}
-        {onLarge && (
-          <button
-            type="button"
-            class="plain enlarge"
-            title="Have camera and map change places"
-            onClick={() => onLarge(!large)}
-          >
-            {large ? "Small" : "Large"}
-          </button>
-        )}
-        {/* Always there: what comes into it is read out. */}
-        <span role="status" data-testid="target">
-          {seen?.target && <span class={`badge ${TARGETS[seen.target].tone}`}>{TARGETS[seen.target].text}</span>}
-        </span>
-        {seen && !flight.recorded && <Age clock={flight.clock} captured={seen.captured} over={flight.over} />}
-      </header>
+    <Card kind="video" label="Camera" head={head}>
       <div class="screen">
         {/* Its first picture gives it its shape. */}
         <canvas
@@ -151,18 +132,13 @@ export function Video({ flight, large = false, onLarge }: VideoProps) {
           </span>
         )}
       </div>
-    </section>
+    </Card>
   );
 }
 
-function Age(props: { clock: ClockOffset; captured: number; over: boolean }) {
-  const [, tick] = useState(0);
-  useEffect(() => {
-    const timer = setInterval(() => tick((count) => count + 1), 250);
-    return () => clearInterval(timer);
-  }, []);
-  const age = props.clock.age(props.captured);
-  if (props.over) return <span class="badge">flight over</span>;
+function Age({ flight, captured }: { flight: Flight; captured: number }) {
+  const age = flight.clock.age(captured);
+  if (flight.over) return <span class="badge">flight over</span>;
   if (age === null) return null;
   const stale = age > STALE;
   const text = age < 1000 ? `${Math.round(age / 10) * 10} ms` : `${(age / 1000).toFixed(1)} s`;
