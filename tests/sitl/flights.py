@@ -18,6 +18,7 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, Command, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -27,7 +28,7 @@ from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborSched
 from aerodaas.testing.channel import Impairment
 from sitl.relay import Relay
 
-__all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]
+__all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "newest_log", "robot_at", "survey"]
 
 _PERIOD = 0.05
 PERFECT = Impairment()
@@ -43,6 +44,18 @@ def survey(*places: tuple[float, float], hover: float = 1.0) -> AddNavigation:
 
 FARM = survey((0, 0), (0, 10), (10, 10), (10, 0), hover=5.0)
 FAR = survey((0, 60))
+
+
+def newest_log(vehicle: MavlinkVehicle) -> LogEntry:
+    """The newest log, once it grows no more: a busy simulator writes on after the landing."""
+    size = -1
+    for _ in range(30):
+        log = vehicle.logs()[-1]
+        if log.size == size:
+            return log
+        size = log.size
+        time.sleep(2.0)
+    raise AssertionError(f"log {log.number} goes on growing")
 
 
 def robot_at(

@@ -28,7 +28,7 @@ from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightReference, NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
 from sitl.autopilot import Autopilot
-from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
+from sitl.flights import FAR, FARM, SitlFlight, newest_log, robot_at, survey
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
@@ -228,10 +228,10 @@ def test_its_own_log_is_fetched(autopilot: Autopilot, tmp_path: Path) -> None:
     """After a flight: the newest one is whole, and its own reader finds the flight in it."""
     with SitlFlight(autopilot.url, survey((0, 3))) as flight:
         finish(flight)
-        logs = flight.vehicle.logs()
-        file = flight.vehicle.fetch_log(logs[-1], tmp_path)
-        print(f"\n{len(logs)} logs; {file.name}: {file.stat().st_size} bytes")  # noqa: T201
-        assert file.stat().st_size == logs[-1].size
+        log = newest_log(flight.vehicle)
+        file = flight.vehicle.fetch_log(log, tmp_path)
+        print(f"\n{file.name}: {file.stat().st_size} bytes")  # noqa: T201
+        assert file.stat().st_size == log.size
     if autopilot.family == "ardupilot":
         reader = DFReader.DFReader_binary(str(file))
         heights = []

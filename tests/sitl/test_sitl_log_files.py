@@ -18,9 +18,8 @@ from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.testing.channel import Impairment
-from sitl.flights import robot_at
+from sitl.flights import newest_log, robot_at
 from sitl.relay import Relay
 
 STEPS = 0.01
@@ -77,18 +76,6 @@ def own_time(vehicle: MavlinkVehicle) -> tuple[float, float]:
     return told
 
 
-def at_rest(vehicle: MavlinkVehicle) -> LogEntry:
-    """Its log, once it grows no more."""
-    before = 0
-    for _ in range(30):
-        (log,) = vehicle.logs()
-        if log.size == before:
-            return log
-        before = log.size
-        time.sleep(2.0)
-    raise AssertionError("it goes on writing")
-
-
 def test_a_log_comes_down_byte_for_byte(
     relayed: tuple[str, Relay], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -104,7 +91,7 @@ def test_a_log_comes_down_byte_for_byte(
         assert vehicle.telemetry.serves_files
         began, ended = around_a_change(vehicle)
         vehicle.parameters.set("LOG_DISARMED", 0.0)
-        log = at_rest(vehicle)
+        log = newest_log(vehicle)
         (original,) = (tmp_path / "state" / "logs").glob("*.BIN")
         link, sent = vehicle.connection.link, list[Any]()
         send = link.send
