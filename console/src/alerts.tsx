@@ -1,7 +1,8 @@
 // Alerts: their log, the list of them, the newest one for the bar, and the sound of a new one.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { Button, Card, wordsOf } from "./widgets";
+import { Badge, Button, Card } from "./widgets";
+import { wordsOf } from "./words";
 
 /** The kind of alert by which a flight records the commands that it was given. */
 const COMMAND_KIND = "console_command";
@@ -102,9 +103,9 @@ export function Alerts({ log, onAcknowledge }: AlertsProps) {
       label="Alerts"
       head={
         <>
-          <span class={`badge ${open ? "warn" : "good"}`} data-testid="alerts">
+          <Badge tone={open ? "warn" : "good"} testid="alerts">
             {live ? (open ? `${open} new` : "none new") : `${log.alerts.length} so far`}
-          </span>
+          </Badge>
           {live && <Sound log={log} />}
           {open > 1 && <Button class="plain" onClick={() => onAcknowledge?.(null)}>Acknowledge all</Button>}
         </>
@@ -131,7 +132,7 @@ export function NewestAlert({ log, onAcknowledge }: AlertsProps) {
     <p class="alert" role="status" data-testid="newest-alert">
       {newest ? (
         <>
-          <span class="badge warn">{open.length > 1 ? `${open.length} alerts` : "alert"}</span>
+          <Badge tone="warn">{open.length > 1 ? `${open.length} alerts` : "alert"}</Badge>
           <AlertText alert={newest} />
           <Acknowledge alert={newest} onAcknowledge={onAcknowledge} />
         </>

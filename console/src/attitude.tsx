@@ -1,5 +1,6 @@
 // The artificial horizon: roll and pitch as a pilot sees them, with the heading.
 
+import { bearingOf } from "./words";
 import type { StatusOut } from "./wire";
 
 /** Pixels of a degree of pitch; a drone pitches more than 30° in no ordinary flight. */
@@ -11,8 +12,6 @@ export function Attitude({ status }: { status: StatusOut }) {
   if (status.roll == null || status.pitch == null || status.yaw == null) return null;
   // Pitch is positive with the nose down, roll with the right side down, yaw counter-clockwise from east.
   const [roll, down] = [degrees(status.roll), degrees(status.pitch)];
-  const heading = (((90 - degrees(status.yaw)) % 360) + 360) % 360;
-  const shown = `${String(Math.round(heading) % 360).padStart(3, "0")}°`;
   const side = (value: number, positive: string, negative: string) =>
     `${Math.abs(value).toFixed(0)}° ${value < 0 ? negative : positive}`;
   return (
@@ -35,7 +34,7 @@ export function Attitude({ status }: { status: StatusOut }) {
       </svg>
       <dl>
         <dt>Heading</dt>
-        <dd>{shown}</dd>
+        <dd>{bearingOf(Math.cos(status.yaw), Math.sin(status.yaw))}</dd>
         <dt>Roll</dt>
         <dd>{side(roll, "right", "left")}</dd>
         <dt>Pitch</dt>

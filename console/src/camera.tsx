@@ -5,7 +5,7 @@ import { drawScale } from "./depth";
 import type { Flight } from "./flight";
 import { type Painted, paint } from "./paint";
 import { KEPT, Pictures } from "./pictures";
-import { Button, Card, NameChoice } from "./widgets";
+import { Badge, Button, Card, NameChoice } from "./widgets";
 import type { MissionOut, TargetItem } from "./wire";
 
 const STALE = 1500;
@@ -101,7 +101,7 @@ export function Camera({ flight, mission, robot = "", large = false, onLarge }: 
       )}
       {/* Always there: what comes into it is read out. */}
       <span role="status" data-testid="target">
-        {seen?.target && <span class={`badge ${TARGETS[seen.target].tone}`}>{TARGETS[seen.target].text}</span>}
+        {seen?.target && <Badge tone={TARGETS[seen.target].tone}>{TARGETS[seen.target].text}</Badge>}
       </span>
       {seen && !flight.recorded && <Age flight={flight} captured={seen.captured} />}
     </>
@@ -138,14 +138,14 @@ export function Camera({ flight, mission, robot = "", large = false, onLarge }: 
 
 function Age({ flight, captured }: { flight: Flight; captured: number }) {
   const age = flight.clock.age(captured);
-  if (flight.over) return <span class="badge">flight over</span>;
+  if (flight.over) return <Badge>flight over</Badge>;
   if (age === null) return null;
   const stale = age > STALE;
   const text = age < 1000 ? `${Math.round(age / 10) * 10} ms` : `${(age / 1000).toFixed(1)} s`;
   return (
-    <span class={`badge ${stale ? "bad" : "good"}`} data-testid="age">
+    <Badge tone={stale ? "bad" : "good"} testid="age">
       {stale ? `stale: ${text} old` : `${text} old`}
-    </span>
+    </Badge>
   );
 }
 

@@ -28,9 +28,7 @@ function ChartCard(props: { label: string; flight: Flight; times: number[]; char
           <figcaption>
             {name} <small>{unit}</small>
             {keys.map(([colour, text]) => (
-              <span key={colour} class={`key ${colour}`}>
-                {text}
-              </span>
+              <span key={colour} class={`key ${colour}`}>{text}</span>
             ))}
           </figcaption>
           <Chart {...{ times, ...chart, ...timeOf(flight) }} />

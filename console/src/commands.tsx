@@ -4,13 +4,13 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import "./commands.css";
 import { NewestAlert } from "./alerts";
-import { useEscape } from "./escape";
 import { COMMANDS, type Flight, type Order, type Stage, type Word, isEnding, speedOf, stageOf, toneOf } from "./flight";
-import { Button, Card, wordsOf } from "./widgets";
+import { Badge, Button, Card, useEscape } from "./widgets";
+import { wordsOf } from "./words";
 
 const TITLES: Record<Word, string> = {
-  pause: "Hover here until told to resume",
-  resume: "Go on with the plan",
+  pause: "Hover here until you resume",
+  resume: "Continue the plan",
   "return-home": "Fly back to the place of take-off, and land",
   clear: "Drop the plan, and hover",
   land: "Land at once, where the drone is",
@@ -74,9 +74,7 @@ export function Bar(props: { label: string; flight: Flight; now: ComponentChildr
   const [newest] = flight.orders;
   return (
     <section class="card flightbar" aria-label={label}>
-      <p class={`now ${flight.stale ? "stale" : ""}`} data-testid="now">
-        {now}
-      </p>
+      <p class={`now ${flight.stale ? "stale" : ""}`} data-testid="now">{now}</p>
       <div class="newest">
         <NewestAlert log={flight.log} onAcknowledge={flight.acknowledge} />
         {newest && (
@@ -104,11 +102,9 @@ export function FlightBar({ flight, robot, mayFly }: { flight: Flight; robot: st
       <strong>{robot}</strong>
       {status ? (
         <>
-          <span class={`badge ${toneOf(status)}`}>{wordsOf(status.state)}</span>
+          <Badge tone={toneOf(status)}>{wordsOf(status.state)}</Badge>
           <span class="figures">{figures?.filter(Boolean).join(" · ")}</span>
-          <span class="why" title={status.reason}>
-            {status.reason}
-          </span>
+          <span class="why" title={status.reason}>{status.reason}</span>
         </>
       ) : (
         <span class="muted">no state yet</span>
@@ -155,11 +151,7 @@ export function CommandLog(props: { flight: Flight; mayFly: boolean; hint?: stri
   const single = flight.source.kind === "live";
   if (!single && commands.length + flight.orders.length === 0) return null;
   return (
-    <Card
-      kind="commandlog"
-      label="Commands"
-      head={!mayFly && single && <span class="badge">watch only</span>}
-    >
+    <Card kind="commandlog" label="Commands" head={!mayFly && single && <Badge>watch only</Badge>}>
       {hint && <p class="hint">{hint}</p>}
       <ol class="orders" aria-live="polite" data-testid="orders">
         {flight.orders.map((order) => (

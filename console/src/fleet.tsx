@@ -7,15 +7,15 @@ import "./fleet.css";
 import { Alerts } from "./alerts";
 import { Camera } from "./camera";
 import { Bar, CommandButtons, CommandLog } from "./commands";
-import { useEscape } from "./escape";
 import { type Flight, type Vehicle, aheadOf, concerns, isEnding, useFlight } from "./flight";
 import { FlightMap } from "./map";
 import { Page, Silence } from "./page";
 import { type LeasedArea, robotsOf } from "./place";
-import { Badge, PreflightPanel } from "./preflight";
+import { PreflightBadge, PreflightPanel } from "./preflight";
 import { useScenery } from "./scenery";
 import { FleetSource } from "./source";
-import { Button, Card, LOW, wordsOf } from "./widgets";
+import { Badge, Button, Card, LOW, useEscape } from "./widgets";
+import { lasting, wordsOf } from "./words";
 import type { AccountOut, FleetOut, MissionOut, RobotOut } from "./wire";
 
 const WAITING = new Set<MissionOut["phase"]>(["submitted", "rehearsing", "awaiting_approval", "queued"]);
@@ -80,7 +80,7 @@ export function FleetPage(props: FleetProps) {
     <>
       <strong>{rows.length} drones</strong>
       <span class="figures">{rows.filter((row) => row.status).length} in flight</span>
-      {lost > 0 && <span class="badge bad">{lost} lost</span>}
+      {lost > 0 && <Badge tone="bad">{lost} lost</Badge>}
     </>
   );
   return (
@@ -144,16 +144,9 @@ function nextOf({ robot, status, waiting }: Row): string {
   return waiting ? `${waiting.name}: ${wordsOf(waiting.phase)}` : robot.objection;
 }
 
-function ago(age: number | null): string {
-  if (age === null) return "";
-  const seconds = age / 1000;
-  if (seconds < 120) return `${seconds.toFixed(0)} s`;
-  return seconds < 7200 ? `${(seconds / 60).toFixed(0)} min` : `${(seconds / 3600).toFixed(0)} h`;
-}
-
 /** A row's badge of its state. */
 function State({ row }: { row: Row }) {
-  return <span class={`badge ${row.tone}`}>{stateOf(row)}</span>;
+  return <Badge tone={row.tone}>{stateOf(row)}</Badge>;
 }
 
 const COLUMNS = ["State", "Mission", "Tenant", "Charge", "Link", "Age", "Next"] as const;
@@ -179,9 +172,7 @@ function Table({ rows, commanded, chosen, selected, onChoose, onSelect, onMissio
               <span class="unseen">Selected</span>
             </th>
             {["Drone", ...COLUMNS].map((name) => (
-              <th key={name} scope="col">
-                {name}
-              </th>
+              <th key={name} scope="col">{name}</th>
             ))}
           </tr>
         </thead>
@@ -207,9 +198,7 @@ function Table({ rows, commanded, chosen, selected, onChoose, onSelect, onMissio
               {COLUMNS.map((name) => {
                 const [content, kind = ""] = cellsOf(row, onMission)[name];
                 return (
-                  <td key={name} data-label={name} class={kind}>
-                    {content || "—"}
-                  </td>
+                  <td key={name} data-label={name} class={kind}>{content || "—"}</td>
                 );
               })}
             </tr>
@@ -236,7 +225,7 @@ function cellsOf(
     Tenant: [mission?.tenant ?? robot.tenant],
     Charge: [charge === null ? "" : `${(100 * charge).toFixed(0)} %`, charge !== null && charge < LOW ? "bad" : ""],
     Link: [LINKS[robot.link], robot.link === "lost" ? "bad" : ""],
-    Age: [ago(row.age), row.stale ? "bad" : ""],
+    Age: [row.age === null ? "" : lasting(row.age / 1000), row.stale ? "bad" : ""],
     Next: [nextOf(row), "next"],
   };
 }
@@ -249,7 +238,7 @@ function Chosen(props: { flight: Flight; account: AccountOut; row: Row; onMissio
   const head = (
     <>
       <State row={row} />
-      {!mission && robot.preflight && <Badge verdict={robot.preflight} />}
+      {!mission && robot.preflight && <PreflightBadge verdict={robot.preflight} />}
       {mission && <Button class="primary" onClick={() => onMission(mission.id)}>Open its flight</Button>}
     </>
   );
@@ -258,9 +247,7 @@ function Chosen(props: { flight: Flight; account: AccountOut; row: Row; onMissio
     <>
       <Card kind="chosendrone" label="Chosen drone" title={robot.id} head={head}>
         {reasons.map((text) => (
-          <p key={text} class="why">
-            {text}
-          </p>
+          <p key={text} class="why">{text}</p>
         ))}
         {!mission && <PreflightPanel robot={robot.id} live open />}
       </Card>
@@ -281,7 +268,7 @@ export function Missions({ missions, onMission }: { missions: MissionOut[]; onMi
           <Button onClick={() => onMission(one.id)}>
             <span>
               <strong>{one.name}</strong> {one.robots.join(", ")}{" "}
-              <span class={`badge ${PHASES[one.phase] ?? ""}`}>{wordsOf(one.phase)}</span>
+              <Badge tone={PHASES[one.phase] ?? ""}>{wordsOf(one.phase)}</Badge>
             </span>
             <small>
               {timesOf(one)} · {one.account}, {one.tenant}
@@ -308,6 +295,5 @@ function timesOf({ submitted, started, ended }: MissionOut): string {
   const at = today ? from.toLocaleTimeString() : from.toLocaleString();
   if (started === null) return `submitted ${at}`;
   if (ended === null) return `since ${at}`;
-  const minutes = (ended - started) / 60;
-  return `${at}, ${minutes < 2 ? `${(60 * minutes).toFixed(0)} s` : `${minutes.toFixed(0)} min`}`;
+  return `${at}, ${lasting(ended - started)}`;
 }

@@ -6,7 +6,7 @@ import { Refused, ask, messageOf, openSocket } from "./connection";
 import { GroundMarks } from "./ground";
 import type { Spot } from "./place";
 import type { Snapshot, Source } from "./source";
-import { wordsOf } from "./widgets";
+import { wordsOf } from "./words";
 import type {
   AnalyticsOut,
   Answer,
@@ -204,7 +204,8 @@ export class Flight {
 
   command(robots: string[], command: Word): void {
     const { name, obeyed } = COMMANDS[command];
-    this.order(robots, name, "commands", (robot): CommandIn => ({ robot, command }), (status) =>
+    const what = this.source.kind === "fleet" ? `${name} ${robots.join(", ")}` : name;
+    this.order(robots, what, "commands", (robot): CommandIn => ({ robot, command }), (status) =>
       obeyed(status) ? wordsOf(status.state) : null,
     );
   }

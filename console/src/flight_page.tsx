@@ -20,7 +20,8 @@ import { useScenery } from "./scenery";
 import { LiveSource } from "./source";
 import { SurveyPanel, useSurvey } from "./survey";
 import { Timeline, momentOfLink } from "./timeline";
-import { Button, NameChoice, Select, wordsOf } from "./widgets";
+import { Button, NameChoice, Select } from "./widgets";
+import { wordsOf } from "./words";
 import type { AccountOut, FleetOut, MissionOut, RecordedOut } from "./wire";
 
 /** Milliseconds since the server's last answer after which it counts as out of reach. */
@@ -186,10 +187,7 @@ export function SideBySide({ missions, recorded, onAlone }: SideBySideProps) {
     left.seek(momentOfLink() ?? left.time);
   }, [left, right]);
   if (!first.flight || !second.flight || !(left instanceof Playback)) return null;
-  const halves = [
-    { ...first, flight: first.flight },
-    { ...second, flight: second.flight },
-  ];
+  const halves = [{ ...first, flight: first.flight }, { ...second, flight: second.flight }];
   const names = titles(missions);
   return (
     <Page

@@ -118,9 +118,7 @@ export function MarkLayer({ marks, now, stale, sight }: MarksProps) {
             />
             <circle r="4" />
             {named.has(one) && (
-              <text x="7" dy="4">
-                {nameOf(one.what)}
-              </text>
+              <text x="7" dy="4">{nameOf(one.what)}</text>
             )}
           </g>
         );

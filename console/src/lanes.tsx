@@ -2,7 +2,7 @@
 
 import { useMemo } from "preact/hooks";
 import { lastBefore } from "./playback";
-import { wordsOf } from "./widgets";
+import { clock, wordsOf } from "./words";
 import type { AnalyticsOut, RecordedOut, StatusOut } from "./wire";
 
 const BINS = 120;
@@ -58,9 +58,7 @@ export function Lanes({ drone, begin, end, now, ticks }: LanesProps) {
           <title>{`${band.state} from ${band.begin.toFixed(1)} s`}</title>
           <rect class={`band ${band.state}`} width="100%" height="100%" />
           {fits(band) && (
-            <text x="5" y="15">
-              {wordsOf(band.state)}
-            </text>
+            <text x="5" y="15">{wordsOf(band.state)}</text>
           )}
         </svg>
       ))}
@@ -89,9 +87,7 @@ export function Lanes({ drone, begin, end, now, ticks }: LanesProps) {
         </svg>
       ))}
       {(ticks ? ticksOf(begin, end) : []).map((tick) => (
-        <text key={tick} class="tick" x={share(tick)} y="64">
-          {clock(tick).replace(/\.0$/, "")}
-        </text>
+        <text key={tick} class="tick" x={share(tick)} y="64">{clock(tick)}</text>
       ))}
       <svg x={share(now)} class="now">
         <path d="M0 0V52" />
@@ -177,13 +173,4 @@ function ticksOf(begin: number, end: number): number[] {
   return Array.from({ length: count }, (_, place) => (place + 1) * step).filter(
     (one) => one > begin && one < end - step / 4,
   );
-}
-
-export function clock(seconds: number): string {
-  const whole = Math.floor(seconds);
-  const rest = Math.floor((seconds - whole) * 10);
-  const pad = (number: number) => String(number).padStart(2, "0");
-  const hours = Math.floor(whole / 3600);
-  const minutes = Math.floor((whole % 3600) / 60);
-  return `${hours ? `${hours}:${pad(minutes)}` : minutes}:${pad(whole % 60)}.${rest}`;
 }

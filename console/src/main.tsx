@@ -20,7 +20,8 @@ import { FlightPage, SideBySide } from "./flight_page";
 import { Theme, ThemeButton, useTheme } from "./page";
 import { areasOf } from "./place";
 import { Recorded } from "./recorded";
-import { Select, wordsOf } from "./widgets";
+import { Select } from "./widgets";
+import { wordsOf } from "./words";
 import type { AccountOut, FleetOut, MissionOut } from "./wire";
 
 /** Milliseconds between two requests of the missions, and of the fleet while that is shown. */
@@ -173,9 +174,7 @@ function SignIn({ problem, onToken }: { problem: string; onToken(token: string):
           <span>Token</span>
           <input name="token" type="password" autocomplete="off" required autoFocus />
         </label>
-        <button type="submit" class="primary">
-          Open
-        </button>
+        <button type="submit" class="primary">Open</button>
         <p class="hint">
           The address that a flight of your own prints contains its token. A provider's administrator
           gives you yours.

@@ -1,11 +1,10 @@
 // The panel to fly by hand: who has the controls, the keys, and how fast.
 
 import { useCallback, useEffect, useRef, useState } from "preact/hooks";
-import { useEscape } from "./escape";
 import type { Flight } from "./flight";
 import { KEYS, ManualControl } from "./manual_control";
+import { Badge, Button, useEscape } from "./widgets";
 import type { RobotConfig } from "./wire";
-import { Button } from "./widgets";
 
 const TURN = Math.PI / 4;
 const PAD: { key: string; face: string; name: string }[] = [
@@ -84,17 +83,15 @@ export function ManualControlPanel(props: {
     >
       <header>
         <h2>Fly by hand</h2>
-        <span class={`badge ${tone}`} role="status" data-testid="controls">
-          {text}
-        </span>
+        <Badge tone={tone} testid="controls" status>{text}</Badge>
         {holds && control.lag !== null && <small>{control.lag.toFixed(0)} ms</small>}
       </header>
       {control?.over && control.text && <p class="why">{control.text}</p>}
       {holds ? (
         <>
           <p class="hint">
-            Hold the keys or a gamepad's sticks; let go and it hovers. Escape gives the controls
-            back, and Resume goes on with the mission.
+            Hold the keys or a gamepad's sticks. The drone hovers when you let go. Escape gives the
+            controls back; Resume continues the mission.
           </p>
           <div class="pad">
             {PAD.map(({ key, face, name }) => (

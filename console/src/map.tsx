@@ -2,7 +2,6 @@
 
 import type { ComponentChildren, RefObject } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { useEscape } from "./escape";
 import type { Flight } from "./flight";
 import { MarkLayer, nameOf } from "./ground";
 import { Coordinates, Drones, Grid, PlaceLayer, Scale } from "./map_layers";
@@ -14,6 +13,7 @@ import { type Drawn, SurveyLayer } from "./survey_map";
 import { useArchive } from "./tile_archive";
 import { TileLayer } from "./tiles";
 import { TrafficLayer, headingOf, heightOf, trafficOf } from "./traffic";
+import { useEscape } from "./widgets";
 import type { RobotConfig, SceneryOut } from "./wire";
 import "./map.css";
 
@@ -140,14 +140,10 @@ export function FlightMap(props: MapProps) {
         </svg>
         <Scale scale={sight.view.scale} />
         {map.problem && (
-          <p class="unmapped" role="status" data-testid="unmapped">
-            {map.problem}
-          </p>
+          <p class="unmapped" role="status" data-testid="unmapped">{map.problem}</p>
         )}
         {scenery.tiles?.attribution && <div class="attribution">{scenery.tiles.attribution}</div>}
-        <div class="north" aria-hidden="true">
-          N
-        </div>
+        <div class="north" aria-hidden="true">N</div>
       </div>
       <div class="mapkeys">
         {pilot && (
@@ -172,15 +168,11 @@ export function FlightMap(props: MapProps) {
         <Key text="Follow" title="Follow the drone (F)" pressed={view.follows} onClick={view.follow} />
       </div>
       {ruler && (
-        <p class="measured" role="status" data-testid="measured">
-          {measured(ruler)}
-        </p>
+        <p class="measured" role="status" data-testid="measured">{measured(ruler)}</p>
       )}
       <ul class="legend" aria-label="Legend">
         {Object.entries({ ...(fleet ? STATES : WAYPOINTS), ...ZONES }).map(([kind, text]) => (
-          <li key={kind} class={kind}>
-            {text}
-          </li>
+          <li key={kind} class={kind}>{text}</li>
         ))}
         <Listed name="sighted" word="seen" items={[...marks].reverse().map(({ what }) => nameOf(what))} />
         <Listed
@@ -199,9 +191,7 @@ function Key(props: { class?: string; text: string; title: string; pressed?: boo
   const { text, title, pressed, ...rest } = props;
   const label = text.length > 1 ? {} : { "aria-label": title.replace(/ \(.*/, "") };
   return (
-    <button type="button" title={title} aria-pressed={pressed} {...label} {...rest}>
-      {text}
-    </button>
+    <button type="button" title={title} aria-pressed={pressed} {...label} {...rest}>{text}</button>
   );
 }
 

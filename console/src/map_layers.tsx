@@ -83,9 +83,7 @@ function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
             <circle r={current ? 8 : 6} />
             {visited && <path d="M-3 0l2 3 4-6" />}
             {(current || known.length <= LABELS) && (
-              <text x="11" dy="4">
-                {id}
-              </text>
+              <text x="11" dy="4">{id}</text>
             )}
           </g>
         );
@@ -247,9 +245,7 @@ export function Scale({ scale }: { scale: number }) {
   const length = niceStep(60 / scale);
   return (
     <svg class="scale" width={length * scale + 4} height="24" aria-hidden="true">
-      <text x={(length * scale) / 2 + 2} y="11">
-        {label(length)} m
-      </text>
+      <text x={(length * scale) / 2 + 2} y="11">{label(length)} m</text>
       <path d={`M2 14v7h${length * scale}v-7`} />
     </svg>
   );

@@ -3,7 +3,7 @@
 import { type ComponentChildren, createContext } from "preact";
 import { useContext, useEffect, useState } from "preact/hooks";
 import type { Flight } from "./flight";
-import { Button } from "./widgets";
+import { Badge, Button } from "./widgets";
 
 const THEMES = ["auto", "light", "dark"] as const;
 type Choice = (typeof THEMES)[number];
@@ -67,7 +67,7 @@ export function Page({ title, who, flight, children }: PageProps) {
         <h1>AeroDaaS</h1>
         {title}
         <span class="grow" />
-        {who && <span class={`badge ${flight.source.kind === "fleet" ? "who" : ""}`}>{who}</span>}
+        {who && <Badge tone={flight.source.kind === "fleet" ? "who" : ""}>{who}</Badge>}
         <Connection flight={flight} />
         <ThemeButton />
       </header>
@@ -86,9 +86,7 @@ function Connection({ flight }: { flight: Flight }) {
         ? ["bad", lost]
         : ["good", "live"];
   return (
-    <span class={`badge ${tone}`} data-testid="connection">
-      {text}
-    </span>
+    <Badge tone={tone} testid="connection">{text}</Badge>
   );
 }
 

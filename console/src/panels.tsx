@@ -3,7 +3,8 @@
 import { Attitude } from "./attitude";
 import { type Flight, speedOf, toneOf } from "./flight";
 import type { Point } from "./place";
-import { Button, Card, Field, Figure, type FigureProps, clock, wordsOf } from "./widgets";
+import { Badge, Button, Card, Field, Figure, type FigureProps } from "./widgets";
+import { clock, wordsOf } from "./words";
 import type { StatusOut, Waypoint } from "./wire";
 
 /** Reasons of states for which the mission gives none. */
@@ -24,15 +25,11 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
   const { state, mode, faults, reason } = status;
   const link = mode === "lost" ? "lost" : flight.stale ? "stale" : "up";
   const head = (
-    <span class={`badge ${toneOf(status)}`} data-testid="state">
-      {wordsOf(state)}
-    </span>
+    <Badge tone={toneOf(status)} testid="state">{wordsOf(state)}</Badge>
   );
   return (
     <Card kind={`state ${flight.stale ? "stale" : ""}`} label="State" title={robot} head={head}>
-      <p class="why" data-testid="why">
-        {reason || REASONS[state] || "follows the plan"}
-      </p>
+      <p class="why" data-testid="why">{reason || REASONS[state] || "follows the plan"}</p>
       <Attitude status={status} />
       <dl>
         {figuresOf(status).map((figure) => (
@@ -130,12 +127,10 @@ export function WaypointForm(props: {
         first
       />
       <Field name="hover" label="Hover, s" value="2" min={0} />
-      <Field name="priority" label="Priority (1 first)" value="5" min={0} step="1" />
-      <Field name="deadline" label="Within, s" value="" min={1} optional="any time" />
+      <Field name="priority" label="Priority, 1 is first" value="5" min={0} step="1" />
+      <Field name="deadline" label="Arrive within, s" value="" min={1} optional="any time" />
       <div class="buttons">
-        <button type="submit" class="primary">
-          Fly there
-        </button>
+        <button type="submit" class="primary">Fly there</button>
         <Button onClick={onDone}>Cancel</Button>
       </div>
     </form>

@@ -2,8 +2,9 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { type Flight, aheadOf, isEnding } from "./flight";
+import { Badge, Button, Card } from "./widgets";
+import { wordsOf } from "./words";
 import type { StatusOut } from "./wire";
-import { Button, Card, wordsOf } from "./widgets";
 
 /** Milliseconds after the last key before the order is asked for. */
 const PAUSE = 600;
@@ -71,9 +72,9 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   const left = coming.length + (target === null ? 0 : 1);
   const now = target === null ? "" : `, now ${target}`;
   const head = (
-    <span class="badge" data-testid="to-go">
+    <Badge testid="to-go">
       {over ? `${wordsOf(status.state)}: ${left} left out` : `${left} to go${now}`}
-    </span>
+    </Badge>
   );
   return (
     <Card kind={`plan ${over ? "over" : ""}`} label="Plan" head={head}>
@@ -83,9 +84,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
       <ol ref={list} data-testid="plan">
         {target !== null && (
           <li class={over ? "" : "current"} data-plan={target}>
-            <span class="handle" aria-hidden="true">
-              {over ? "○" : "▶"}
-            </span>
+            <span class="handle" aria-hidden="true">{over ? "○" : "▶"}</span>
             <Place status={status} id={target} />
             {mayFly && <Remove id={target} word="Skip" onRemove={remove} />}
           </li>
@@ -120,9 +119,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
                 ⠿
               </button>
             ) : (
-              <span class="handle" aria-hidden="true">
-                ○
-              </span>
+              <span class="handle" aria-hidden="true">○</span>
             )}
             <Place status={status} id={id} />
             {mayFly && <Remove id={id} word="Leave out" onRemove={remove} />}
@@ -139,9 +136,7 @@ function Place({ status, id }: { status: StatusOut; id: string }) {
     <span class="what">
       <strong>{id}</strong>{" "}
       {at && (
-        <small>
-          {at[0].toFixed(1)} E, {at[1].toFixed(1)} N, {at[2].toFixed(1)} m
-        </small>
+        <small>{at[0].toFixed(1)} E, {at[1].toFixed(1)} N, {at[2].toFixed(1)} m</small>
       )}
     </span>
   );

@@ -2,7 +2,8 @@
 
 import "./preflight.css";
 import { ask, messageOf, usePolled } from "./connection";
-import { wordsOf } from "./widgets";
+import { Badge } from "./widgets";
+import { lasting, wordsOf } from "./words";
 import type { HealthItem, PreflightOut, Verdict } from "./wire";
 
 /** Milliseconds between two requests of the list. */
@@ -42,8 +43,8 @@ export function PreflightPanel({ robot, live, open }: PreflightProps) {
     <details class="card preflight" open={open} aria-label="Before take-off">
       <summary>
         <h2>Before take-off</h2>
-        <Badge verdict={answer?.verdict ?? null} count={worst} />
-        {age !== null && <span class="hint">{ago(age)}</span>}
+        <PreflightBadge verdict={answer?.verdict ?? null} count={worst} />
+        {age !== null && <span class="hint">{lasting(age)} ago</span>}
       </summary>
       {error !== null && <p class="hint">{messageOf(error)}</p>}
       {items.length > 0 ? (
@@ -59,21 +60,16 @@ export function PreflightPanel({ robot, live, open }: PreflightProps) {
   );
 }
 
-export function Badge({ verdict, count }: { verdict: Verdict | null; count?: number }) {
-  if (verdict === null) return <span class="badge">no list</span>;
+export function PreflightBadge({ verdict, count }: { verdict: Verdict | null; count?: number }) {
+  if (verdict === null) return <Badge>no list</Badge>;
   const { mark, tone } = WORDS[verdict];
   const many = count === undefined ? "" : `: ${count}`;
   const text = { refused: `refused${many}`, warning: `warned${many}`, good: "ready", unknown: "" };
   return (
-    <span class={`badge ${tone}`} data-testid="preflight">
+    <Badge tone={tone} testid="preflight">
       <span aria-hidden="true">{mark}</span> {text[verdict]}
-    </span>
+    </Badge>
   );
-}
-
-function ago(seconds: number): string {
-  if (seconds < 2) return "just now";
-  return seconds < 120 ? `${seconds.toFixed(0)} s ago` : `${(seconds / 60).toFixed(0)} min ago`;
 }
 
 function Item({ item }: { item: HealthItem }) {
@@ -81,9 +77,7 @@ function Item({ item }: { item: HealthItem }) {
   const grave = item.verdict === "refused" || item.verdict === "warning";
   return (
     <li class={item.verdict} data-item={item.name}>
-      <span class={`mark ${tone}`} aria-hidden="true">
-        {mark}
-      </span>
+      <span class={`mark ${tone}`} aria-hidden="true">{mark}</span>
       <span class="what">
         <strong>{NAMES[item.name] ?? wordsOf(item.name)}</strong>{" "}
         {item.verdict !== "unknown" && item.value}

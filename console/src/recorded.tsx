@@ -20,9 +20,7 @@ export function Recorded(props: { mission: MissionOut; children(flight: Recorded
     <main class="start">
       <h1>AeroDaaS console</h1>
       {error !== null ? (
-        <p class="banner bad" role="alert">
-          {messageOf(error)}
-        </p>
+        <p class="banner bad" role="alert">{messageOf(error)}</p>
       ) : (
         <label class="reading">
           <span>

@@ -3,16 +3,11 @@
 import type { Point } from "./place";
 import type { Sight } from "./sight";
 import { px } from "./sight";
+import { bearingOf } from "./words";
 
 /** Metres between two points. */
 function lengthOf(from: Point, to: Point): number {
   return Math.hypot(to[0] - from[0], to[1] - from[1]);
-}
-
-/** Degrees clockwise from north, in three digits. */
-function bearingOf(from: Point, to: Point): string {
-  const degrees = Math.round((Math.atan2(to[0] - from[0], to[1] - from[1]) * 180) / Math.PI + 360);
-  return `${String(degrees % 360).padStart(3, "0")}°`;
 }
 
 function metres(length: number): string {
@@ -28,7 +23,7 @@ export function measured(points: readonly Point[]): string {
     const from = points[place - 1];
     return from ? sum + lengthOf(from, point) : sum;
   }, 0);
-  const leg = `${metres(lengthOf(before, last))} at ${bearingOf(before, last)}`;
+  const leg = `${metres(lengthOf(before, last))} at ${bearingOf(last[0] - before[0], last[1] - before[1])}`;
   return points.length > 2 ? `${leg}, ${metres(whole)} in all` : leg;
 }
 

@@ -5,7 +5,8 @@ import { ask, messageOf } from "./connection";
 import { type Flight, aheadOf } from "./flight";
 import { type Point, camerasOf, surveyCamera } from "./place";
 import type { Drawn } from "./survey_map";
-import { Button, Field, type FieldProps, Figure, type FigureProps, Select, clock } from "./widgets";
+import { Button, Field, type FieldProps, Figure, type FigureProps, Select } from "./widgets";
+import { clock } from "./words";
 import type { RobotConfig, SurveyIn, SurveyOut, Waypoint } from "./wire";
 
 /** Milliseconds without a change before a plan is asked for. */
@@ -138,13 +139,13 @@ const RESOLUTION_FIELD: NumberField = {
   scale: 100,
 };
 const OVERLAPS: NumberField[] = [
-  { setting: "front_overlap", name: "front", label: "Overlap ahead, %", min: 0, max: 95, step: "1", scale: 100 },
-  { setting: "overlap", name: "side", label: "Overlap aside, %", min: 0, max: 90, step: "1", scale: 100 },
+  { setting: "front_overlap", name: "front", label: "Front overlap, %", min: 0, max: 95, step: "1", scale: 100 },
+  { setting: "overlap", name: "side", label: "Side overlap, %", min: 0, max: 90, step: "1", scale: 100 },
 ];
 const STRIPS: NumberField[] = [
-  { setting: "field_of_view", name: "fov", label: "Camera's view, °", min: 2, max: 170, scale: 1 / RADIANS },
+  { setting: "field_of_view", name: "fov", label: "Field of view, °", min: 2, max: 170, scale: 1 / RADIANS },
   { setting: "overlap", name: "overlap", label: "Overlap, %", min: 0, max: 90, step: "1", scale: 100 },
-  { setting: "width", name: "width", label: "Strips, m", min: 0.1, optional: "camera's" },
+  { setting: "width", name: "width", label: "Strip width, m", min: 0.1, optional: "automatic" },
 ];
 const SPEED: NumberField = { setting: "speed", name: "speed", label: "Speed, m/s", min: 0.1, optional: "cruise" };
 
@@ -220,7 +221,7 @@ export function SurveyPanel({ survey }: { survey: Survey }) {
       ))}
       <Field
         name="direction"
-        label="Direction, ° of north"
+        label="Direction, ° from north"
         value=""
         min={0}
         max={360}
@@ -243,9 +244,7 @@ export function SurveyPanel({ survey }: { survey: Survey }) {
       <Corners survey={survey} />
       <Figures survey={survey} />
       <div class="buttons">
-        <button type="submit" class="primary" disabled={plan === null}>
-          Fly the survey
-        </button>
+        <button type="submit" class="primary" disabled={plan === null}>Fly the survey</button>
         <Button disabled={area.length === 0} onClick={survey.undo}>Undo corner</Button>
         <Button onClick={survey.cancel}>Cancel</Button>
       </div>
@@ -287,9 +286,7 @@ function Figures({ survey }: { survey: Survey }) {
   const { plan, problem, area } = survey;
   if (problem) {
     return (
-      <p class="problem" role="alert" data-testid="survey-problem">
-        {problem}
-      </p>
+      <p class="problem" role="alert" data-testid="survey-problem">{problem}</p>
     );
   }
   if (!plan) {
@@ -325,9 +322,7 @@ function Figures({ survey }: { survey: Survey }) {
         ))}
       </dl>
       {photos?.warning && (
-        <p class="problem" role="alert" data-testid="survey-warning">
-          {photos.warning}.
-        </p>
+        <p class="problem" role="alert" data-testid="survey-warning">{photos.warning}.</p>
       )}
       {short && (
         <p class="problem" role="alert">

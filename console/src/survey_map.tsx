@@ -58,9 +58,7 @@ export function SurveyLayer({ drawn, sight, box }: LayerProps) {
         >
           <circle class="touch" r="18" />
           <circle r="7" />
-          <text x="10" y="-8">
-            {corner + 1}
-          </text>
+          <text x="10" y="-8">{corner + 1}</text>
         </g>
       ))}
     </g>

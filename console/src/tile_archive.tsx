@@ -6,12 +6,7 @@ import { messageOf, token } from "./connection";
 import type { TilesOut } from "./wire";
 
 /** Kinds of pictures by their number in the archive's header. */
-const KINDS = new Map([
-  [2, "image/png"],
-  [3, "image/jpeg"],
-  [4, "image/webp"],
-  [5, "image/avif"],
-]);
+const KINDS = new Map([[2, "image/png"], [3, "image/jpeg"], [4, "image/webp"], [5, "image/avif"]]);
 /** Tiles whose pictures are kept; a wall's screen shows a hundred. */
 const KEPT = 400;
 /** Directories that are kept, each of a few kilobytes. */

@@ -1,11 +1,12 @@
 // The timeline of a recording: states, waypoints visited, alerts, decisions; play, seek and link.
 
-import { useEffect, useLayoutEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import "./timeline.css";
 import { readFragment, writeFragment } from "./connection";
-import { Lanes, type RecordedDrone, clock, eventsOf, stateAt } from "./lanes";
+import { Lanes, type RecordedDrone, eventsOf, stateAt } from "./lanes";
 import { lastBefore, type Playback } from "./playback";
-import { Button, Select } from "./widgets";
+import { Button, Select, useEvent } from "./widgets";
+import { clock } from "./words";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const STEP = 1;
@@ -31,25 +32,24 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
   };
   const toggle = () => (playback.playing ? playback.pause() : playback.play());
 
-  // Before it is painted: who sees the timeline can use its keys.
-  useLayoutEffect(() => {
-    const keys: Record<string, (event: KeyboardEvent) => void> = {
-      " ": toggle,
-      ArrowLeft: (event) => playback.seek(playback.time - (event.shiftKey ? LEAP : STEP)),
-      ArrowRight: (event) => playback.seek(playback.time + (event.shiftKey ? LEAP : STEP)),
-      Home: () => playback.seek(begin),
-      End: () => playback.seek(end),
-      "[": () => toEvent(false),
-      "]": () => toEvent(true),
-    };
-    const press = (event: KeyboardEvent) => {
-      const act = keys[event.key];
-      if (!act || event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
-      event.preventDefault();
-      act(event);
-    };
-    document.addEventListener("keydown", press);
-    return () => document.removeEventListener("keydown", press);
+  const keys: Record<string, (event: KeyboardEvent) => void> = {
+    " ": toggle,
+    ArrowLeft: (event) => playback.seek(playback.time - (event.shiftKey ? LEAP : STEP)),
+    ArrowRight: (event) => playback.seek(playback.time + (event.shiftKey ? LEAP : STEP)),
+    Home: () => playback.seek(begin),
+    End: () => playback.seek(end),
+    "[": () => toEvent(false),
+    "]": () => toEvent(true),
+  };
+  useEvent("keydown", (event) => {
+    const act = keys[event.key];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) return;
+    event.preventDefault();
+    act(event);
+  });
+  useEvent("hashchange", () => {
+    const time = momentOfLink();
+    if (time !== null) playback.seek(time);
   });
 
   // The address is a link to the moment at which it rests.
@@ -61,14 +61,6 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
     return () => clearTimeout(timer);
   }, [resting]);
   useEffect(() => setCopied(false), [resting]);
-  useEffect(() => {
-    const follow = () => {
-      const time = momentOfLink();
-      if (time !== null) playback.seek(time);
-    };
-    addEventListener("hashchange", follow);
-    return () => removeEventListener("hashchange", follow);
-  }, [playback]);
 
   const states = drones.map((one) => stateAt(one, playback.time)).filter(Boolean);
   const spoken = [`${playback.time.toFixed(1)} of ${end.toFixed(1)} seconds`, ...states].join(", ");
@@ -91,11 +83,11 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
           onChoose={(speed) => (playback.speed = Number(speed))}
         />
         <output class="time" data-testid="time" data-time={playback.time}>
-          {clock(playback.time)} <small>of {clock(end)}</small>
+          {clock(playback.time, true)} <small>of {clock(end, true)}</small>
         </output>
         <span class="grow" />
         <Button
-          title="Copy a link to this moment; who opens it needs a token of their own"
+          title="Copy a link to this moment. Whoever opens it needs a token"
           onClick={() => {
             writeFragment({ t: playback.time.toFixed(2) });
             void navigator.clipboard?.writeText(location.href).then(() => setCopied(true));
@@ -139,7 +131,7 @@ export function Timeline({ playback, drones }: { playback: Playback; drones: Rec
         ({ flight }, place) =>
           flight.remark && (
             <p key={place} class="hint" data-testid="remark">
-              Of {drones.length > 1 ? flight.name : "this recording"}, {flight.remark}.
+              {drones.length > 1 ? flight.name : "This recording"} is incomplete: {flight.remark}.
             </p>
           ),
       )}

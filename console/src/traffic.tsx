@@ -1,6 +1,7 @@
 // Other aircraft on the map: where they are, their heading, and how much higher than the drone.
 
 import type { Sight } from "./sight";
+import { bearingOf } from "./words";
 import type { StatusOut, TrafficOut } from "./wire";
 
 /** Seconds without a word after which an aircraft is shown as old; after 10 it is gone. */
@@ -27,11 +28,9 @@ export function heightOf({ position: [, , up] }: TrafficOut, own: number | null)
   return above === 0 ? "same height" : `${Math.abs(above)} m ${above > 0 ? "above" : "below"}`;
 }
 
-/** Degrees clockwise from north, in three digits. */
+/** Where it flies to. */
 export function headingOf({ velocity: [east, north] }: TrafficOut): string {
-  if (Math.hypot(east, north) < SLOW) return "heading unknown";
-  const degrees = Math.round((Math.atan2(east, north) * 180) / Math.PI + 360) % 360;
-  return `${String(degrees).padStart(3, "0")}°`;
+  return Math.hypot(east, north) < SLOW ? "heading unknown" : bearingOf(east, north);
 }
 
 export function TrafficLayer(

@@ -52,9 +52,7 @@ export class VideoDecoding {
     const number = (this.count += 1);
     return new Promise((done) => {
       this.waiting.set(number, done);
-      decoder.decode(
-        new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: number, data }),
-      );
+      decoder.decode(new EncodedVideoChunk({ type: key ? "key" : "delta", timestamp: number, data }));
     });
   }
 

@@ -1,6 +1,7 @@
-// Small parts that all panels are made of: cards, buttons, choices, figures and fields.
+// Small parts that all panels are made of: cards, badges, buttons, choices, figures, fields and keys.
 
 import type { ComponentChildren } from "preact";
+import { useLayoutEffect, useRef } from "preact/hooks";
 
 /** Share of a battery below which it is shown as low. */
 export const LOW = 0.3;
@@ -25,6 +26,22 @@ export function Card({ kind, label, title = label, head, children }: CardProps) 
       </header>
       {children}
     </section>
+  );
+}
+
+interface BadgeProps {
+  tone?: string;
+  testid?: string;
+  /** Whether it is read out when it changes. */
+  status?: boolean;
+  children: ComponentChildren;
+}
+
+export function Badge({ tone = "", testid, status, children }: BadgeProps) {
+  return (
+    <span class={`badge ${tone}`} data-testid={testid} role={status ? "status" : undefined}>
+      {children}
+    </span>
   );
 }
 
@@ -71,9 +88,7 @@ export function Select({ label, name, value, options, onChoose }: SelectProps) {
       onChange={(event) => onChoose(event.currentTarget.value)}
     >
       {options.map(([option, text]) => (
-        <option key={option} value={option}>
-          {text}
-        </option>
+        <option key={option} value={option}>{text}</option>
       ))}
     </select>
   );
@@ -142,13 +157,18 @@ export function Field({ label, value, step = "0.1", optional, first, onValue, ..
   );
 }
 
-/** A word of the wire as people read it. */
-export function wordsOf(name: string): string {
-  return name.replaceAll("_", " ");
+/** Call `listen` at each event of a kind, whatever has the focus. */
+export function useEvent<K extends keyof WindowEventMap>(kind: K, listen: (event: WindowEventMap[K]) => void) {
+  const newest = useRef(listen);
+  newest.current = listen;
+  useLayoutEffect(() => {
+    const call = (event: WindowEventMap[K]) => newest.current(event);
+    addEventListener(kind, call);
+    return () => removeEventListener(kind, call);
+  }, [kind]);
 }
 
-/** Minutes and seconds. */
-export function clock(seconds: number): string {
-  const whole = Math.round(seconds);
-  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
+/** Call `act` when Escape is pressed, wherever the focus is; null while there is nothing to end. */
+export function useEscape(act: (() => void) | null): void {
+  useEvent("keydown", (event) => event.key === "Escape" && act?.());
 }

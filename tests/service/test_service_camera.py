@@ -100,6 +100,29 @@ def test_the_tenants_viewer_sees_it_decoded(provider: Served, mission: str) -> N
 
 
 @needs_peer("AERODAAS_BROWSER")
+def test_the_fleet_shows_the_camera_of_the_chosen_drone(provider: Served, mission: str) -> None:
+    """Only in flight, and only to an account that may sense."""
+    del mission
+    blind = provider.user("bea", "farm", scopes=["fly"])
+    with Browser() as browser:
+        pages = [
+            browser.open(f"{provider.url}/#token={token}")
+            for token in (provider.user("vito", "farm", "viewer"), blind)
+        ]
+        for page in pages:
+            page.until("document.querySelector('[data-row=one]')?.innerText.includes('enroute')")
+            page.press("[data-row=one] th button")
+            page.until("document.querySelector('.chosendrone')?.innerText.includes('enroute')")
+        seeing, other = pages
+        seeing.until("document.querySelector('[data-testid=video]')?.dataset.stamp > 0")
+        assert "cam" in seeing.text(".video")
+        assert other.run("document.querySelector('.video')") is None
+        seeing.press("[data-row=two] th button")
+        seeing.until("document.querySelector('.video') === null")
+        assert [one for page in pages for one in page.complaints()] == []
+
+
+@needs_peer("AERODAAS_BROWSER")
 def test_who_may_not_sense_sees_no_camera(provider: Served, mission: str) -> None:
     """Their page has the map alone; another tenant's page has no such mission."""
     blind = provider.user("ben", "farm", scopes=["fly"])
@@ -127,7 +150,7 @@ def test_a_lease_of_another_drone_is_none_of_this_camera(provider: Served, missi
         pass
     assert refused.value.response.status_code == 404
     provider.ask("DELETE", f"/v1/missions/{own}", None, ivan)
-    with watch(provider, mission, provider.user("vito", "farm", "viewer")) as socket:
+    with watch(provider, mission, provider.user("vidya", "farm", "viewer")) as socket:
         found = pictures(socket, 60.0, 8)
     assert len(found) == 8
     assert all(one["item"]["format"] == "h264" for one in found)
