@@ -212,8 +212,8 @@ def _submit() -> None:
     from aerodaas.http_server.addresses import listen  # noqa: PLC0415 - for this walk alone
     from aerodaas.service import mission as missions  # noqa: PLC0415
     from aerodaas.service.access.accounts import Accounts  # noqa: PLC0415
-    from aerodaas.service.http.app_server import AppServer  # noqa: PLC0415
     from aerodaas.service.http.limits import PROVIDER  # noqa: PLC0415
+    from aerodaas.service.http.server import AppServer  # noqa: PLC0415
     from aerodaas.service.provider import build_service  # noqa: PLC0415
     from aerodaas.service.settings import ServiceSettings  # noqa: PLC0415
     from aerodaas.service.store import Store  # noqa: PLC0415

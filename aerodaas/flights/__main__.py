@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.folder import FlightFolder, end_with_starter
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.flights.tie import end_with_starter
 
 
 def main() -> None:

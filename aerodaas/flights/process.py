@@ -25,11 +25,9 @@ from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.runtime.reports import FlightState
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.environment import environment_of
-from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.service.flights.server import LeasedFlight, ProcessServer
-from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 
 __all__ = ["Flying", "fly"]
 

@@ -11,8 +11,7 @@ import anyio.to_thread
 from fastapi import APIRouter, FastAPI
 
 from aerodaas.config.map_tiles import MapTilesConfig
-from aerodaas.service.http.admission import Admission
-from aerodaas.service.http.gate import Gate
+from aerodaas.service.http.gate import Admission, Gate
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.http.map_archive import archive_routes
 from aerodaas.service.http.page import page_routes

@@ -18,7 +18,7 @@ from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
-from aerodaas.service.leases import Candidate, Fleet, LeaseBook
+from aerodaas.service.lease_book import Candidate, Fleet, LeaseBook
 from aerodaas.service.store import Lease, Mission, Store
 
 __all__ = ["Bookings"]

@@ -16,9 +16,9 @@ from aerodaas.service.flights.order import (
     FlightOrder,
     OtherLease,
     Outcome,
+    TenantLimits,
 )
 from aerodaas.service.garage import Garage
-from aerodaas.service.limits import TenantLimits
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store, Usage
 

@@ -36,21 +36,18 @@ from aerodaas.service.attachments import Attachments
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
-from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.errors import RefusedError, StoreError, TroubleLog
 from aerodaas.service.flights.environment import environment_of
-from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.garage import OUT_OF_SERVICE, Garage
 from aerodaas.service.idempotency import fingerprint
-from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
+from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown
 from aerodaas.service.models import ModelShelf, require_room
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.records import shown
 from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
-from aerodaas.service.trouble import TroubleLog
 
 __all__ = ["MissionDesk"]
 

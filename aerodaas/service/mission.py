@@ -17,16 +17,26 @@ from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
 from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import LeaseState, MissionPhase, VerdictOut
-from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.protocol.schemas import LeaseState, MissionOut, MissionPhase, VerdictOut
+from aerodaas.service.errors import without_folders
+from aerodaas.service.flights.folder import FlightFolder, start_process
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.service.flights.starter import start_process
 from aerodaas.service.models import ModelShelf
-from aerodaas.service.phases import FOLLOWING
 from aerodaas.service.store import Lease, Mission
 
-__all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
+__all__ = ["CANCELLED_BY", "FOLLOWING", "ActiveMission", "LostFlightError", "shown"]
+
+_P = MissionPhase
+FOLLOWING = {
+    _P.SUBMITTED: {_P.REHEARSING, _P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
+    _P.REHEARSING: {_P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
+    _P.AWAITING_APPROVAL: {_P.QUEUED, _P.REFUSED, _P.CANCELLED},
+    _P.QUEUED: {_P.FLYING, _P.REFUSED, _P.CANCELLED, _P.FAILED},
+    _P.FLYING: {_P.LANDED, _P.CANCELLED, _P.FAILED},
+}
+"""Phases that may follow each one."""
+
 
 CANCELLED_BY = "cancelled by "
 """How the reason of a cancelled mission begins."""
@@ -267,3 +277,41 @@ class ActiveMission:
         except OSError:
             lines = []
         return lines[-1][-_LAST_WORDS:] if lines else "its process ended without a word"
+
+
+def shown(one: ActiveMission) -> MissionOut:
+    """A mission with its newest state: of its flight while it goes on, else as it ended."""
+    row = one.row
+    outcome = one.flight.outcome() if one.over else None
+    told = None if one.link is None else one.link.mission
+    newest = outcome or told
+    flying = None if one.over else told
+    verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
+    if verdict is not None:
+        reasons = [without_folders(reason) for reason in verdict.reasons]
+        verdict = verdict.model_copy(update={"reasons": reasons})
+    if verdict is not None and one.rehearsal.picture.is_file():
+        verdict = verdict.model_copy(update={"picture": f"/v1/missions/{row.id}/rehearsal.png"})
+    return MissionOut(
+        id=row.id,
+        name=row.name,
+        tenant=row.tenant,
+        account=row.account,
+        phase=row.phase,
+        reason=without_folders(one.waits_for or row.reason),
+        robots=list(row.robots),
+        lease=row.lease,
+        share=list(row.request.get("share", ())),
+        attach=one.attached_to,
+        grants=one.grants,
+        submitted=row.submitted,
+        started=row.started,
+        ended=row.ended,
+        verdict=verdict,
+        status={} if newest is None else newest.status,
+        told={} if flying is None else flying.told,
+        alerts=[] if newest is None else newest.alerts,
+        streams={} if flying is None else flying.streams,
+        analytics=None if flying is None else flying.analytics,
+        recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
+    )

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from aerodaas.errors import ConfigError
 from aerodaas.runtime.memory_limit import limit_memory
-from aerodaas.service.flights.starter import service_free_environment
+from aerodaas.service.flights.folder import service_free_environment
 
 __all__ = ["try_model"]
 

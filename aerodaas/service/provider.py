@@ -9,8 +9,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from aerodaas.config.redaction import catalogue
-from aerodaas.service.access.access import Access
-from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.oidc import OidcVerifier
 from aerodaas.service.access.principal import Principal
@@ -21,7 +20,7 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.edge import EdgeArbiter
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.live.playback import Player, Players
 from aerodaas.service.model_trial import try_model
 from aerodaas.service.models import ModelShelf

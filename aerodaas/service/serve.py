@@ -11,8 +11,8 @@ from aerodaas.drivers.loading import link_of
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.http_server.addresses import is_loopback, listen
 from aerodaas.service.access.accounts import Accounts
-from aerodaas.service.http.connections import web_server
 from aerodaas.service.http.limits import PROVIDER
+from aerodaas.service.http.server import web_server
 from aerodaas.service.provider import build_service
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store

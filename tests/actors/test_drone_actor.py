@@ -23,7 +23,7 @@ from aerodaas.errors import MissionError
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.runtime.session import Session
-from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.service.flights.folder import RobotLocks
 
 pytestmark = pytest.mark.wall_clock
 

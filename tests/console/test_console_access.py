@@ -22,7 +22,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause
-from aerodaas.service.http.bearer import bearer
+from aerodaas.service.http.gate import bearer
 from aerodaas.service.own.server import FlightServer
 
 pytestmark = pytest.mark.wall_clock

@@ -10,7 +10,7 @@ import pytest
 from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import AnalyticsOut
-from aerodaas.service.live.meter import FlightMeter
+from aerodaas.service.own.flight import FlightMeter
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import ActorReport, FlightState
@@ -47,7 +47,7 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
 def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who told it may hang."""
     now = 100.0
-    monkeypatch.setattr("aerodaas.service.live.meter.host_time_ns", lambda: int(now * 1e9))
+    monkeypatch.setattr("aerodaas.service.own.flight.host_time_ns", lambda: int(now * 1e9))
     meter, state = FlightMeter(), flying_to(1)
     for _ in range(2):
         meter.note(state)

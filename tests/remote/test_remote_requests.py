@@ -22,7 +22,7 @@ from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand
 from aerodaas.mission.commands import StreamItem
 from aerodaas.protocol.schemas import Role
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.own.access import FlightTokens, principal_of
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.own.server import flight_app

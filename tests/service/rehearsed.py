@@ -21,7 +21,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.errors import MissionError
 from aerodaas.messages.odometry import Odometry
-from aerodaas.service.rehearsal import rehearsal_config
+from aerodaas.service.flights.environment import rehearsal_config
 
 __all__ = ["FIELD", "Eastwards", "OtherLease", "Rehearsal", "rehearse", "survey", "to_the_east"]
 

@@ -11,8 +11,7 @@ from aerodaas.errors import MissionError
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.runtime.reports import FlightState
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.server import LeasedFlight, ProcessServer
-from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 
 __all__ = ["Drones", "ServedFlight"]
 

@@ -32,9 +32,8 @@ from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import Attached, FlightOrder
-from aerodaas.service.flights.server import LeasedFlight, ProcessServer
+from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
-from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.http.limits import LEASED_FLIGHT
 from aerodaas.service.own import flight as own
 

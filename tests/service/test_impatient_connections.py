@@ -15,8 +15,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from aerodaas.http_server.addresses import App, Receive, Scope, Send, listen
-from aerodaas.service.http.connections import web_server
 from aerodaas.service.http.limits import RequestLimits
+from aerodaas.service.http.server import web_server
 
 pytestmark = pytest.mark.wall_clock
 

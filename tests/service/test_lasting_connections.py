@@ -32,10 +32,10 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.flights.server import LeaseWatch
 from aerodaas.service.http import bodies
-from aerodaas.service.http.connections import web_server
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
+from aerodaas.service.http.server import web_server
 from aerodaas.service.live import controls as hand
 from aerodaas.service.live import session
 from aerodaas.service.models import ModelShelf

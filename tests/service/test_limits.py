@@ -18,7 +18,8 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.service.limits import TenantLimits, limited
+from aerodaas.service.flights.environment import limited
+from aerodaas.service.flights.order import TenantLimits
 
 SQUARE = [(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)]
 NOTHING = TenantLimits()

@@ -24,7 +24,7 @@ from served import document, fleet, robot
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.service import provider
 from aerodaas.service.access.accounts import Accounts
-from aerodaas.service.http.counters import RateLimiter
+from aerodaas.service.http.limits import RateLimiter
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 

@@ -16,7 +16,8 @@ from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.errors import ConfigError
 from aerodaas.messages.health import Verdict
 from aerodaas.mission.safety.checklist import Checklist
-from aerodaas.service.rehearsal import judge, rehearsal_config
+from aerodaas.service.flights.environment import rehearsal_config
+from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.simulation.airframe import Airframe
 

@@ -11,9 +11,8 @@ import psutil
 import pytest
 from served import Served, document, fleet, robot
 
-from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.folder import FlightFolder, start_process
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.flights.starter import start_process
 
 pytestmark = pytest.mark.slow
 

@@ -19,8 +19,7 @@ from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.store import Account, Mission, Tenant
 
@@ -32,7 +31,7 @@ HOLD = """
 import sys
 from pathlib import Path
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.locks import RobotLocks
+from aerodaas.service.flights.folder import RobotLocks
 from aerodaas.service.flights.order import FlightOrder
 with RobotLocks(Path(sys.argv[1])).hold(["one"]):
     print("held", flush=True)

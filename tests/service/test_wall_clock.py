@@ -12,14 +12,13 @@ from desks import PILOT, Provider
 
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.schemas import AccountIn, LeaseIn, LeaseState, LinkState, TokenIn
-from aerodaas.service.access.access import Access
-from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.flights.server import LeaseWatch
 from aerodaas.service.store import Store
 
 HOUR = 3600.0

@@ -1,19 +1,62 @@
-"""Folder of one flight: its files, its lock, and the mark that it has begun."""
+"""A flight on this machine: its folder, the locks of its drones, and the start of its process."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from aerodaas.config.file_lock import exclusive, is_locked
+from aerodaas.config.file_lock import actor_lock, exclusive, is_locked
 from aerodaas.config.private_file import write_private
+from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.errors import MissionError
 from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
 
-__all__ = ["FlightFolder"]
+__all__ = [
+    "FlightFolder",
+    "RobotLocks",
+    "end_with_starter",
+    "service_free_environment",
+    "start_process",
+]
+
+
+class RobotLocks:
+    """One lock for each drone of a provider: the process that flies a drone holds its lock."""
+
+    def __init__(self, folder: Path) -> None:
+        """Keep them in `folder`, which need not exist."""
+        self._folder = folder
+
+    @contextlib.contextmanager
+    def hold(self, robots: Collection[str]) -> Iterator[None]:
+        """Hold the locks of `robots`; raises MissionError for one that another process holds."""
+        self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with contextlib.ExitStack() as held:
+            for robot in robots:
+                refusal = (
+                    f"another process still flies {robot}: submit the mission again once that "
+                    "flight is over"
+                )
+                held.enter_context(exclusive(self._folder / robot, refusal))
+                if is_locked(actor_lock(self._folder, robot)):
+                    raise MissionError(refusal)
+            yield
+
+    def held(self, robots: Collection[str]) -> set[str]:
+        """Those of `robots` whose lock a living process holds."""
+        return {
+            robot
+            for robot in robots
+            if is_locked(self._folder / robot) or is_locked(actor_lock(self._folder, robot))
+        }
 
 
 class FlightFolder:
@@ -100,3 +143,53 @@ class FlightFolder:
             return Outcome.model_validate_json(self._outcome.read_bytes())
         except (OSError, ValidationError):
             return None
+
+
+_KEPT_OUT = "AERODAAS_"
+"""Variables of the service itself, which hold its tokens."""
+
+
+def service_free_environment(*, vehicles: bool) -> dict[str, str]:
+    """The environment's variables without the service's own.
+
+    Those of `vehicles` stay for a process that is connected with them.
+    """
+    kept = {MAVLINK_KEY} if vehicles else set()
+    return {
+        name: value
+        for name, value in os.environ.items()
+        if name in kept or not name.startswith(_KEPT_OUT)
+    }
+
+
+def start_process(folder: FlightFolder, *, tied: bool, vehicles: bool) -> subprocess.Popen[bytes]:
+    """Start the process of the order in `folder`, in a session of its own.
+
+    A flight goes on when the service ends, and Ctrl-C at the service's terminal does not reach
+    it. A rehearsal is `tied`: it ends with the service, whatever ends that (see `tie`). Only what
+    is connected with `vehicles` gets their secrets.
+    """
+    with folder.log.open("ab") as log:
+        return subprocess.Popen(  # noqa: S603 - our own module
+            [sys.executable, "-m", "aerodaas.flights", str(folder.path)],
+            stdin=subprocess.PIPE if tied else subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+            env=service_free_environment(vehicles=vehicles),
+        )
+
+
+def end_with_starter() -> None:
+    """End this process, and all of its group, once the process that started it is gone.
+
+    Its standard input must be a pipe whose other end its starter alone holds, and leaves alone:
+    the system closes that end however the starter ends, also by SIGKILL. (Linux' signal at a
+    parent's death goes by the thread that started a process, and reaches no grandchildren.)
+    """
+    threading.Thread(target=_await_end, name="tie", daemon=True).start()
+
+
+def _await_end() -> None:
+    os.read(0, 1)
+    os.killpg(os.getpgrp(), signal.SIGKILL)

@@ -31,9 +31,9 @@ from aerodaas.protocol.schemas import (
     Role,
 )
 from aerodaas.service.backend import PilotCommand
+from aerodaas.service.errors import TroubleLog
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.own.access import OWN
-from aerodaas.service.trouble import TroubleLog
 
 __all__ = ["FlightLink", "flight_address"]
 

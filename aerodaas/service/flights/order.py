@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -10,10 +11,29 @@ from pydantic import BaseModel, ConfigDict, Field
 from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
-from aerodaas.protocol.schemas import Area, SilencePolicy, StatusOut, VerdictOut
-from aerodaas.service.limits import TenantLimits
+from aerodaas.protocol.schemas import Area, Positive, SilencePolicy, StatusOut, VerdictOut
 
-__all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome", "Progress"]
+__all__ = [
+    "Attached",
+    "EdgeTurnsOrder",
+    "FlightOrder",
+    "OtherLease",
+    "Outcome",
+    "Progress",
+    "TenantLimits",
+]
+
+
+@dataclass(frozen=True)
+class TenantLimits:
+    """Limits of a tenant, on top of the provider's; None for no further limit."""
+
+    max_height: Positive | None = None
+    """Metres above home."""
+    max_speed: Positive | None = None
+    """m/s, level and upright."""
+    max_range: Positive | None = None
+    """Metres from the place of take-off."""
 
 
 class _Record(BaseModel):

@@ -19,10 +19,9 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.schemas import GrantIn, Role, Scope
-from aerodaas.service.flights.server import LeasedFlight
-from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.flights.server import LeasedFlight, LeaseWatch
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
 from aerodaas.service.live.jobs import end_jobs
 from aerodaas.service.live.packed_reader import PackedReader

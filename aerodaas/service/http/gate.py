@@ -1,26 +1,189 @@
-"""The gate before the service: who sends a request, how large it is, and beside how many."""
+"""The gate before the API: the sender of each request, its role, and the limits of both."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from http import HTTPStatus
+from typing import TYPE_CHECKING, Protocol
 
 from starlette.requests import HTTPConnection
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Send
+from starlette.types import Scope as Connection
 
 from aerodaas.errors import AeroDaaSError
 from aerodaas.http_server.addresses import address_of
-from aerodaas.protocol.schemas import Role
-from aerodaas.service.access.principal import Principal
+from aerodaas.mission.commands import Answer
+from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.http.admission import Admission
-from aerodaas.service.http.counters import RateLimiter
-from aerodaas.service.http.limits import RequestLimits
+from aerodaas.service.http.limits import RateLimiter, RequestLimits
 from aerodaas.service.http.page import is_page
 from aerodaas.service.http.refusals import refuse
 
-__all__ = ["Gate"]
+if TYPE_CHECKING:
+    from aerodaas.service.access.audit import Audit
+
+__all__ = ["SUBPROTOCOL", "Admission", "Gate", "Tokens", "bearer"]
+
+SUBPROTOCOL = "aerodaas"
+"""What a browser's WebSocket speaks; beside it, its token: a browser sets no further headers."""
+_BEARER = "bearer."
+
+
+def bearer(headers: Mapping[str, str]) -> str:
+    """The token that a request carries, empty for none.
+
+    In `Authorization: Bearer TOKEN`; or, of a browser's WebSocket, as the subprotocol
+    `bearer.TOKEN` beside `aerodaas`, which is the one that is answered.
+    """
+    kind, _, token = headers.get("authorization", "").partition(" ")
+    if kind.lower() == "bearer":
+        return token.strip()
+    offered = [one.strip() for one in headers.get("sec-websocket-protocol", "").split(",")]
+    if SUBPROTOCOL not in offered:
+        return ""
+    return next((one[len(_BEARER) :] for one in offered if one.startswith(_BEARER)), "")
+
+
+_SENDER = "aerodaas.principal"
+"""Key of the sender in a request's ASGI scope."""
+_THREADS = 8
+_GONE = frozenset(
+    {
+        HTTPStatus.UNAUTHORIZED,
+        HTTPStatus.FORBIDDEN,
+        HTTPStatus.NOT_FOUND,
+        # Of many wrong tokens from the same address; the right one is never told so.
+        HTTPStatus.TOO_MANY_REQUESTS,
+    }
+)
+"""Refusals of who may not go on; any other one is the service's own trouble."""
+
+
+class Tokens(Protocol):
+    """Tokens that are good, and whose they are."""
+
+    def of(self, token: str, address: str) -> Principal:
+        """Who sends a `token` from an `address`; raises RefusedError for a wrong one."""
+        ...
+
+
+class Admission:
+    """Tells who sends a request, and whether they may; refusals are audited."""
+
+    def __init__(self, tokens: Tokens, audit: Audit | None = None) -> None:
+        """Admit by `tokens`.
+
+        Args:
+            tokens: Tokens that are good.
+            audit: Log of refusals and of drones' answers; None for none.
+        """
+        self._audit = audit
+        self._tokens = tokens
+        self._threads = ThreadPoolExecutor(_THREADS, "admission")
+
+    async def admit(self, connection: HTTPConnection, count: Callable[[str], None]) -> Principal:
+        """Identify the sender of a request before its body is read.
+
+        A thread of this alone does it: nobody's other work keeps a sender waiting. Without a
+        database that has the tokens, and the audit, it is done at once.
+
+        Args:
+            connection: The request.
+            count: Counts a request of an account; raises RefusedError for one too many.
+
+        Returns:
+            The sender.
+
+        Raises:
+            RefusedError: For a wrong token, and from `count`.
+        """
+        if self._audit is None:
+            return self.identify(connection, count)
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._threads, self.identify, connection, count)
+
+    def identify(
+        self, connection: HTTPConnection, count: Callable[[str], None] = lambda _: None
+    ) -> Principal:
+        """As `admit`, in this thread; without `count` it is no further request."""
+        address = address_of(connection.scope)
+        principal: Principal | None = None
+        try:
+            principal = self._tokens.of(bearer(connection.headers), address)
+            count(principal.account)
+        except RefusedError as error:
+            # A wrong token is audited where it is counted.
+            if principal is not None:
+                self._refuse(principal, connection, error)
+            raise
+        connection.scope[_SENDER] = principal
+        return principal
+
+    def stays(
+        self,
+        connection: HTTPConnection,
+        role: Role,
+        scope: Scope | None,
+        look: Callable[[Principal], object],
+    ) -> bool:
+        """Whether the sender of a request that lasts still may have it; counts as no further one.
+
+        `look` raises RefusedError for who may not. The service's own trouble refuses nobody.
+        """
+        token, address = bearer(connection.headers), address_of(connection.scope)
+        try:
+            connection.scope[_SENDER] = self._tokens.of(token, address)
+            look(self.require(connection, role, scope))
+        except RefusedError as error:
+            return error.status not in _GONE
+        except AeroDaaSError:
+            # The database may not answer for a while.
+            return True
+        return True
+
+    def require(
+        self, connection: HTTPConnection, role: Role, scope: Scope | None = None
+    ) -> Principal:
+        """The sender of a request; raises RefusedError if they may not do this."""
+        principal: Principal = connection.scope[_SENDER]
+        with self.auditing(principal, connection):
+            require(principal, role, scope)
+        return principal
+
+    @contextmanager
+    def auditing(self, principal: Principal, connection: HTTPConnection) -> Iterator[None]:
+        """Audit what is refused to the sender of a request meanwhile."""
+        try:
+            yield
+        except RefusedError as error:
+            self._refuse(principal, connection, error)
+            raise
+
+    def note_answer(self, principal: Principal, action: str, target: str, answer: Answer) -> None:
+        """Audit what a drone answered to a command."""
+        if self._audit is not None:
+            self._audit.note_answer(principal, action, target, answer)
+
+    def _refuse(
+        self, principal: Principal, connection: HTTPConnection, error: RefusedError
+    ) -> None:
+        if self._audit is None:
+            return
+        action = f"{connection.scope.get('method', 'WS')} {connection.scope['path']}"
+        self._audit.write(
+            principal,
+            action,
+            text=str(error),
+            accepted=False,
+            address=address_of(connection.scope),
+            required=False,
+        )
+
 
 _READING = frozenset({"GET", "HEAD"})
 
@@ -41,7 +204,7 @@ class Gate:
         self._counts: Counter[tuple[str, str]] = Counter()
         """Requests under way, as `RequestLimits.at_a_time` has them."""
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Connection, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it."""
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)

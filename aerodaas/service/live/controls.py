@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from aerodaas.errors import AeroDaaSError
 from aerodaas.mission.commands import Answer, ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
-from aerodaas.service.http.bearer import SUBPROTOCOL
+from aerodaas.service.http.gate import SUBPROTOCOL
 from aerodaas.service.live.jobs import end_jobs
 
 __all__ = ["ControlCommand", "ControlSession", "Freshness"]

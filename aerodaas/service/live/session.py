@@ -12,7 +12,7 @@ from fastapi import Query, WebSocket, WebSocketDisconnect
 from aerodaas.clock import host_time_ns
 from aerodaas.protocol.schemas import PictureForm
 from aerodaas.service.backend import Missions
-from aerodaas.service.http.bearer import SUBPROTOCOL
+from aerodaas.service.http.gate import SUBPROTOCOL
 from aerodaas.service.http.limits import RequestLimits
 from aerodaas.service.live.hub import StreamHub, Watcher
 from aerodaas.service.live.jobs import end_jobs

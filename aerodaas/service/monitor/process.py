@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from aerodaas.service.flights.starter import service_free_environment
+from aerodaas.service.flights.folder import service_free_environment
 from aerodaas.service.monitor.news import MonitorNews, VehicleNews, Wanted
 
 __all__ = ["FleetMonitor"]

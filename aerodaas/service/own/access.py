@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from aerodaas.protocol.schemas import AccountOut, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.http.counters import WrongTokens
+from aerodaas.service.http.limits import WrongTokens
 
 __all__ = ["OWN", "REMOTE", "FlightTokens", "account_of", "new_tokens", "principal_of"]
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections import OrderedDict, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from aerodaas.analytics.remote import RemoteAnalytics
+from aerodaas.clock import host_time_ns, seconds
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
+from aerodaas.messages.mission import GROUNDED
 from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, told_of_controls
@@ -21,6 +24,7 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
+    AnalyticsOut,
     CommandIn,
     FleetOut,
     MissionOut,
@@ -29,21 +33,108 @@ from aerodaas.protocol.schemas import (
     PictureForm,
     RobotOut,
     Role,
+    StatusOut,
 )
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.live.meter import FlightMeter
 from aerodaas.service.live.packed_reader import PackedReader, drawn_streams, ground_of
 from aerodaas.service.own.access import OWN, REMOTE, account_of
 
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig
     from aerodaas.dataflow.graph import Graph
-    from aerodaas.runtime.reports import FlightState
+    from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.terrain.ground import Ground
 
-__all__ = ["Flown", "OwnFlight"]
+__all__ = ["FlightMeter", "Flown", "OwnFlight"]
+
+_Place: TypeAlias = tuple[float, float, float]
+_ALERTS = 50
+"""Most alerts told, the newest ones."""
+_PLACES = 200
+"""Most waypoints of a robot whose places are told, unless more lie ahead."""
+
+
+class FlightMeter:
+    """Newest status of each robot, and sums over the flight."""
+
+    def __init__(self) -> None:
+        self.status: dict[str, StatusOut] = {}
+        """By robot; replaced and never changed, because other threads read it."""
+        self.told: dict[str, float] = {}
+        """Host time in seconds when each robot's newest status came; replaced as that is."""
+        self.preflight: dict[str, PreflightOut] = {}
+        """The list before take-off by robot; replaced as the status is."""
+        self.alerts: list[str] = []
+        self.analytics: AnalyticsOut | None = None
+        """What the analytics scheduler has done; None before its first outcome."""
+        self._places: dict[str, OrderedDict[str, _Place]] = defaultdict(OrderedDict)
+        self._flown: dict[str, float] = defaultdict(float)
+        self._charges: dict[str, tuple[float, float]] = {}
+        """First and newest known charge by robot."""
+
+    @property
+    def time(self) -> float:
+        """Mission seconds of the newest status."""
+        return max((one.time for one in self.status.values()), default=0.0)
+
+    def note(self, state: FlightState) -> None:
+        """Take over a state of the run."""
+        told = {}
+        for name, report in state.robots.items():
+            now, before = seconds(report.status.stamp), self.status.get(name)
+            # The same status again is no news: who told it may hang.
+            same = before is not None and before.time == now
+            told[name] = self.told[name] if same else seconds(host_time_ns())
+            if before is not None and report.status.state not in GROUNDED:
+                self._flown[name] += max(0.0, now - before.time)
+        self.told = told
+        self.status = {
+            name: self._remembering(name, StatusOut.of(report.status, report.state))
+            for name, report in state.robots.items()
+        }
+        self.preflight = {
+            name: PreflightOut.of_flight(name, report.health, report.status.stamp)
+            for name, report in state.robots.items()
+        }
+        for name, status in self.status.items():
+            if status.battery is not None:
+                first, _ = self._charges.get(name, (status.battery, status.battery))
+                self._charges[name] = first, status.battery
+        self.alerts = [f"{one.kind}: {one.text}" for one in state.alerts[-_ALERTS:]]
+        dispatcher = state.reports.get("dispatcher")
+        if dispatcher is not None:
+            self.analytics = AnalyticsOut.of(self.time, dispatcher.values)
+
+    def _remembering(self, name: str, status: StatusOut) -> StatusOut:
+        """A status with the places of waypoints that lie behind, too: those known last."""
+        known = self._places[name]
+        for waypoint, place in status.places.items():
+            known[waypoint] = place
+            known.move_to_end(waypoint)
+        while len(known) > max(_PLACES, len(status.places)):
+            known.popitem(last=False)
+        return status.model_copy(update={"places": dict(known)})
+
+    def usage(self, reports: Mapping[str, ActorReport]) -> dict[str, Any]:
+        """What the flight has used, as `Outcome` has it; `reports` are its actors'."""
+        compute: dict[str, float] = defaultdict(float)
+        calls = 0
+        for name, report in reports.items():
+            kind, _, place = name.partition("/")
+            if kind == "analytics" and report.vitals is not None:
+                compute["cloud" if place == "cloud" else "edge"] += report.vitals.cpu_seconds
+            if kind == "dispatcher":
+                calls += sum(one["frames"] for one in report.values.get("sites", {}).values())
+        return {
+            "flight_seconds": sum(self._flown.values()),
+            "distance": sum(one.distance for one in self.status.values()),
+            "battery_used": sum(max(0.0, first - last) for first, last in self._charges.values()),
+            "compute_seconds": dict(compute),
+            "cloud_calls": calls,
+        }
+
 
 _LOOK_SECONDS = 0.1
 """Wall seconds between two looks at the drones while somebody watches."""

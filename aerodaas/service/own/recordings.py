@@ -14,7 +14,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.app import build_app
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import OWN_FLIGHT
 from aerodaas.service.live.playback import Player
 from aerodaas.service.own.access import OWN, account_of

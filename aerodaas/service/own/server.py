@@ -13,9 +13,9 @@ from aerodaas.errors import ConfigError
 from aerodaas.http_server.addresses import HostGuard, listen
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.app import build_app
-from aerodaas.service.http.admission import Admission
-from aerodaas.service.http.app_server import AppServer
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import OWN_FLIGHT, RequestLimits
+from aerodaas.service.http.server import AppServer
 from aerodaas.service.own.access import REMOTE, FlightTokens, new_tokens, principal_of
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.routes.fleet import FleetRoutes

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.service.rehearsal.environment import rehearsal_config
 from aerodaas.service.rehearsal.findings import OtherArea
 from aerodaas.service.rehearsal.verdict import judge
 
-__all__ = ["OtherArea", "judge", "rehearsal_config"]
+__all__ = ["OtherArea", "judge"]

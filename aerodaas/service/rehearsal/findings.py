@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
-from aerodaas.service.limits import Outline
+from aerodaas.service.flights.environment import Outline
 
 __all__ = ["Finding", "OtherArea", "findings_of", "landing_time"]
 

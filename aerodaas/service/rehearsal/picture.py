@@ -18,7 +18,7 @@ from aerodaas.recording.report.overlay import OKABE_ITO
 from aerodaas.recording.report.page.figures import png_of
 from aerodaas.recording.report.plots.style import mark
 from aerodaas.recording.report.plots.trajectory import trajectory_figure
-from aerodaas.service.limits import Outline
+from aerodaas.service.flights.environment import Outline
 from aerodaas.service.rehearsal.findings import Finding, OtherArea, findings_of
 
 __all__ = ["draw"]

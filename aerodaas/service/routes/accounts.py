@@ -23,8 +23,8 @@ from aerodaas.protocol.schemas import (
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.usage import usage_csv, usage_out
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.store import Store, Tenant
 
 __all__ = ["AccountRoutes"]

@@ -8,8 +8,8 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, Role
 from aerodaas.service.backend import Fleet
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 
 __all__ = ["FleetRoutes"]
 

@@ -15,7 +15,7 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import flight_address
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
 from aerodaas.service.live.jobs import end_jobs
 from aerodaas.service.live.session import until_refused

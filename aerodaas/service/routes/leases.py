@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from aerodaas.protocol.schemas import LeaseIn, LeaseOut, Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.bookings import Bookings
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
-from aerodaas.service.leases import lease_out
+from aerodaas.service.http.gate import Admission
+from aerodaas.service.lease_book import lease_out
 
 __all__ = ["LeaseRoutes"]
 

@@ -11,7 +11,7 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ControlsIn, told_of_controls
 from aerodaas.protocol.schemas import PictureForm, Role, Scope, Word
 from aerodaas.service.backend import Missions
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
 from aerodaas.service.live.controls import ControlCommand, ControlSession
 from aerodaas.service.live.hub import StreamHub

@@ -11,8 +11,8 @@ from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyO
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, Role, Scope
 from aerodaas.service.backend import Missions, PilotCommand, ShownMissions
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.live.surveys import SurveyPlanner
 
 __all__ = ["MissionRoutes", "PilotingRoutes"]

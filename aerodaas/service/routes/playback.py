@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.live.playback import Player
 
 __all__ = ["PlaybackRoutes"]

@@ -12,8 +12,8 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import RequestLimits
 from aerodaas.service.models import ModelShelf
 

@@ -10,8 +10,8 @@ from fastapi.responses import FileResponse
 from aerodaas.protocol.schemas import GrantIn, MissionIn, MissionOut, Role, Scope, Word
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.desk import MissionDesk
-from aerodaas.service.http.admission import Admission
 from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.idempotency import read_key
 
 __all__ = ["SubmissionRoutes"]

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from aerodaas.protocol.schemas import AccountIn, Role, Scope, TokenIn
-from aerodaas.service.access import access
-from aerodaas.service.access.access import Access
-from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access import accounts as access
+from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.errors import RefusedError, StoreError

@@ -20,8 +20,7 @@ from oidc_issuer import AUDIENCE, Issuer
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.protocol.schemas import AccountIn, Role, Scope
 from aerodaas.service.access import issuer_keys
-from aerodaas.service.access.access import Access
-from aerodaas.service.access.accounts import Accounts
+from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.issuer_keys import IssuerKeys
 from aerodaas.service.access.oidc import OidcSettings, OidcVerifier

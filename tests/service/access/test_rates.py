@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.http.counters import RateLimiter, WrongTokens
-from aerodaas.service.http.limits import RequestLimits
+from aerodaas.service.http.limits import RateLimiter, RequestLimits, WrongTokens
 
 
 def limiter_of(rate: float, burst: float, clock: Callable[[], float]) -> RateLimiter:

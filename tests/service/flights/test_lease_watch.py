@@ -11,7 +11,7 @@ import pytest
 
 from aerodaas.protocol.schemas import SilencePolicy
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.flights.server import LeaseWatch
 
 pytestmark = pytest.mark.wall_clock
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.service.flights.starter import service_free_environment
+from aerodaas.service.flights.folder import service_free_environment
 
 
 @pytest.mark.parametrize("vehicles", [True, False])

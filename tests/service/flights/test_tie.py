@@ -13,7 +13,7 @@ import pytest
 
 STARTED = """
 import subprocess, sys, time
-from aerodaas.service.flights.tie import end_with_starter
+from aerodaas.service.flights.folder import end_with_starter
 end_with_starter()
 own = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 print(own.pid, flush=True)

@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role, Scope
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.leases import Candidate, LeaseBook, Shelf
+from aerodaas.service.lease_book import Candidate, LeaseBook, Shelf
 from aerodaas.service.store import Account, Lease, Store, Tenant
 
 ROBOTS = ("a", "b", "c", "d")

@@ -21,7 +21,7 @@ from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.schemas import Role
-from aerodaas.service.http.admission import Admission
+from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import OWN_FLIGHT
 from aerodaas.service.own.access import FlightTokens, principal_of
 from aerodaas.service.own.flight import OwnFlight

@@ -1,22 +1,202 @@
-"""The book of leases: who flies which drone until when."""
+"""Book of leases: requests, the drones that fit them, and the rules by which they are granted."""
 
 from __future__ import annotations
 
 import math
 import secrets
 import threading
-from collections.abc import Callable, Iterable
-from dataclasses import replace
-from typing import Protocol
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
 
-from aerodaas.protocol.schemas import LeaseIn, LeaseState
+from aerodaas.protocol.schemas import LeaseIn, LeaseOut, LeaseState
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.leases.candidates import Fleet
-from aerodaas.service.leases.rules import MINUTE, grants, is_waited_for, over
-from aerodaas.service.leases.wish import check_wish, lease_of
 from aerodaas.service.store import Lease, LeaseEnd
 
-__all__ = ["LeaseBook", "Shelf"]
+__all__ = [
+    "MINUTE",
+    "Candidate",
+    "Fleet",
+    "LeaseBook",
+    "Shelf",
+    "check_wish",
+    "distance",
+    "grants",
+    "is_waited_for",
+    "lease_of",
+    "lease_out",
+    "over",
+    "waited_for",
+]
+
+
+def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
+    """Refuse what this fleet cannot fulfil however long one waits.
+
+    Raises:
+        RefusedError: With status 404, 409 or 422; see `LeaseBook.request`.
+    """
+    names = wish.robots or []
+    if len(set(names)) < len(names):
+        raise RefusedError(422, "a lease names each robot once")
+    unknown = [name for name in names if name not in fleet]
+    if unknown:
+        known = ", ".join(sorted(fleet)) or "none"
+        raise RefusedError(404, f"the fleet has no robot {', '.join(unknown)}; it has: {known}")
+    for name in names:
+        if fleet[name].objection:
+            raise RefusedError(409, f"{name}: {fleet[name].objection}; ask for another")
+    if not names and not any(robot.camera or not wish.camera for robot in fleet.values()):
+        raise RefusedError(409, "no drone of the fleet could ever fit")
+
+
+def lease_of(
+    wish: LeaseIn, *, id_: str, number: int, tenant: str, account: str, now: float
+) -> Lease:
+    """A wish as a queued lease."""
+    return Lease(
+        id=id_,
+        number=number,
+        tenant=tenant,
+        account=account,
+        minutes=wish.minutes,
+        asked=now,
+        wanted=tuple(wish.robots or ()),
+        camera=wish.camera,
+        within=wish.within,
+        near=wish.near,
+        battery_minutes=wish.battery_minutes,
+        area=None if wish.area is None else tuple(wish.area),
+    )
+
+
+def lease_out(lease: Lease) -> LeaseOut:
+    """A lease as the HTTP interface shows it."""
+    return LeaseOut(
+        id=lease.id,
+        tenant=lease.tenant,
+        account=lease.account,
+        robots=list(lease.robots or lease.wanted),
+        state=lease.state,
+        reason=lease.reason,
+        minutes=lease.minutes,
+        asked=lease.asked,
+        granted=lease.granted,
+        ends=lease.ends,
+        area=None if lease.area is None else list(lease.area),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One drone of the fleet, as it is now."""
+
+    id: str
+    camera: bool = False
+    position: tuple[float, float] | None = None
+    """Metres east and north; None if unknown, which is within no distance."""
+    battery_minutes: float | None = None
+    """Minutes of flight that its charge lasts; None if unknown, which is enough for none."""
+    objection: str = ""
+    """Why it cannot be flown now: out of service, out of reach, low; empty if it can."""
+    busy: bool = False
+    """Whether it still flies, for a lease that holds it or one that has ended: no other lease gets
+    it before it has landed."""
+
+
+Fleet: TypeAlias = Mapping[str, Candidate]
+"""The whole fleet, by id."""
+
+
+def waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
+    """Robots that a queued lease could use now, were they all free.
+
+    All of those that it names, if each can be flown; or each one that fits.
+    """
+    if not lease.wanted:
+        return frozenset(id_ for id_, robot in fleet.items() if _fits(lease, robot))
+    ready = all(id_ in fleet and not fleet[id_].objection for id_ in lease.wanted)
+    return frozenset(lease.wanted) if ready else frozenset()
+
+
+def distance(lease: Lease, robot: Candidate) -> float:
+    """Metres from where a lease wants any drone; infinity if it is not known where this one is."""
+    return math.inf if robot.position is None else math.dist(robot.position, lease.near)
+
+
+def _fits(lease: Lease, robot: Candidate) -> bool:
+    return (
+        not robot.objection
+        and (robot.camera or not lease.camera)
+        and (lease.within is None or distance(lease, robot) <= lease.within)
+        and (lease.battery_minutes or 0.0) <= (robot.battery_minutes or 0.0)
+    )
+
+
+MINUTE = 60.0
+"""Seconds."""
+
+
+def over(live: Iterable[Lease], now: float) -> list[Lease]:
+    """Those whose time is over, as ended."""
+    return [
+        replace(
+            lease,
+            state=LeaseState.ENDED,
+            ended=lease.ends,
+            end=LeaseEnd.EXPIRED,
+            reason=f"its {lease.minutes:g} minutes are over",
+        )
+        for lease in live
+        if lease.ends is not None and lease.ends <= now
+    ]
+
+
+def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
+    """Those of the queue that can have their drones now, as granted.
+
+    Each lease that must wait keeps the robots it waits for from all later ones: of several robots,
+    those that are free stay so for it, or it might never find them free together.
+
+    Args:
+        live: Leases queued, or granted and not over, in the queue's order.
+        now: Moment, seconds of Unix time.
+        fleet: The drones as they are now.
+    """
+    taken = {robot for lease in live for robot in lease.robots}
+    taken |= {id_ for id_, robot in fleet.items() if robot.busy}
+    granted = []
+    for lease in live:
+        if lease.state is not LeaseState.QUEUED:
+            continue
+        robots = waited_for(lease, fleet)
+        free = robots - taken
+        if not free or (lease.wanted and free != robots):
+            taken |= robots
+            continue
+        # The nearest of any; the order by name makes it the same one each time.
+        nearest = min(sorted(free), key=lambda id_: distance(lease, fleet[id_]))
+        chosen = lease.wanted or (nearest,)
+        taken.update(chosen)
+        granted.append(
+            replace(
+                lease,
+                state=LeaseState.GRANTED,
+                robots=chosen,
+                granted=now,
+                ends=now + lease.minutes * MINUTE,
+            )
+        )
+    return granted
+
+
+def is_waited_for(held: Lease, live: Iterable[Lease], fleet: Fleet) -> bool:
+    """Whether a queued lease waits for a robot that `held` holds."""
+    return any(
+        lease.state is LeaseState.QUEUED and not waited_for(lease, fleet).isdisjoint(held.robots)
+        for lease in live
+    )
+
 
 _MOST_WAITING = 1000
 _MOST_WAITING_OF_TENANT = 50

@@ -9,7 +9,10 @@ are bounded in time, and in memory for all connections together.
 
 from __future__ import annotations
 
+import socket
+import threading
 from collections import OrderedDict, defaultdict
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import uvicorn
@@ -21,11 +24,12 @@ from aerodaas.service.http.limits import RequestLimits
 if TYPE_CHECKING:
     import asyncio
 
+    from starlette.types import ASGIApp
     from uvicorn.protocols.http.h11_impl import H11Protocol as _Protocol
 else:
     _Protocol = AutoHTTPProtocol
 
-__all__ = ["web_server"]
+__all__ = ["AppServer", "web_server"]
 
 _TRY_AGAIN_LATER, _POLICY_VIOLATION = 1013, 1008
 """Codes by which a WebSocket is closed (RFC 6455)."""
@@ -262,3 +266,50 @@ class _ImpatientProtocol(_Protocol):
         if self._closing is not None:
             self._closing.cancel()
             self._closing = None
+
+
+_STOPPING = 5.0
+"""Seconds that the thread has to end."""
+
+
+class AppServer:
+    """Serves an application to who connects to a socket, in a thread, until it is closed."""
+
+    def __init__(self, listener: socket.socket, limits: RequestLimits) -> None:
+        """Take over a socket; who connects before `start` is answered then.
+
+        Args:
+            listener: Socket that listens; it is closed with the server.
+            limits: Limits of its connections.
+        """
+        self._listener = listener
+        self._limits = limits
+        self._closed = threading.Event()
+        self._server: uvicorn.Server | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def serving(self) -> bool:
+        """Whether it has begun to serve."""
+        return self._thread is not None
+
+    def start(self, build: Callable[[], ASGIApp]) -> None:
+        """Serve the application that `build` makes, which is called in the server's thread."""
+        self._thread = threading.Thread(
+            target=self._serve, args=(build,), name="api server", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop serving, and listen no more."""
+        self._closed.set()
+        if self._server is not None:
+            self._server.should_exit = True
+        if self._thread is not None:
+            self._thread.join(_STOPPING)
+        self._listener.close()
+
+    def _serve(self, build: Callable[[], ASGIApp]) -> None:
+        self._server = web_server(build(), self._limits, timeout_graceful_shutdown=1)
+        if not self._closed.is_set():
+            self._server.run(sockets=[self._listener])
