@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from aerodaas.service.flights.folder import FlightFolder, end_with_starter
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 
 
 def main() -> None:

@@ -26,10 +26,10 @@ from aerodaas.runtime.reports import FlightState
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
-from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.orders import FlightOrder, Outcome
 from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 
-__all__ = ["Flying", "fly"]
+__all__ = ["FlightProcess", "fly"]
 
 _USER_SECONDS = 30.0
 """Wall seconds for the user's side to connect before take-off."""
@@ -51,10 +51,10 @@ def fly(path: Path) -> None:
     if order.attached is not None:
         os.nice(_NICENESS)
     with RobotLocks(order.locks).hold(order.robots), folder.claim():
-        folder.end(Flying(folder, order).outcome())
+        folder.end(FlightProcess(folder, order).outcome())
 
 
-class Flying:
+class FlightProcess:
     """One flight from its order to its outcome."""
 
     def __init__(self, folder: FlightFolder, order: FlightOrder) -> None:

@@ -13,10 +13,10 @@ import psutil
 
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.errors import AeroDaaSError
-from aerodaas.flights.process import Flying
+from aerodaas.flights.process import FlightProcess
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
+from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
 from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
 
@@ -35,7 +35,7 @@ def rehearse(path: Path) -> None:
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
     with folder.claim():
-        flying = Flying(folder, order)
+        flying = FlightProcess(folder, order)
         threading.Thread(target=_watch, args=(folder, order, flying), daemon=True).start()
         outcome = flying.outcome()
         verdict = _verdict(folder, order, flying, outcome)
@@ -44,7 +44,7 @@ def rehearse(path: Path) -> None:
         folder.end(outcome.model_copy(update={"verdict": verdict}))
 
 
-def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
+def _watch(folder: FlightFolder, order: FlightOrder, flying: FlightProcess) -> None:
     """Write how far the rehearsal has come, and end its process where it uses too much."""
     process = psutil.Process()
     while True:
@@ -74,7 +74,7 @@ def _watch(folder: FlightFolder, order: FlightOrder, flying: Flying) -> None:
 
 
 def _verdict(
-    folder: FlightFolder, order: FlightOrder, flying: Flying, outcome: Outcome
+    folder: FlightFolder, order: FlightOrder, flying: FlightProcess, outcome: Outcome
 ) -> VerdictOut:
     if not folder.recording.is_file():
         return VerdictOut(approved=False, reasons=[outcome.reason])

@@ -17,9 +17,9 @@ from aerodaas.errors import MissionError
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
 from aerodaas.service.access.principal import Principal, sees
-from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import Attached
+from aerodaas.service.flights.orders import HostFlight
+from aerodaas.service.lease_service import LeaseService
 from aerodaas.service.mission import ActiveMission
 from aerodaas.service.settings import ServiceSettings
 
@@ -34,17 +34,17 @@ _ENDING_SECONDS = 60.0
 
 
 class Attachments:
-    """Attached missions among the desk's; called with its lock held."""
+    """Attached missions among those of the service, whose lock the caller holds."""
 
     def __init__(
-        self, settings: ServiceSettings, bookings: Bookings, missions: Mapping[str, ActiveMission]
+        self, settings: ServiceSettings, leases: LeaseService, missions: Mapping[str, ActiveMission]
     ) -> None:
-        """Attach to the desk's `missions`, by the provider's settings."""
+        """Attach to `missions` by the provider's settings."""
         self._most = settings.most_attached
         self._cameras = {
             one.full_id for one in settings.config.all_sensors() if one.type == "camera"
         }
-        self._bookings = bookings
+        self._leases = leases
         self._missions = missions
         self._told: dict[str, float] = {}
         """When an attached mission was told to end, by `time.monotonic`."""
@@ -78,7 +78,7 @@ class Attachments:
         cameras = [name for name in running if name in self._cameras]
         return [name for name in cameras if _may_have(tenant, [name], host)]
 
-    def begin(self, one: ActiveMission) -> Attached:
+    def begin(self, one: ActiveMission) -> HostFlight:
         """Have the flight share its cameras with a mission; raises MissionError if it does not."""
         host = self._missions.get(str(one.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
@@ -91,7 +91,7 @@ class Attachments:
         answer = host.follow().share(one.row.id, wanted)
         if not answer.accepted:
             raise MissionError(answer.text)
-        return Attached(mission=host.row.id, socket=host.flight.socket, sensors=wanted)
+        return HostFlight(mission=host.row.id, socket=host.flight.socket, sensors=wanted)
 
     def watch(self, one: ActiveMission) -> None:
         """End an attached mission whose flight has ended, or that may sense no more."""
@@ -139,7 +139,7 @@ class Attachments:
             if host.phase is not MissionPhase.FLYING or host.attached_to is not None:
                 what = "senses only" if host.attached_to else f"is {host.phase.value}"
                 raise RefusedError(409, f"{name} {what}: attach to a mission in flight")
-            lease = self._bookings.lease(str(host.row.lease))
+            lease = self._leases.lease(str(host.row.lease))
             if lease.state is LeaseState.ENDED:
                 raise RefusedError(409, f"{name}: its lease has ended, and its drones come home")
             return host

@@ -7,7 +7,7 @@ import re
 
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["RefusedError", "StoreError", "TroubleLog", "without_folders"]
+__all__ = ["RefusedError", "RepeatedErrorLog", "StoreError", "without_folders"]
 
 _FOLDERS = re.compile(r"(?<![\w/:.~-])/(?:[^\s/'\":;,()]+/)+")
 """The folders of an absolute path, up to its last part."""
@@ -48,7 +48,7 @@ class StoreError(AeroDaaSError):
     """The database is full, missing, locked, out of reach or of another version."""
 
 
-class TroubleLog:
+class RepeatedErrorLog:
     """Logs each trouble of what is tried many times a second once, for as long as it is the same.
 
     For one thread.

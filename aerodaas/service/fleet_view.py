@@ -13,9 +13,9 @@ from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal, sees
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.desk import MissionDesk
-from aerodaas.service.garage import Garage
+from aerodaas.service.fleet_registry import FleetRegistry
+from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.mission_service import MissionService
 from aerodaas.service.store import RobotState
 
 __all__ = ["FleetView"]
@@ -29,9 +29,9 @@ class FleetView:
         config: EnvironmentConfig,
         catalogue: dict[str, Any],
         actuators: Mapping[str, frozenset[str]],
-        garage: Garage,
-        bookings: Bookings,
-        desk: MissionDesk,
+        registry: FleetRegistry,
+        leases: LeaseService,
+        missions: MissionService,
         accounts: Accounts,
     ) -> None:
         """Show `catalogue`, and the drones of `config`; to a tenant its `actuators`."""
@@ -39,9 +39,9 @@ class FleetView:
         self._actuators = actuators
         self._config = config
         self._catalogue = catalogue
-        self._garage = garage
-        self._bookings = bookings
-        self._desk = desk
+        self._registry = registry
+        self._leases = leases
+        self._missions = missions
 
     def account(self, principal: Principal) -> AccountOut:
         """The account that asks."""
@@ -49,8 +49,8 @@ class FleetView:
 
     def preflight(self, robot: str) -> PreflightOut:
         """A robot's health before take-off; raises RefusedError for an unknown robot."""
-        known = self._garage.preflight(robot)
-        return self._desk.preflight(robot) or known
+        known = self._registry.preflight(robot)
+        return self._missions.preflight(robot) or known
 
     def fleet_scenery(self) -> SceneryOut:
         """What lies below the fleet on a map; raises ConfigError if its world cannot be read."""
@@ -62,7 +62,7 @@ class FleetView:
 
     def seen_by(self, principal: Principal) -> FleetOut:
         """The fleet as this account may see it."""
-        states = self._garage.states
+        states = self._registry.states
         robots = [self._robot(robot, states[robot.id], principal) for robot in self._config.robots]
         return FleetOut(
             name=self._config.name, robots=robots, environment=self._environment(principal)
@@ -81,9 +81,9 @@ class FleetView:
         return {**self._catalogue, "robots": robots}
 
     def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
-        lease = self._bookings.holder(robot.id)
-        news, ready = self._garage.news(robot.id), self._garage.preflight(robot.id)
-        flying, shared = self._desk.shared(robot.id, principal.tenant)
+        lease = self._leases.holder(robot.id)
+        news, ready = self._registry.news(robot.id), self._registry.preflight(robot.id)
+        flying, shared = self._missions.shared(robot.id, principal.tenant)
         mine = lease is not None and sees(principal, lease.tenant)
         # Only of a lease that this account sees.
         own = lease if mine else None
@@ -103,6 +103,6 @@ class FleetView:
             since=news.since or None,
             mode=news.mode or None,
             faults=list(news.faults),
-            objection="" if flying is not None else self._garage.objection(robot.id),
+            objection="" if flying is not None else self._registry.objection(robot.id),
             preflight=ready.verdict if news.link is LinkState.CONNECTED else None,
         )

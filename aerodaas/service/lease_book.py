@@ -18,7 +18,7 @@ __all__ = [
     "Candidate",
     "Fleet",
     "LeaseBook",
-    "Shelf",
+    "LeaseTable",
     "check_wish",
     "distance",
     "grants",
@@ -204,7 +204,7 @@ _LONGEST = 24 * 60
 """Minutes of a lease with all of its extensions."""
 
 
-class Shelf(Protocol):
+class LeaseTable(Protocol):
     """What the book keeps its leases in: `Store.leases`."""
 
     def live(self) -> list[Lease]:
@@ -242,7 +242,7 @@ class LeaseBook:
     """
 
     def __init__(
-        self, shelf: Shelf, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
+        self, shelf: LeaseTable, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
     ) -> None:
         """Go on with the leases on `shelf`; call `tick` next, for some may be over.
 

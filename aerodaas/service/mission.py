@@ -21,11 +21,11 @@ from aerodaas.protocol.schemas import LeaseState, MissionOut, MissionPhase, Verd
 from aerodaas.service.errors import without_folders
 from aerodaas.service.flights.folder import FlightFolder, start_process
 from aerodaas.service.flights.link import FlightLink
-from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.service.models import ModelShelf
-from aerodaas.service.store import Lease, Mission
+from aerodaas.service.flights.orders import FlightOrder, Outcome
+from aerodaas.service.model_store import ModelStore
+from aerodaas.service.store import Lease, Mission, Usage
 
-__all__ = ["CANCELLED_BY", "FOLLOWING", "ActiveMission", "LostFlightError", "shown"]
+__all__ = ["CANCELLED_BY", "FOLLOWING", "ActiveMission", "LostFlightError", "shown", "usage_of"]
 
 _P = MissionPhase
 FOLLOWING = {
@@ -139,7 +139,7 @@ class ActiveMission:
         """Whether a former service began the rehearsal, which ended with it, without a result."""
         return self._rehearsing is None and self.rehearsal.outcome() is None
 
-    def rehearse(self, order: FlightOrder, models: ModelShelf) -> None:
+    def rehearse(self, order: FlightOrder, models: ModelStore) -> None:
         """Start the rehearsal, in place of what one of a former service has left."""
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
@@ -175,7 +175,7 @@ class ActiveMission:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
-    def brief(self, order: FlightOrder, models: ModelShelf) -> None:
+    def brief(self, order: FlightOrder, models: ModelStore) -> None:
         """Write down the flight's order, before anything of it begins."""
         self._prepare(self.flight, order, models)
         self._known_lease = FlightLeaseIn(ends=order.ends)
@@ -202,7 +202,7 @@ class ActiveMission:
             if not kept:
                 raise
 
-    def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
+    def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelStore) -> None:
         document = self.document()
         folder.make(order, document.text())
         models.lend(self.row.tenant, document, folder.models)
@@ -314,4 +314,20 @@ def shown(one: ActiveMission) -> MissionOut:
         streams={} if flying is None else flying.streams,
         analytics=None if flying is None else flying.analytics,
         recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
+    )
+
+
+def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
+    """What a mission has used."""
+    return Usage(
+        mission=mission.id,
+        tenant=mission.tenant,
+        account=mission.account,
+        started=outcome.began,
+        flight_seconds=outcome.flight_seconds,
+        distance=outcome.distance,
+        battery_used=outcome.battery_used,
+        compute_seconds=outcome.compute_seconds,
+        cloud_calls=outcome.cloud_calls,
+        recorded_bytes=recording.stat().st_size if recording.is_file() else 0,
     )

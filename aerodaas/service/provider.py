@@ -15,15 +15,15 @@ from aerodaas.service.access.oidc import OidcVerifier
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.app import build_app
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.edge import EdgeArbiter
+from aerodaas.service.fleet_registry import FleetRegistry
 from aerodaas.service.fleet_view import FleetView
-from aerodaas.service.garage import Garage
 from aerodaas.service.http.gate import Admission
+from aerodaas.service.lease_service import LeaseService
 from aerodaas.service.live.playback import Player, Players
+from aerodaas.service.mission_service import MissionService
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.model_trial import try_model
-from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.fleet import FleetRoutes
@@ -54,22 +54,24 @@ def build_service(
     issuer = None if settings.oidc is None else OidcVerifier(settings.oidc)
     accounts, access = Accounts(store), Access(store, audit, tell, issuer=issuer)
     accounts.on_change = access.forget
-    quotas, garage = Quotas(store), Garage(settings.config, store)
-    models = ModelShelf(settings.models, try_model)
-    bookings = Bookings(settings.config, store, garage, quotas, settings.state / "clock")
+    quotas, registry = Quotas(store), FleetRegistry(settings.config, store)
+    models = ModelStore(settings.models, try_model)
+    leases = LeaseService(settings.config, store, registry, quotas, settings.state / "clock")
     monitor = None
     if settings.monitor:
-        monitor = FleetMonitor(settings.fleet, settings.state / "monitor.log", garage.observe)
-    desk = MissionDesk(
-        settings, store, bookings=bookings, garage=garage, models=models, monitor=monitor
+        monitor = FleetMonitor(settings.fleet, settings.state / "monitor.log", registry.observe)
+    missions = MissionService(
+        settings, store, leases=leases, registry=registry, models=models, monitor=monitor
     )
     admission = Admission(access, audit)
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
-    fleet = FleetView(settings.config, shown, settings.actuators, garage, bookings, desk, accounts)
+    fleet = FleetView(
+        settings.config, shown, settings.actuators, registry, leases, missions, accounts
+    )
     players = Players()
 
     def player(principal: Principal, mission: str) -> Player:
-        return players.of(mission, desk.file(principal, mission, "recording"))
+        return players.of(mission, missions.file(principal, mission, "recording"))
 
     edge = None
     if settings.edge_slots is not None:
@@ -77,24 +79,24 @@ def build_service(
 
     @asynccontextmanager
     async def running() -> AsyncIterator[None]:
-        desk.start()
+        missions.start()
         if edge is not None:
             edge.start()
         yield
-        desk.close()
+        missions.close()
         if edge is not None:
             edge.close()
 
     routes = (
         FleetRoutes(fleet, admission),
-        ProvisionRoutes(garage, models, admission, audit),
-        LeaseRoutes(bookings, admission, audit),
-        MissionRoutes(desk, admission),
-        SubmissionRoutes(desk, admission, audit),
-        PilotingRoutes(desk, admission),
+        ProvisionRoutes(registry, models, admission, audit),
+        LeaseRoutes(leases, admission, audit),
+        MissionRoutes(missions, admission),
+        SubmissionRoutes(missions, admission, audit),
+        PilotingRoutes(missions, admission),
         PlaybackRoutes(player, admission),
-        LiveRoutes(desk, admission),
-        HereRoutes(desk, admission),
+        LiveRoutes(missions, admission),
+        HereRoutes(missions, admission),
         AccountRoutes(accounts, store, admission, audit),
     )
     return build_app(

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from desks import PILOT, Link, Provider
+from offered import PILOT, Link, Provider
 
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.orders import FlightOrder, Outcome
 from aerodaas.service.store import Account, Tenant
 
 CITY = Principal("bela", "city", Role.PILOT, frozenset({Scope.SENSE, Scope.COMPUTE}), "t")
@@ -27,7 +27,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.store.tenants.add(Tenant("city"))
     made.store.accounts.add(Account("bela", "city", Role.PILOT, CITY.scopes, 0.0))
     yield made
-    made.desk.close()
+    made.missions.close()
     made.store.close()
 
 
@@ -41,16 +41,16 @@ def watching(host: str, **changes: object) -> MissionIn:
 
 def attached(provider: Provider, host: MissionOut, who: Principal = CITY) -> MissionOut:
     """Attach a mission, and have it run."""
-    mission = provider.desk.submit(who, watching(host.id))
+    mission = provider.missions.submit(who, watching(host.id))
     provider.turns(3)
     assert provider.phase(mission) is MissionPhase.FLYING
-    provider.desk._missions[mission.id].link = cast("Any", Link())
+    provider.missions._missions[mission.id].link = cast("Any", Link())
     return mission
 
 
 def asked(provider: Provider, mission: MissionOut) -> list[Any]:
     """What a mission's flight was asked."""
-    return list(cast("Link", provider.desk._missions[mission.id].link).asked)
+    return list(cast("Link", provider.missions._missions[mission.id].link).asked)
 
 
 def test_who_is_granted_senses_beside_the_flight(provider: Provider) -> None:
@@ -62,22 +62,22 @@ def test_who_is_granted_senses_beside_the_flight(provider: Provider) -> None:
     assert order.robots == []
     assert order.attached is not None
     assert (order.attached.mission, order.attached.sensors) == (host.id, ["one/cam"])
-    shown = provider.desk.mission(CITY, mission.id)
+    shown = provider.missions.mission(CITY, mission.id)
     assert (shown.attach, shown.robots, shown.lease) == (host.id, [], None)
     (one, _) = provider.fleet.seen_by(CITY).robots
     assert (one.mission, one.shared) == (host.id, ["one/cam"])
     for who in (PILOT, Principal("eve", "evil", Role.PILOT, frozenset(Scope), "t")):
         with pytest.raises(RefusedError, match="there is no mission"):
-            provider.desk.mission(who, mission.id)
+            provider.missions.mission(who, mission.id)
 
 
 def test_a_granted_tenant_neither_watches_nor_commands_the_flight(provider: Provider) -> None:
     """A grant is for cameras in flight: not for the mission, its state or its recording."""
     host = provider.flying(grants=GRANT)
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.mission(CITY, host.id)
+        provider.missions.mission(CITY, host.id)
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.grant(CITY, host.id, "evil", [])
+        provider.missions.grant(CITY, host.id, "evil", [])
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_without_a_grant_nothing_is_attached(
     """To a stranger the flight does not exist; who may watch it may not attach to it."""
     host = provider.flying(grants=grants, share=share)
     with pytest.raises(RefusedError, match=told) as refused:
-        provider.desk.submit(CITY, watching(host.id))
+        provider.missions.submit(CITY, watching(host.id))
     assert refused.value.status == status
     assert asked(provider, host) == []
 
@@ -108,9 +108,9 @@ def test_without_the_providers_consent_nothing_is_attached(
     host = provider.flying(grants=GRANT)
     for who in (CITY, PILOT):
         with pytest.raises(RefusedError, match="shares no cameras between applications"):
-            provider.desk.submit(who, watching(host.id))
+            provider.missions.submit(who, watching(host.id))
     assert provider.fleet.seen_by(CITY).robots[0].shared == []
-    provider.desk.close()
+    provider.missions.close()
     provider.store.close()
 
 
@@ -151,7 +151,7 @@ def test_what_would_change_a_target_or_read_another_is_refused(
     """Before anything of it runs."""
     host = provider.flying(grants={"city": []})
     with pytest.raises(RefusedError, match=told):
-        provider.desk.submit(CITY, watching(host.id, **changes))
+        provider.missions.submit(CITY, watching(host.id, **changes))
 
 
 def test_an_attached_mission_takes_no_command(provider: Provider) -> None:
@@ -161,12 +161,12 @@ def test_an_attached_mission_takes_no_command(provider: Provider) -> None:
     host = provider.flying(grants=GRANT)
     mission = attached(provider, host)
     with pytest.raises(RefusedError, match=f"attached to {host.id}: it senses only") as refused:
-        provider.desk.fly(CITY, mission.id, CommandIn(robot="one", command="land"))
+        provider.missions.fly(CITY, mission.id, CommandIn(robot="one", command="land"))
     assert refused.value.status == 403
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.fly(CITY, host.id, CommandIn(robot="one", command="land"))
+        provider.missions.fly(CITY, host.id, CommandIn(robot="one", command="land"))
     with pytest.raises(RefusedError, match="senses only: attach to a mission in flight"):
-        provider.desk.submit(CITY, watching(mission.id))
+        provider.missions.submit(CITY, watching(mission.id))
     assert all(one[0] in {"share", "withdraw"} for one in asked(provider, host))
 
 
@@ -174,22 +174,22 @@ def test_a_withdrawn_grant_ends_what_was_attached(provider: Provider) -> None:
     """At the flight first, then by a word to the mission; other tenants' go on."""
     host = provider.flying(grants=GRANT)
     mission, own = attached(provider, host), attached(provider, host, PILOT)
-    provider.desk.grant(PILOT, host.id, "city", None)
+    provider.missions.grant(PILOT, host.id, "city", None)
     assert ("withdraw", mission.id) in asked(provider, host)
     assert asked(provider, mission) == [FlightLeaseIn(reason="farm has withdrawn its grant")]
     assert asked(provider, own) == []
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.submit(CITY, watching(host.id))
-    assert provider.desk.mission(PILOT, host.id).grants == {}
+        provider.missions.submit(CITY, watching(host.id))
+    assert provider.missions.mission(PILOT, host.id).grants == {}
 
 
 def test_a_narrower_grant_ends_what_it_leaves_out(provider: Provider) -> None:
     """And lets the rest go on."""
     host = provider.flying(grants={"city": []})
     mission = attached(provider, host)
-    provider.desk.grant(PILOT, host.id, "city", ["one/cam"])
+    provider.missions.grant(PILOT, host.id, "city", ["one/cam"])
     assert asked(provider, mission) == []
-    provider.desk.grant(PILOT, host.id, "city", ["one/belly"])
+    provider.missions.grant(PILOT, host.id, "city", ["one/belly"])
     assert ("withdraw", mission.id) in asked(provider, host)
 
 
@@ -205,20 +205,20 @@ def test_an_attached_mission_ends_with_its_flight(provider: Provider) -> None:
     (told,) = asked(provider, mission)
     assert told.ends is None
     with pytest.raises(RefusedError, match="there is no mission"):
-        provider.desk.submit(CITY, watching(host.id))
+        provider.missions.submit(CITY, watching(host.id))
     process.end(Outcome(landed=True, began=0.0, ended=1.0, reason="over"))
     provider.turns()
     assert provider.phase(mission) is MissionPhase.LANDED
-    assert all(one.enabled for one in provider.garage.states.values())
+    assert all(one.enabled for one in provider.registry.states.values())
 
 
 def test_after_the_leases_end_nothing_is_attached(provider: Provider) -> None:
     """Though the drone is still on its way home."""
     host = provider.flying(grants=GRANT)
-    lease = provider.desk.mission(PILOT, host.id).lease
-    provider.bookings.end(PILOT, str(lease))
+    lease = provider.missions.mission(PILOT, host.id).lease
+    provider.leases.end(PILOT, str(lease))
     with pytest.raises(RefusedError, match="its lease has ended") as refused:
-        provider.desk.submit(CITY, watching(host.id))
+        provider.missions.submit(CITY, watching(host.id))
     assert refused.value.status == 409
 
 
@@ -227,8 +227,8 @@ def test_no_more_are_attached_than_the_provider_allows(provider: Provider) -> No
     host = provider.flying(grants=GRANT)
     first, _ = attached(provider, host), attached(provider, host)
     with pytest.raises(RefusedError, match="the most that may be"):
-        provider.desk.submit(CITY, watching(host.id))
-    provider.desk.cancel(CITY, first.id)
+        provider.missions.submit(CITY, watching(host.id))
+    provider.missions.cancel(CITY, first.id)
     provider.started[-2].end(Outcome(landed=True, began=0.0, ended=1.0, reason="cancelled by x"))
     provider.turns()
     assert provider.phase(first) is MissionPhase.CANCELLED
@@ -239,4 +239,4 @@ def test_a_mission_without_navigation_is_attached_or_refused(provider: Provider)
     """By a sentence; it would fly nothing."""
     wanted = watching("x").model_copy(update={"attach": None})
     with pytest.raises(RefusedError, match="it flies no drone, and is attached to no mission"):
-        provider.desk.submit(PILOT, wanted)
+        provider.missions.submit(PILOT, wanted)

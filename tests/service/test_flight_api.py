@@ -31,7 +31,7 @@ from aerodaas.protocol.schemas import CommandIn, PictureForm
 from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
-from aerodaas.service.flights.order import Attached, FlightOrder
+from aerodaas.service.flights.orders import FlightOrder, HostFlight
 from aerodaas.service.flights.server import LeasedFlight, LeaseWatch, ProcessServer
 from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
 from aerodaas.service.http.limits import LEASED_FLIGHT
@@ -122,7 +122,7 @@ class Flight:
 
     def camera(self, mission: str, stream: str = "one/cam") -> SharedCamera:
         """The camera of an attached mission, from its environment."""
-        to = Attached(mission="m", socket=self.folder.socket, sensors=[stream])
+        to = HostFlight(mission="m", socket=self.folder.socket, sensors=[stream])
         config = attached_config(EnvironmentConfig.model_validate(FLEET), to, mission)
         (sensor,) = config.all_sensors()
         return SharedCamera(sensor, config)
@@ -319,7 +319,7 @@ def test_nothing_is_shared_once_the_drones_come_home(flight: Flight) -> None:
 
 def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
     """No address, driver or setting of a vehicle; no camera that is not shared."""
-    to = Attached(mission="m", socket=Path("api"), sensors=["one/cam"])
+    to = HostFlight(mission="m", socket=Path("api"), sensors=["one/cam"])
     config = attached_config(EnvironmentConfig.model_validate(FLEET), to, "crowd")
     assert [robot.id for robot in config.robots] == ["one"]
     assert [one.full_id for one in config.all_sensors()] == ["one/cam"]

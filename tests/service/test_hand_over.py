@@ -8,19 +8,19 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from desks import PILOT, Link, Monitor, Provider
+from offered import PILOT, Link, Monitor, Provider
 
 from aerodaas.errors import MissionError
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.mission import ActiveMission
-from aerodaas.service.models import ModelShelf
-from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.mission_service import MissionService
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
+from aerodaas.service.monitor.reports import VehicleReport
 
 OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(Scope), "t")
 
@@ -30,7 +30,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     """A provider whose monitor is the test's."""
     made = Provider(tmp_path, monkeypatch)
     yield made
-    made.desk.close()
+    made.missions.close()
     made.store.close()
 
 
@@ -39,7 +39,7 @@ def test_a_flight_begins_once_the_monitor_has_let_go(provider: Provider) -> None
     mission = provider.submit()
     provider.turns()
     assert provider.monitor.wanted == {"one", "two"}
-    assert "the service connects to it" in provider.desk.shown(mission.id).reason
+    assert "the service connects to it" in provider.missions.shown(mission.id).reason
     provider.monitor.see("one")
     provider.turns()
     assert provider.monitor.wanted == {"two"}
@@ -51,7 +51,7 @@ def test_a_flight_begins_once_the_monitor_has_let_go(provider: Provider) -> None
     assert len(provider.started) == 1
     provider.turns()
     assert provider.monitor.wanted == {"two"}
-    assert provider.garage.news("one").link is LinkState.MISSION
+    assert provider.registry.news("one").link is LinkState.MISSION
     provider.land()
     provider.turns()
     assert provider.phase(mission) is MissionPhase.LANDED
@@ -67,7 +67,7 @@ def test_one_that_somebody_arms_meanwhile_is_not_handed_over(provider: Provider)
     provider.monitor.see("one", mode="manual", objections=("already manual",))
     provider.turns()
     assert provider.monitor.wanted == {"one", "two"}
-    assert provider.desk.shown(mission.id).reason == "waits for one: already manual"
+    assert provider.missions.shown(mission.id).reason == "waits for one: already manual"
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_what_cannot_fly_is_neither_leased_nor_submitted_to(
     """With the reason, which the catalogue has, too; another one can be had."""
     provider.monitor.see("one", **news)
     provider.monitor.see("two")
-    for ask in (provider.submit, lambda: provider.bookings.request(PILOT, wish("one"))):
+    for ask in (provider.submit, lambda: provider.leases.request(PILOT, wish("one"))):
         with pytest.raises(RefusedError, match=r"^one: ") as refused:
             ask()
         assert refused.value.status == 409
@@ -96,7 +96,7 @@ def test_what_cannot_fly_is_neither_leased_nor_submitted_to(
     one, two = provider.fleet.seen_by(PILOT).robots
     assert said in one.objection
     assert (two.objection, two.link, two.battery) == ("", LinkState.CONNECTED, 0.9)
-    any_one = provider.bookings.request(PILOT, wish())
+    any_one = provider.leases.request(PILOT, wish())
     assert any_one.robots == ("two",)
 
 
@@ -110,7 +110,7 @@ def test_a_dropout_of_a_moment_refuses_nobody(provider: Provider) -> None:
     provider.monitor.see("one", link=LinkState.LOST, since=time.time())
     mission = provider.submit()
     provider.turns()
-    assert "the service connects to it" in provider.desk.shown(mission.id).reason
+    assert "the service connects to it" in provider.missions.shown(mission.id).reason
     assert provider.monitor.wanted == {"one", "two"}
 
 
@@ -123,11 +123,11 @@ def test_one_that_is_not_known_to_be_down_is_nobodys(provider: Provider) -> None
     provider.turns()
     provider.land(state="aborted", mode="manual")
     provider.turns()
-    assert "not known to be down" in provider.desk.shown(mission.id).reason
+    assert "not known to be down" in provider.missions.shown(mission.id).reason
     assert provider.monitor.wanted == {"two"}
     with pytest.raises(RefusedError, match="out of service until an operator has looked"):
         provider.submit()
-    provider.garage.enable("one", enabled=True)
+    provider.registry.enable("one", enabled=True)
     provider.turns()
     assert provider.monitor.wanted == {"one", "two"}
 
@@ -143,14 +143,14 @@ def test_drones_in_flight_are_left_alone_after_a_restart(
     provider.turns()
     assert len(provider.started) == 1
     seen: list[set[str]] = []
-    monitor = Monitor(provider.garage)
+    monitor = Monitor(provider.registry)
     monkeypatch.setattr(monitor, "watch", lambda robots: seen.append(set(robots)))
-    again = MissionDesk(
+    again = MissionService(
         provider.settings,
         provider.store,
-        bookings=provider.bookings,
-        garage=provider.garage,
-        models=ModelShelf(provider.settings.models),
+        leases=provider.leases,
+        registry=provider.registry,
+        models=ModelStore(provider.settings.models),
         monitor=cast("FleetMonitor", monitor),
     )
     again.turn()
@@ -160,12 +160,12 @@ def test_drones_in_flight_are_left_alone_after_a_restart(
 
 def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
     """The monitor tells of all drones, those that it does not hold included."""
-    provider.garage.hand(["one"], LinkState.MISSION)
-    provider.garage.observe({"one": VehicleNews(), "two": VehicleNews()})
-    assert provider.garage.news("one").link is LinkState.MISSION
-    provider.garage.observe({})
-    assert provider.garage.news("one").link is LinkState.MISSION
-    assert provider.garage.news("two").reason == "the service looks for it again"
+    provider.registry.hand(["one"], LinkState.MISSION)
+    provider.registry.observe({"one": VehicleReport(), "two": VehicleReport()})
+    assert provider.registry.news("one").link is LinkState.MISSION
+    provider.registry.observe({})
+    assert provider.registry.news("one").link is LinkState.MISSION
+    assert provider.registry.news("two").reason == "the service looks for it again"
 
 
 class Launching(Link):
@@ -185,8 +185,8 @@ def launching(provider: Provider) -> tuple[Launching, str]:
     mission = provider.flying()
     link = Launching()
     link.number = 0
-    provider.desk._missions[mission.id].link = cast("Any", link)
-    lease = provider.desk.shown(mission.id).lease
+    provider.missions._missions[mission.id].link = cast("Any", link)
+    lease = provider.missions.shown(mission.id).lease
     assert lease is not None
     return link, lease
 
@@ -196,7 +196,7 @@ def test_a_lease_revoked_during_the_launch_brings_the_drone_home(
 ) -> None:
     """The flight is told once it listens, and once only; while it hangs nobody waits for it."""
     link, lease = launching
-    provider.bookings.end(OPERATOR, lease)
+    provider.leases.end(OPERATOR, lease)
     told = FlightLeaseIn(reason="the lease has ended: revoked by olga")
     provider.turns()
     assert link.asked == [told]
@@ -210,7 +210,7 @@ def test_a_lease_extended_during_the_launch_ends_later(
 ) -> None:
     """As its user was told."""
     link, lease = launching
-    ends = provider.bookings.extend(PILOT, lease, 5.0).ends
+    ends = provider.leases.extend(PILOT, lease, 5.0).ends
     link.number = 1
     provider.turns()
     assert link.asked == [FlightLeaseIn(ends=ends)] * 2
@@ -221,10 +221,10 @@ def test_what_became_of_a_lease_is_told_by_the_next_service(
 ) -> None:
     """Where the one before ended in between."""
     _, lease = launching
-    provider.bookings.end(OPERATOR, lease)
-    (mission,) = provider.desk._missions.values()
+    provider.leases.end(OPERATOR, lease)
+    (mission,) = provider.missions._missions.values()
     again = ActiveMission(mission.row, Path(mission.row.folder), provider.store.missions.put)
     link = again.link = cast("Any", Link())
-    provider.desk._missions[mission.row.id] = again
+    provider.missions._missions[mission.row.id] = again
     provider.turns()
     assert link.asked == [FlightLeaseIn(reason="the lease has ended: revoked by olga")]

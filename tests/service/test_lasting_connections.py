@@ -28,17 +28,17 @@ from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, S
 from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
 from aerodaas.service.http import bodies
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.http.server import web_server
 from aerodaas.service.live import controls as hand
 from aerodaas.service.live import session
-from aerodaas.service.models import ModelShelf
+from aerodaas.service.mission_service import MissionService
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.provider import build_service
 from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings
@@ -77,7 +77,7 @@ class Service:
         self.file = folder / "service.db"
         self.store = Store.open(self.file)
         self.accounts = Accounts(self.store)
-        self.desks: list[MissionDesk] = []
+        self.services: list[MissionService] = []
         self.port = 0
         self.relay: HereRelay | None = None
         self.token("root", role=Role.ADMIN)
@@ -118,13 +118,13 @@ class Service:
         pilot = Principal("asha", "farm", Role.PILOT, frozenset(Scope), "t")
         sensors = ["one/odometry", "one/cam"]
         flight = document("one", (5, 0), sensors=sensors, analyses=[SEEN], **changes)
-        (desk,) = self.desks
-        return desk.submit(pilot, MissionIn.model_validate({"document": flight})).id
+        (missions,) = self.services
+        return missions.submit(pilot, MissionIn.model_validate({"document": flight})).id
 
     def fly(self, mission: str) -> ServedFlight:
-        """The flight's own end, once the desk has begun it."""
-        (desk,) = self.desks
-        until(lambda: desk.shown(mission).phase is MissionPhase.FLYING)
+        """The flight's own end, once the service has begun it."""
+        (missions,) = self.services
+        until(lambda: missions.shown(mission).phase is MissionPhase.FLYING)
         folder = FlightFolder(self.settings.missions / mission / "f")
         watch = LeaseWatch(FlightOrder.read(folder.order), lambda _: None)
         flight = ServedFlight(folder, Drones(self.settings.config), watch)
@@ -147,21 +147,21 @@ def service(monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
         monkeypatch.setattr(module, "_RENEWAL_SECONDS", 0.1)
     monkeypatch.setattr(here, "_AGAIN_SECONDS", 0.05)
     monkeypatch.setattr(missions, "start_process", lambda *_, **__: Process())
-    start = MissionDesk.start
+    start = MissionService.start
     with tempfile.TemporaryDirectory(prefix="lasting-", dir="/tmp") as folder:
         made = Service(Path(folder))
 
-        def started(desk: MissionDesk) -> None:
-            made.desks.append(desk)
-            start(desk)
+        def started(service: MissionService) -> None:
+            made.services.append(service)
+            start(service)
 
-        monkeypatch.setattr(MissionDesk, "start", started)
+        monkeypatch.setattr(MissionService, "start", started)
         server = web_server(build_service(made.settings, made.store), PROVIDER)
         with listen("127.0.0.1", 0) as listener:
             made.port = listener.getsockname()[1]
             thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
             thread.start()
-            until(lambda: made.desks)
+            until(lambda: made.services)
             yield made
             server.should_exit = True
             thread.join(ENOUGH)
@@ -213,7 +213,7 @@ def test_a_user_who_leaves_before_the_flight_is_waited_for_no_longer(
     service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each that was would hold one of the service's places until the mission is over."""
-    monkeypatch.setattr(MissionDesk, "flight", lambda *_: None)
+    monkeypatch.setattr(MissionService, "flight", lambda *_: None)
     left: list[bool] = []
     answer = here._User.answer
 
@@ -295,12 +295,12 @@ def test_an_operators_hand_is_a_pilots_once_the_role_is_gone(
     """Another tenant's drone is not steered any more."""
     asked: list[tuple[Role, str]] = []
 
-    def fly(_: MissionDesk, who: Any, mission: str, what: ControlsIn) -> Answer:  # noqa: ANN401
+    def fly(_: MissionService, who: Any, mission: str, what: ControlsIn) -> Answer:  # noqa: ANN401
         del mission
         asked.append((who.role, "steers" if what.steer else "takes or leaves"))
         return Answer(accepted=True)
 
-    monkeypatch.setattr(MissionDesk, "fly", fly)
+    monkeypatch.setattr(MissionService, "fly", fly)
     monkeypatch.setattr(hand, "_SILENT_SECONDS", ENOUGH)
     mission = service.submit()
     flight = service.fly(mission)
@@ -346,7 +346,7 @@ def test_a_model_that_is_kept_holds_up_nobody(
         begun.set()
         assert free.wait(ENOUGH)
 
-    monkeypatch.setattr(ModelShelf, "put", put)
+    monkeypatch.setattr(ModelStore, "put", put)
     token = service.token("ivan")
     with ThreadPoolExecutor(1) as pool:
         kept = pool.submit(service.status, "PUT", f"models/{'0' * 64}", token, "model")
@@ -492,10 +492,10 @@ def test_a_command_waits_for_nothing_that_the_desk_does(service: Service) -> Non
     """It may read a large document, or write to a slow disk."""
     mission = service.submit()
     flight = service.fly(mission)
-    (desk,) = service.desks
-    until(lambda: desk._missions[mission].link is not None)
+    (missions,) = service.services
+    until(lambda: missions._missions[mission].link is not None)
     words = "POST", f"missions/{mission}/commands", service.token("ivan")
-    with ThreadPoolExecutor(1) as pool, desk._lock:
+    with ThreadPoolExecutor(1) as pool, missions._lock:
         command = {"robot": "one", "command": "return-home"}
         assert pool.submit(service.status, *words, command).result(ENOUGH) == 200
     flight.close()

@@ -19,7 +19,7 @@ from aerodaas.messages.vehicle import PositionSetpoint, VelocitySetpoint
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.service.flights.environment import limited
-from aerodaas.service.flights.order import TenantLimits
+from aerodaas.service.flights.orders import TenantLimits
 
 SQUARE = [(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)]
 NOTHING = TenantLimits()
@@ -197,7 +197,7 @@ def test_a_drone_never_leaves_any_of_them(
     wishes: list[tuple[float, float, float]],
     **case: Any,  # noqa: ANN401
 ) -> None:
-    """Flown by whatever velocities for seconds each, the drone stays inside all three."""
+    """FlightRun by whatever velocities for seconds each, the drone stays inside all three."""
     provider, flight = narrowed(**case)
     tenant = case["tenant"]
     guard, outer = SetpointFilter(flight, np.array([0.0, 0.0, 0.0])), Geofence(provider.geofence)

@@ -13,8 +13,8 @@ from synthetic_models import constant_model
 
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.errors import ConfigError
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.model_trial import try_model
-from aerodaas.service.models import ModelShelf
 
 
 def greedy_model(path: Path, *axes: int, from_input: bool = False) -> Path:
@@ -76,7 +76,7 @@ def test_a_model_that_is_refused_is_not_kept(tmp_path: Path) -> None:
     def refuse(_: Path) -> None:
         raise ConfigError("too much")
 
-    shelf, name = ModelShelf(tmp_path, refuse), hashlib.sha256(b"model").hexdigest()
+    shelf, name = ModelStore(tmp_path, refuse), hashlib.sha256(b"model").hexdigest()
     with pytest.raises(ConfigError, match="too much"):
         shelf.put("farm", name, b"model")
     assert not shelf.has("farm", name)

@@ -9,28 +9,28 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from desks import Provider
+from offered import Provider
 from served import document
 
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.service import models
+from aerodaas.service import model_store as models
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.models import ModelShelf
+from aerodaas.service.model_store import ModelStore
 
 DAY = 86400.0
 
 
 @pytest.fixture
-def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModelShelf:
+def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModelStore:
     """One with room for 100 bytes of each tenant."""
     monkeypatch.setattr(models, "_LARGEST_SHELF", 100)
-    return ModelShelf(tmp_path / "models")
+    return ModelStore(tmp_path / "models")
 
 
-def bring(shelf: ModelShelf, tenant: str, letter: str, size: int = 40) -> str:
+def bring(shelf: ModelStore, tenant: str, letter: str, size: int = 40) -> str:
     """Bring a model of `size` bytes; returns its name."""
     content = letter.encode() * size
     name = hashlib.sha256(content).hexdigest()
@@ -54,7 +54,7 @@ def naming(name: str) -> MissionDocument:
     )
 
 
-def test_a_tenant_sees_its_own_models_and_those_that_ship(shelf: ModelShelf) -> None:
+def test_a_tenant_sees_its_own_models_and_those_that_ship(shelf: ModelStore) -> None:
     """What others work with is theirs."""
     name = bring(shelf, "farm", "a")
     assert shelf.has("farm", name)
@@ -62,7 +62,7 @@ def test_a_tenant_sees_its_own_models_and_those_that_ship(shelf: ModelShelf) -> 
     assert shelf.has("city", hashlib.sha256(DETECTOR.read_bytes()).hexdigest())
 
 
-def test_the_longest_unused_goes_for_a_new_one(shelf: ModelShelf, tmp_path: Path) -> None:
+def test_the_longest_unused_goes_for_a_new_one(shelf: ModelStore, tmp_path: Path) -> None:
     """Once it was unused for a day: of its own tenant, and no more of them than must."""
     first, second = bring(shelf, "farm", "a"), bring(shelf, "farm", "b")
     other = bring(shelf, "city", "c", 100)
@@ -74,7 +74,7 @@ def test_the_longest_unused_goes_for_a_new_one(shelf: ModelShelf, tmp_path: Path
     assert kept == [False, True, True]
 
 
-def test_what_was_used_within_a_day_stays(shelf: ModelShelf, tmp_path: Path) -> None:
+def test_what_was_used_within_a_day_stays(shelf: ModelStore, tmp_path: Path) -> None:
     """A mission that waits for its drones may name it; the new one is refused, with the reason."""
     first, second = bring(shelf, "farm", "a"), bring(shelf, "farm", "b")
     for name in (first, second):
@@ -88,14 +88,14 @@ def test_what_was_used_within_a_day_stays(shelf: ModelShelf, tmp_path: Path) -> 
     bring(shelf, "farm", "d", 20)
 
 
-def test_what_is_here_needs_no_room_to_be_sent_again(shelf: ModelShelf) -> None:
+def test_what_is_here_needs_no_room_to_be_sent_again(shelf: ModelStore) -> None:
     """As by two applications at once, of which neither had found it."""
     first = bring(shelf, "farm", "a", 60)
     assert bring(shelf, "farm", "a", 60) == first
     assert shelf.has("farm", first)
 
 
-def test_to_ask_for_a_model_is_to_use_it(shelf: ModelShelf, tmp_path: Path) -> None:
+def test_to_ask_for_a_model_is_to_use_it(shelf: ModelStore, tmp_path: Path) -> None:
     """An application asks before it sends one."""
     first, second = bring(shelf, "farm", "a"), bring(shelf, "farm", "b")
     for name in (first, second):
@@ -105,7 +105,7 @@ def test_to_ask_for_a_model_is_to_use_it(shelf: ModelShelf, tmp_path: Path) -> N
     assert (shelf.has("farm", first), shelf.has("farm", second)) == (True, False)
 
 
-def test_a_model_that_is_lent_outlives_the_shelf(shelf: ModelShelf, tmp_path: Path) -> None:
+def test_a_model_that_is_lent_outlives_the_shelf(shelf: ModelStore, tmp_path: Path) -> None:
     """A flight has a link of its own, and another tenant none."""
     name = bring(shelf, "farm", "a")
     flight = tmp_path / "flight"
@@ -126,7 +126,7 @@ def test_a_mission_that_is_over_holds_no_models(
     provider = Provider(tmp_path, monkeypatch)
     content = b"network"
     name = hashlib.sha256(content).hexdigest()
-    ModelShelf(provider.settings.models).put("farm", name, content)
+    ModelStore(provider.settings.models).put("farm", name, content)
     mission = provider.flying(document=naming(name).model_dump(exclude_none=True))
     lent = provider.started[-1].models / f"{name}.onnx"
     assert lent.read_bytes() == content
@@ -134,12 +134,12 @@ def test_a_mission_that_is_over_holds_no_models(
     provider.turns()
     assert provider.phase(mission) is MissionPhase.LANDED
     assert not lent.exists()
-    provider.desk.close()
+    provider.missions.close()
     provider.store.close()
 
 
 @pytest.mark.parametrize("name", ["", "a" * 63, "../" + "a" * 61, "A" * 64])
-def test_a_model_is_called_by_its_hash(shelf: ModelShelf, name: str) -> None:
+def test_a_model_is_called_by_its_hash(shelf: ModelStore, name: str) -> None:
     """And by nothing that is a path."""
     with pytest.raises(ConfigError, match="SHA-256"):
         shelf.has("farm", name)

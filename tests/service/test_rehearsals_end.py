@@ -12,7 +12,7 @@ import pytest
 from served import Served, document, fleet, robot
 
 from aerodaas.service.flights.folder import FlightFolder, start_process
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 
 pytestmark = pytest.mark.slow
 

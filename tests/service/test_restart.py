@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 from served import document, fleet, robot
-from test_desk import PILOT, Desk
+from test_desk import PILOT, MissionsAlone
 
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.store import Account, Mission, Tenant
 
 pytestmark = pytest.mark.wall_clock
@@ -32,7 +32,7 @@ import sys
 from pathlib import Path
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.folder import RobotLocks
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 with RobotLocks(Path(sys.argv[1])).hold(["one"]):
     print("held", flush=True)
     sys.stdin.read()
@@ -53,28 +53,28 @@ def held(locks: Path) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def crowded(desk: Desk, phase: MissionPhase, **changes: object) -> None:
+def crowded(served: MissionsAlone, phase: MissionPhase, **changes: object) -> None:
     """Add thousands of newer missions of another tenant for drone `two`."""
-    desk.store.tenants.put(Tenant("crowd"))
-    desk.store.accounts.put(Account("crowd", "crowd", Role.PILOT, frozenset(Scope), 0.0))
+    served.store.tenants.put(Tenant("crowd"))
+    served.store.accounts.put(Account("crowd", "crowd", Role.PILOT, frozenset(Scope), 0.0))
     request = {"minutes": 1.0, "silence": "continue", "silence_seconds": 30.0, "seed": None}
     row = Mission("", "visits", "crowd", "crowd", phase, ("two",), 4e9, "", request=request)
     row = replace(row, **changes)  # type: ignore[arg-type]
     rows = [replace(row, id=f"c{n}", submitted=4e9 + n, folder=f"/c{n}") for n in range(ROWS)]
-    desk.store.missions.put(*rows)
+    served.store.missions.put(*rows)
 
 
-def reach(desk: Desk, phase: MissionPhase) -> MissionOut:
+def reach(served: MissionsAlone, phase: MissionPhase) -> MissionOut:
     """A mission for drone `one` in a phase."""
-    blocked = desk.settings
+    blocked = served.settings
     if phase is MissionPhase.QUEUED:
-        desk.settings = replace(blocked, most_flights=0)
-        desk.open()
-    mission = desk.submit("one")
+        served.settings = replace(blocked, most_flights=0)
+        served.open()
+    mission = served.submit("one")
     if phase is not MissionPhase.SUBMITTED:
-        desk.turns()
-    desk.settings = blocked
-    assert desk.phase(mission) is phase
+        served.turns()
+    served.settings = blocked
+    assert served.phase(mission) is phase
     return mission
 
 
@@ -88,80 +88,80 @@ def test_a_restart_forgets_no_mission(
 ) -> None:
     """However many newer ones of others there are, over or not; it is found, and goes on."""
     rehearse = phase in {MissionPhase.SUBMITTED, MissionPhase.REHEARSING}
-    desk = Desk(
+    served = MissionsAlone(
         tmp_path,
         monkeypatch,
         rehearse=rehearse,
         approval=phase is MissionPhase.AWAITING_APPROVAL,
     )
-    with closing(desk):
-        mission = reach(desk, phase)
-        crowded(desk, of_crowd)
+    with closing(served):
+        mission = reach(served, phase)
+        crowded(served, of_crowd)
         # The processes of the service before go on, or have ended with it.
-        desk.started.clear()
-        desk.open()
-        assert [one.id for one in desk.desk.missions(PILOT)] == [mission.id]
-        desk.turns()
-        assert desk.phase(mission) is {
+        served.started.clear()
+        served.open()
+        assert [one.id for one in served.missions.missions(PILOT)] == [mission.id]
+        served.turns()
+        assert served.phase(mission) is {
             MissionPhase.SUBMITTED: MissionPhase.REHEARSING,
             MissionPhase.QUEUED: MissionPhase.FLYING,
         }.get(phase, phase)
         if phase is MissionPhase.FLYING:
-            lease = desk.bookings.request(CROWD, LeaseIn(robots=["one"]))
-            desk.turns()
-            assert desk.bookings.lease(lease.id).state is LeaseState.QUEUED
-            assert len({path.parent.name for path in desk.started}) == 1, "its own flight's alone"
+            lease = served.leases.request(CROWD, LeaseIn(robots=["one"]))
+            served.turns()
+            assert served.leases.lease(lease.id).state is LeaseState.QUEUED
+            assert len({path.parent.name for path in served.started}) == 1, "its own flight's alone"
 
 
 def test_missions_wait_in_the_order_of_their_submission(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also after a restart: the first of those that share a lease flies first."""
-    desk = Desk(tmp_path, monkeypatch, rehearse=False, most_flights=0)
-    with closing(desk):
-        lease = desk.bookings.request(PILOT, LeaseIn(robots=["one"]))
-        first, second = (desk.submit("one", lease=lease.id) for _ in range(2))
-        desk.turns()
-        desk.settings = replace(desk.settings, most_flights=16)
-        desk.open()
-        desk.turns()
-        assert desk.phase(first) is MissionPhase.FLYING
-        assert desk.phase(second) is MissionPhase.QUEUED
+    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False, most_flights=0)
+    with closing(served):
+        lease = served.leases.request(PILOT, LeaseIn(robots=["one"]))
+        first, second = (served.submit("one", lease=lease.id) for _ in range(2))
+        served.turns()
+        served.settings = replace(served.settings, most_flights=16)
+        served.open()
+        served.turns()
+        assert served.phase(first) is MissionPhase.FLYING
+        assert served.phase(second) is MissionPhase.QUEUED
 
 
 def test_no_flight_begins_on_a_drone_that_a_living_process_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of which the database says nothing: no lease is granted, until that process is gone."""
-    desk = Desk(tmp_path, monkeypatch, rehearse=False)
-    with closing(desk), held(desk.settings.locks) as flight:
-        mission, other = desk.submit("one"), desk.submit("two")
-        desk.turns()
-        assert desk.phase(mission) is MissionPhase.QUEUED
-        lease = desk.desk.shown(mission.id).lease
+    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
+    with closing(served), held(served.settings.locks) as flight:
+        mission, other = served.submit("one"), served.submit("two")
+        served.turns()
+        assert served.phase(mission) is MissionPhase.QUEUED
+        lease = served.missions.shown(mission.id).lease
         assert lease is not None
-        assert desk.bookings.lease(lease).state is LeaseState.QUEUED
-        assert desk.phase(other) is MissionPhase.FLYING
+        assert served.leases.lease(lease).state is LeaseState.QUEUED
+        assert served.phase(other) is MissionPhase.FLYING
         flight.kill()
         flight.wait()
-        desk.turns()
-        assert desk.phase(mission) is MissionPhase.FLYING
+        served.turns()
+        assert served.phase(mission) is MissionPhase.FLYING
 
 
 def test_a_lease_that_is_held_already_starts_no_second_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It waits, and says for what."""
-    desk = Desk(tmp_path, monkeypatch, rehearse=False)
-    with closing(desk):
-        lease = desk.bookings.request(PILOT, LeaseIn(robots=["one"]))
-        with held(desk.settings.locks):
-            mission = desk.submit("one", lease=lease.id)
-            desk.turns()
-            assert desk.phase(mission) is MissionPhase.QUEUED
-            assert "one" in desk.desk.shown(mission.id).reason
-        desk.turns()
-        assert desk.phase(mission) is MissionPhase.FLYING
+    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
+    with closing(served):
+        lease = served.leases.request(PILOT, LeaseIn(robots=["one"]))
+        with held(served.settings.locks):
+            mission = served.submit("one", lease=lease.id)
+            served.turns()
+            assert served.phase(mission) is MissionPhase.QUEUED
+            assert "one" in served.missions.shown(mission.id).reason
+        served.turns()
+        assert served.phase(mission) is MissionPhase.FLYING
 
 
 def test_a_drone_is_held_by_one_process(tmp_path: Path) -> None:
@@ -181,17 +181,17 @@ def test_a_tenant_has_so_many_missions_that_are_not_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One more is refused until one is over; others' are not counted, and a repetition is none."""
-    desk = Desk(tmp_path, monkeypatch, rehearse=False, most_open=2, approval=True)
-    with closing(desk):
-        first, _ = desk.submit("one", "k1"), desk.submit("one", "k2")
+    served = MissionsAlone(tmp_path, monkeypatch, rehearse=False, most_open=2, approval=True)
+    with closing(served):
+        first, _ = served.submit("one", "k1"), served.submit("one", "k2")
         with pytest.raises(RefusedError, match="cancel some") as refused:
-            desk.submit("one")
+            served.submit("one")
         assert refused.value.status == 429
-        assert desk.submit("one", "k1").id == first.id
-        assert len(list(desk.settings.missions.iterdir())) == 2
-        desk.desk.cancel(PILOT, first.id)
-        desk.turns()
-        assert desk.submit("two").phase is MissionPhase.SUBMITTED
+        assert served.submit("one", "k1").id == first.id
+        assert len(list(served.settings.missions.iterdir())) == 2
+        served.missions.cancel(PILOT, first.id)
+        served.turns()
+        assert served.submit("two").phase is MissionPhase.SUBMITTED
 
 
 def ordered(folder: Path) -> FlightFolder:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from desks import PILOT, Provider
+from offered import PILOT, Provider
 from served import document
 
 from aerodaas.cli.serve import _actuators
@@ -16,7 +16,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.environment import environment_of
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 
 CARRIED: dict[str, Any] = {
     "actuators": [
@@ -29,11 +29,11 @@ CARRIED: dict[str, Any] = {
 
 @pytest.fixture
 def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provider]:
-    """A desk whose tenant `farm` may move the hook of one drone."""
+    """A served whose tenant `farm` may move the hook of one drone."""
     may = {"farm": frozenset({"one/hook"}), "other": frozenset({"one/pump"})}
     made = Provider(tmp_path, monkeypatch, drone=CARRIED, actuators=may)
     yield made
-    made.desk.close()
+    made.missions.close()
     made.store.close()
 
 
@@ -57,17 +57,17 @@ def test_what_the_tenant_may_not_move_is_refused(
 ) -> None:
     """By name, when it is submitted."""
     with pytest.raises(RefusedError, match=f"farm may not move {refused}: "):
-        one.desk.submit(PILOT, moving(robot, **moves))
+        one.missions.submit(PILOT, moving(robot, **moves))
 
 
 def test_what_it_may_move_is_in_its_flight_alone(one: Provider) -> None:
     """Waypoints that come in flight, and commands, meet the same environment."""
     one.monitor.see("one")
-    mission = one.desk.submit(PILOT, moving("one", hook="release"))
+    mission = one.missions.submit(PILOT, moving("one", hook="release"))
     one.turns(2)
     one.monitor.held.clear()
     one.turns()
-    assert one.started, one.desk.shown(mission.id).reason
+    assert one.started, one.missions.shown(mission.id).reason
     config = environment_of(FlightOrder.read(one.started[-1].order))
     assert [actuator.id for actuator in config.robots[0].actuators] == ["hook"]
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from desks import PILOT, Provider
+from offered import PILOT, Provider
 from served import Served, document, fleet, robot
 
 from aerodaas.environment.provider.logins import client_for
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn, MissionPhase, TenantChange
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.mission import ActiveMission, LostFlightError
 from aerodaas.service.store import Tenant, Usage
 
@@ -58,7 +58,7 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.monitor.see("one")
     made.store.usage.put(Usage(mission.id, "farm", "pilot", time.time(), cloud_calls=3))
     yield made
-    made.desk.close()
+    made.missions.close()
     made.store.close()
 
 
@@ -84,10 +84,10 @@ def test_only_what_may_call_the_cloud_needs_calls(
     flight = document("one", (5, 0), sensors=["one/cam"], analyses=[found], **more)
     wanted = MissionIn.model_validate({"document": flight})
     if fits:
-        provider.desk.submit(PILOT, wanted)
+        provider.missions.submit(PILOT, wanted)
     else:
         with pytest.raises(RefusedError, match="cloud calls of farm are used up"):
-            provider.desk.submit(PILOT, wanted)
+            provider.missions.submit(PILOT, wanted)
 
 
 def test_the_recording_of_a_lost_flight_can_be_deleted(
@@ -104,10 +104,10 @@ def test_the_recording_of_a_lost_flight_can_be_deleted(
     monkeypatch.setattr(ActiveMission, "flown", lost)
     provider.turns()
     assert provider.phase(mission) is MissionPhase.FAILED
-    assert provider.desk.shown(mission.id).recording
-    provider.desk.delete_recording(PILOT, mission.id)
-    assert not provider.desk.shown(mission.id).recording
-    provider.desk.close()
+    assert provider.missions.shown(mission.id).recording
+    provider.missions.delete_recording(PILOT, mission.id)
+    assert not provider.missions.shown(mission.id).recording
+    provider.missions.close()
     provider.store.close()
 
 
@@ -121,5 +121,5 @@ def test_a_flight_has_the_weight_of_its_tenant(
     edge = FlightOrder.read(provider.started[-1].order).edge
     assert edge is not None
     assert (edge.tenant, edge.weight) == ("farm", 3.0)
-    provider.desk.close()
+    provider.missions.close()
     provider.store.close()

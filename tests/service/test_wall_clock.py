@@ -8,17 +8,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from desks import PILOT, Provider
+from offered import PILOT, Provider
 
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.protocol.schemas import AccountIn, LeaseIn, LeaseState, LinkState, TokenIn
 from aerodaas.service.access.accounts import Access, Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
+from aerodaas.service.lease_service import LeaseService
 from aerodaas.service.store import Store
 
 HOUR = 3600.0
@@ -48,13 +48,13 @@ def provider(
     del wall
     made = Provider(tmp_path, monkeypatch)
     yield made
-    made.desk.close()
+    made.missions.close()
     made.store.close()
 
 
-def minutes_left(bookings: Bookings, lease: str) -> float:
+def minutes_left(leases: LeaseService, lease: str) -> float:
     """Until the end of a lease by the wall clock, as whoever reads it counts."""
-    ends = bookings.lease(lease).ends
+    ends = leases.lease(lease).ends
     return -math.inf if ends is None else (ends - time.time()) / 60.0
 
 
@@ -63,14 +63,14 @@ def test_a_granted_lease_keeps_its_minutes(
     provider: Provider, wall: WallClock, step: float
 ) -> None:
     """Also in the database, and the next one in the queue waits as long."""
-    held = provider.bookings.request(PILOT, LeaseIn(robots=["one"], minutes=20))
-    waits = provider.bookings.request(PILOT, LeaseIn(robots=["one"], minutes=20))
+    held = provider.leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
+    waits = provider.leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
     wall.ahead += step
-    provider.bookings.tick()
-    assert provider.bookings.lease(held.id).state is LeaseState.GRANTED
-    assert provider.bookings.lease(waits.id).state is LeaseState.QUEUED
-    assert minutes_left(provider.bookings, held.id) == pytest.approx(20.0, abs=0.1)
-    assert provider.store.leases.demand(held.id).ends == provider.bookings.lease(held.id).ends
+    provider.leases.tick()
+    assert provider.leases.lease(held.id).state is LeaseState.GRANTED
+    assert provider.leases.lease(waits.id).state is LeaseState.QUEUED
+    assert minutes_left(provider.leases, held.id) == pytest.approx(20.0, abs=0.1)
+    assert provider.store.leases.demand(held.id).ends == provider.leases.lease(held.id).ends
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -79,7 +79,7 @@ def test_a_flight_in_its_second_minute_is_not_recalled(
 ) -> None:
     """It is told the new moment of its end alone."""
     mission = provider.flying()
-    asked = provider.desk._missions[mission.id].follow().asked  # type: ignore[attr-defined]
+    asked = provider.missions._missions[mission.id].follow().asked  # type: ignore[attr-defined]
     asked.clear()
     wall.ahead += step
     provider.turns()
@@ -92,12 +92,12 @@ def test_a_service_that_starts_again_knows_of_the_step(
     tmp_path: Path, provider: Provider, wall: WallClock, step: float
 ) -> None:
     """While none ran, the clock was set."""
-    parts = provider.settings.config, provider.store, provider.garage, Quotas(provider.store)
+    parts = provider.settings.config, provider.store, provider.registry, Quotas(provider.store)
     clock = tmp_path / "clock"
-    lease = Bookings(*parts, clock).request(PILOT, LeaseIn(robots=["one"], minutes=20))
+    lease = LeaseService(*parts, clock).request(PILOT, LeaseIn(robots=["one"], minutes=20))
     wall.ahead += step
     for _ in range(2):
-        again = Bookings(*parts, clock)
+        again = LeaseService(*parts, clock)
         again.tick()
         assert again.lease(lease.id).state is LeaseState.GRANTED
         assert minutes_left(again, lease.id) == pytest.approx(20.0, abs=0.1)
@@ -105,15 +105,15 @@ def test_a_service_that_starts_again_knows_of_the_step(
 
 def test_an_offset_of_another_boot_moves_nothing(tmp_path: Path, provider: Provider) -> None:
     """`time.monotonic` begins anew with the machine; the file may be anything, too."""
-    parts = provider.settings.config, provider.store, provider.garage, Quotas(provider.store)
+    parts = provider.settings.config, provider.store, provider.registry, Quotas(provider.store)
     clock = tmp_path / "clock"
     for content in ('{"boot": "another", "seconds": 7.0}', "{", ""):
         clock.write_text(content)
-        bookings = Bookings(*parts, clock)
-        lease = bookings.request(PILOT, LeaseIn(robots=["one"], minutes=20))
-        bookings.tick()
-        assert minutes_left(bookings, lease.id) == pytest.approx(20.0, abs=0.1)
-        bookings.end(PILOT, lease.id)
+        leases = LeaseService(*parts, clock)
+        lease = leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
+        leases.tick()
+        assert minutes_left(leases, lease.id) == pytest.approx(20.0, abs=0.1)
+        leases.end(PILOT, lease.id)
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -122,7 +122,7 @@ def test_a_flight_that_starts_meanwhile_has_its_whole_lease(
 ) -> None:
     """Its order was written by the clock of before; one that is over is over, too."""
     mission = provider.flying()
-    order = FlightOrder.read(provider.desk._missions[mission.id].flight.order)
+    order = FlightOrder.read(provider.missions._missions[mission.id].flight.order)
     wall.ahead += step
     recalled: list[str] = []
     for ends, over in ((order.ends, False), (order.ends - 16 * 60, True)):
@@ -138,8 +138,8 @@ def test_a_lost_drone_is_neither_leased_nor_forgotten(
     provider.monitor.see("one", link=LinkState.LOST, since=time.time() - 60)
     provider.monitor.see("two", link=LinkState.LOST, since=time.time())
     wall.ahead += step
-    assert "not reachable" in provider.garage.objection("one")
-    assert provider.garage.objection("two") == ""
+    assert "not reachable" in provider.registry.objection("one")
+    assert provider.registry.objection("two") == ""
 
 
 def test_a_list_before_take_off_is_as_old_as_it_is(provider: Provider, wall: WallClock) -> None:
@@ -147,7 +147,7 @@ def test_a_list_before_take_off_is_as_old_as_it_is(provider: Provider, wall: Wal
     items = (HealthItem("wind", "2.0 m/s", "at most 10", Verdict.GOOD),)
     provider.monitor.see("one", health=items, examined=time.time() - 2)
     wall.ahead += HOUR
-    assert provider.garage.preflight("one").age == pytest.approx(2.0, abs=1.0)
+    assert provider.registry.preflight("one").age == pytest.approx(2.0, abs=1.0)
 
 
 def test_tokens_of_a_service_that_began_in_1970_are_good_once_the_clock_is_set(

@@ -25,7 +25,7 @@ from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.redaction import calibration
 from aerodaas.errors import ConfigError
 from aerodaas.mission.safety.geofence import Geofence
-from aerodaas.service.flights.order import FlightOrder, TenantLimits
+from aerodaas.service.flights.orders import FlightOrder, TenantLimits
 from aerodaas.service.flights.shared_camera import attached_config
 from aerodaas.simulation.airframe import GRAVITY, Airframe
 from aerodaas.simulation.battery import flight_power

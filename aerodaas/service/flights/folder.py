@@ -17,7 +17,7 @@ from aerodaas.config.file_lock import actor_lock, exclusive, is_locked
 from aerodaas.config.private_file import write_private
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.errors import MissionError
-from aerodaas.service.flights.order import FlightOrder, Outcome, Progress
+from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
 
 __all__ = [
     "FlightFolder",

@@ -31,7 +31,7 @@ from aerodaas.protocol.schemas import (
     Role,
 )
 from aerodaas.service.backend import PilotCommand
-from aerodaas.service.errors import TroubleLog
+from aerodaas.service.errors import RepeatedErrorLog
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.own.access import OWN
 
@@ -236,7 +236,7 @@ class FlightLink:
             raise MissionError(f"the flight's stream has ended: {error}") from None
 
     def _follow(self) -> None:
-        trouble = TroubleLog(_log)
+        trouble = RepeatedErrorLog(_log)
         while not self._closed.is_set():
             try:
                 self._follow_once()

@@ -15,11 +15,11 @@ from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import Role, SilencePolicy
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.backend import PilotCommand
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.http.limits import LEASED_FLIGHT
 from aerodaas.service.http.server import AppServer
 from aerodaas.service.own.access import FlightTokens, principal_of
-from aerodaas.service.own.flight import Flown, OwnFlight
+from aerodaas.service.own.flight import FlightRun, OwnFlight
 from aerodaas.unix_server import listen_unix
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ class LeasedFlight(OwnFlight):
     It is looked at whoever watches, for its status is the service's and its outcome's.
     """
 
-    def __init__(self, run: Flown, name: str, lease: LeaseWatch) -> None:
+    def __init__(self, run: FlightRun, name: str, lease: LeaseWatch) -> None:
         """Show `run`, a mission called `name`, under a lease."""
         self._lease = lease
         super().__init__(run, name)

@@ -23,7 +23,7 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.schema import MessageError
 from aerodaas.protocol.schemas import RefusalOut, Role
 from aerodaas.service.flights.link import flight_address
-from aerodaas.service.flights.order import Attached
+from aerodaas.service.flights.orders import HostFlight
 
 __all__ = ["SharedCamera", "SharedCameraSettings", "attached_config"]
 
@@ -121,7 +121,7 @@ class SharedCamera:
 
 
 def attached_config(
-    config: EnvironmentConfig, attached: Attached, mission: str
+    config: EnvironmentConfig, attached: HostFlight, mission: str
 ) -> EnvironmentConfig:
     """The environment of a mission that senses only: the shared cameras, and nothing that flies.
 

@@ -22,12 +22,12 @@ __all__ = [
     "LiveSession",
     "Rate",
     "StreamNames",
-    "Wanted",
+    "StreamRequest",
     "until_refused",
     "wanted_streams",
 ]
 
-Wanted: TypeAlias = tuple[str, PictureForm]
+StreamRequest: TypeAlias = tuple[str, PictureForm]
 """A stream, and how its pictures are sent."""
 
 Rate: TypeAlias = Annotated[float, Query(gt=0, le=RequestLimits.view_rate, allow_inf_nan=False)]
@@ -45,7 +45,7 @@ _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
 
 
-def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[Wanted]:
+def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[StreamRequest]:
     """What is asked for by comma-separated lists of names, as much as one view may have.
 
     Args:
@@ -79,7 +79,7 @@ class LiveSession:
     async def run(
         self,
         rate: float,
-        streams: Sequence[Wanted],
+        streams: Sequence[StreamRequest],
         *,
         own: bool,
         allowed: Callable[[], bool] = lambda: True,

@@ -1,7 +1,8 @@
 """`python -m aerodaas.service.monitor FLEET`: watch a fleet's vehicles for the service.
 
-Lines of its standard input say which vehicles to hold (`Wanted`), those of its standard output
-how they are (`MonitorNews`). It ends with its input: when the service ends, however that ends.
+Lines of its standard input say which vehicles to hold (`MonitorRequest`), those of its standard
+output how they are (`MonitorReport`). It ends with its input: when the service ends, however that
+ends.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import TextIO
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located
-from aerodaas.service.monitor.news import MonitorNews, Wanted
+from aerodaas.service.monitor.reports import MonitorReport, MonitorRequest
 from aerodaas.service.monitor.watcher import VehicleWatcher
 
 __all__ = ["main"]
@@ -41,7 +42,7 @@ def main() -> None:
     told = (out, watchers, changed, obeyed)
     threading.Thread(target=_tell, args=told, daemon=True).start()
     for line in sys.stdin.buffer:
-        wanted = Wanted.model_validate_json(line)
+        wanted = MonitorRequest.model_validate_json(line)
         for name, watcher in watchers.items():
             watcher.want(wanted=name in wanted.robots)
         # Last: who reads this number finds each vehicle held, or never to be held again.
@@ -63,7 +64,7 @@ def _tell(
         # The number first, see `main`.
         number = obeyed[0]
         robots = {name: watcher.news for name, watcher in watchers.items()}
-        out.write(f"{MonitorNews(number=number, robots=robots).model_dump_json()}\n")
+        out.write(f"{MonitorReport(number=number, robots=robots).model_dump_json()}\n")
         out.flush()
         time.sleep(_LEAST_SECONDS)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from aerodaas.service.flights.folder import service_free_environment
-from aerodaas.service.monitor.news import MonitorNews, VehicleNews, Wanted
+from aerodaas.service.monitor.reports import MonitorReport, MonitorRequest, VehicleReport
 
 __all__ = ["FleetMonitor"]
 
@@ -34,7 +34,7 @@ class FleetMonitor:
     """
 
     def __init__(
-        self, fleet: Path, log: Path, told: Callable[[Mapping[str, VehicleNews]], None]
+        self, fleet: Path, log: Path, told: Callable[[Mapping[str, VehicleReport]], None]
     ) -> None:
         """Watch the vehicles of the environment file `fleet`; `told` is called with all news."""
         self._command = [sys.executable, "-m", "aerodaas.service.monitor", str(fleet)]
@@ -47,7 +47,7 @@ class FleetMonitor:
         self._wanted: frozenset[str] = frozenset()
         self._let_go_at: dict[str, float] = {}
         """Since when each vehicle is to be let go of, by `time.monotonic`."""
-        self._news = MonitorNews(number=0)
+        self._news = MonitorReport(number=0)
         self._closed = False
 
     def watch(self, robots: Collection[str]) -> None:
@@ -93,11 +93,11 @@ class FleetMonitor:
         if self._process is None or self._process.poll() is not None:
             return True
         obeyed = self._news.number == self._number
-        return obeyed and not self._news.robots.get(robot, VehicleNews()).held
+        return obeyed and not self._news.robots.get(robot, VehicleReport()).held
 
     def _start(self, now: float) -> None:
         self._started_at = now
-        self._news = MonitorNews(number=-1)
+        self._news = MonitorReport(number=-1)
         with self._log.open("ab") as log:
             process = self._process = subprocess.Popen(  # noqa: S603 - our own module
                 self._command,
@@ -111,7 +111,7 @@ class FleetMonitor:
         threading.Thread(target=self._read, args=(process,), name="monitor", daemon=True).start()
 
     def _send(self) -> None:
-        line = Wanted(number=self._number, robots=self._wanted).model_dump_json()
+        line = MonitorRequest(number=self._number, robots=self._wanted).model_dump_json()
         if self._process is not None and self._process.stdin is not None:
             # One that has died is started anew, and told then.
             with contextlib.suppress(OSError):
@@ -130,7 +130,7 @@ class FleetMonitor:
         with process.stdout as lines:
             for line in lines:
                 try:
-                    news = MonitorNews.model_validate_json(line)
+                    news = MonitorReport.model_validate_json(line)
                 except ValidationError:
                     continue
                 with self._lock:

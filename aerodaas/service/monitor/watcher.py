@@ -13,7 +13,7 @@ from aerodaas.errors import AeroDaaSError, failure_line
 from aerodaas.messages.vehicle import Vehicle, VehicleMode, VehicleState
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.protocol.schemas import LinkState
-from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.monitor.reports import VehicleReport
 
 __all__ = ["VehicleWatcher"]
 
@@ -46,7 +46,7 @@ class VehicleWatcher:
         self._changed = changed
         self._lock = threading.Condition()
         self._wanted = False
-        self._news = VehicleNews()
+        self._news = VehicleReport()
         self._read_at = -math.inf
         """Monotonic seconds of the newest reading."""
 
@@ -61,7 +61,7 @@ class VehicleWatcher:
             self._lock.notify_all()
 
     @property
-    def news(self) -> VehicleNews:
+    def news(self) -> VehicleReport:
         """The vehicle as it was last seen; lost, if its driver has hung since."""
         with self._lock:
             news, silence = self._news, time.monotonic() - self._read_at
@@ -88,7 +88,7 @@ class VehicleWatcher:
         """Connect, and watch until it is wanted no more or lost; returns whether it was reached."""
         reached, reason = False, ""
         if self._news.link is LinkState.UNWATCHED:
-            fresh = VehicleNews(held=True, link=LinkState.CONNECTING, since=time.time())
+            fresh = VehicleReport(held=True, link=LinkState.CONNECTING, since=time.time())
             self._tell(**dict(fresh))
         try:
             vehicle = load_vehicle(self._robot, self._environment, observing=True)

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from aerodaas.runtime.reports import ActorReport, FlightState
     from aerodaas.terrain.ground import Ground
 
-__all__ = ["FlightMeter", "Flown", "OwnFlight"]
+__all__ = ["FlightMeter", "FlightRun", "OwnFlight"]
 
 _Place: TypeAlias = tuple[float, float, float]
 _ALERTS = 50
@@ -151,7 +151,7 @@ _NAMED = 8
 """Most waypoints that an alert names."""
 
 
-class Flown(Protocol):
+class FlightRun(Protocol):
     """The flight, called from several threads."""
 
     @property
@@ -190,7 +190,7 @@ class Flown(Protocol):
 class OwnFlight:
     """The flight as `Missions` and as `Fleet`; safe in any thread."""
 
-    def __init__(self, run: Flown, name: str) -> None:
+    def __init__(self, run: FlightRun, name: str) -> None:
         """Show `run`, an application called `name`."""
         self._run = run
         self._name = name

@@ -1,1 +1,1 @@
-"""HTTP and WebSocket routes, a module a subject: between JSON and the desk, no more."""
+"""HTTP and WebSocket routes, a module a subject: between JSON and the services behind them."""

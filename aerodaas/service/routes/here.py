@@ -12,13 +12,13 @@ from websockets.exceptions import WebSocketException
 from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import flight_address
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
 from aerodaas.service.live.jobs import end_jobs
 from aerodaas.service.live.session import until_refused
+from aerodaas.service.mission_service import MissionService
 
 __all__ = ["HereRoutes"]
 
@@ -32,9 +32,9 @@ class HereRoutes:
     is a text alone. The connection may be made before the flight begins, and ends with it.
     """
 
-    def __init__(self, desk: MissionDesk, admission: Admission) -> None:
-        """Connect users with the desk's flights."""
-        self._desk = desk
+    def __init__(self, missions: MissionService, admission: Admission) -> None:
+        """Connect users with the flights of `missions`."""
+        self._missions = missions
         self._admission = admission
 
     def router(self) -> APIRouter:
@@ -47,7 +47,7 @@ class HereRoutes:
         """Carry questions and answers until the mission is over, or the user leaves or must go."""
 
         def look(principal: Principal) -> None:
-            self._desk.require_users_side(principal, mission)
+            self._missions.require_users_side(principal, mission)
 
         def allowed() -> bool:
             return self._admission.stays(socket, Role.PILOT, Scope.COMPUTE, look)
@@ -75,8 +75,8 @@ class HereRoutes:
 
     async def _carry(self, user: _User, mission: str) -> None:
         """Connect the user with the mission's flight, again if need be, until it is over."""
-        while not self._desk.shown(mission).phase.over:
-            folder = self._desk.flight(mission)
+        while not self._missions.shown(mission).phase.over:
+            folder = self._missions.flight(mission)
             if folder is not None:
                 # The flight may not have begun to listen, or have ended.
                 with contextlib.suppress(OSError, EOFError, WebSocketException):

@@ -9,10 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseOut, Role, Scope
 from aerodaas.service.access.audit import Audit
-from aerodaas.service.bookings import Bookings
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.lease_book import lease_out
+from aerodaas.service.lease_service import LeaseService
 
 __all__ = ["LeaseRoutes"]
 
@@ -30,9 +30,9 @@ class ExtensionIn(BaseModel):
 class LeaseRoutes:
     """Routes below `/v1/leases`."""
 
-    def __init__(self, bookings: Bookings, admission: Admission, audit: Audit) -> None:
-        """Answer from the bookings."""
-        self._bookings = bookings
+    def __init__(self, leases: LeaseService, admission: Admission, audit: Audit) -> None:
+        """Answer from the leases."""
+        self._leases = leases
         self._admission = admission
         self._audit = audit
 
@@ -50,25 +50,25 @@ class LeaseRoutes:
         """Ask for drones: granted at once, or queued."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):
-            lease = self._bookings.request(principal, wish)
+            lease = self._leases.request(principal, wish)
         self._audit.write(principal, "lease.request", lease.id, lease.state.value, accepted=True)
         return lease_out(lease)
 
     def leases(self, request: Request) -> list[LeaseOut]:
         """Leases that go on, in the queue's order."""
         principal = self._admission.require(request, Role.VIEWER)
-        return [lease_out(one) for one in self._bookings.all_seen(principal)]
+        return [lease_out(one) for one in self._leases.all_seen(principal)]
 
     def lease(self, lease: str, request: Request) -> LeaseOut:
         """One lease."""
         principal = self._admission.require(request, Role.VIEWER)
-        return lease_out(self._bookings.seen(principal, lease))
+        return lease_out(self._leases.seen(principal, lease))
 
     def extend(self, lease: str, body: ExtensionIn, request: Request) -> LeaseOut:
         """Let a granted lease end later, if nobody waits for its drones."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):
-            found = self._bookings.extend(principal, lease, body.minutes)
+            found = self._leases.extend(principal, lease, body.minutes)
         self._audit.write(principal, "lease.extend", lease, f"{body.minutes:g} min", accepted=True)
         return lease_out(found)
 
@@ -76,7 +76,7 @@ class LeaseRoutes:
         """Give a lease back; an operator revokes anybody's. Its drones come home."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):
-            found = self._bookings.end(principal, lease)
+            found = self._leases.end(principal, lease)
         text = found.reason
         self._audit.write(principal, "lease.end", lease, text, accepted=True, required=False)
         return lease_out(found)

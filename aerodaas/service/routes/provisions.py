@@ -11,11 +11,11 @@ from pydantic import BaseModel, ConfigDict
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.garage import Garage
+from aerodaas.service.fleet_registry import FleetRegistry
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import RequestLimits
-from aerodaas.service.models import ModelShelf
+from aerodaas.service.model_store import ModelStore
 
 __all__ = ["ProvisionRoutes"]
 
@@ -32,10 +32,10 @@ class ProvisionRoutes:
     """Routes `/v1/robots/{id}` and `/v1/models`."""
 
     def __init__(
-        self, garage: Garage, models: ModelShelf, admission: Admission, audit: Audit
+        self, registry: FleetRegistry, models: ModelStore, admission: Admission, audit: Audit
     ) -> None:
         """Change these."""
-        self._garage = garage
+        self._registry = registry
         self._models = models
         self._admission = admission
         self._audit = audit
@@ -52,7 +52,7 @@ class ProvisionRoutes:
     def enable(self, robot: str, body: RobotIn, request: Request) -> Response:
         """Put a drone into service, or take it out."""
         principal = self._admission.require(request, Role.OPERATOR)
-        self._garage.enable(robot, enabled=body.enabled)
+        self._registry.enable(robot, enabled=body.enabled)
         self._audit.write(principal, "robot.enable", robot, str(body.enabled), accepted=True)
         return Response(status_code=204)
 

@@ -9,10 +9,10 @@ from fastapi.responses import FileResponse
 
 from aerodaas.protocol.schemas import GrantIn, MissionIn, MissionOut, Role, Scope, Word
 from aerodaas.service.access.audit import Audit
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.idempotency import read_key
+from aerodaas.service.mission_service import MissionService
 
 __all__ = ["SubmissionRoutes"]
 
@@ -20,9 +20,9 @@ __all__ = ["SubmissionRoutes"]
 class SubmissionRoutes:
     """Routes below `/v1/missions` for what a provider alone does with missions."""
 
-    def __init__(self, desk: MissionDesk, admission: Admission, audit: Audit) -> None:
-        """Answer from the desk."""
-        self._desk = desk
+    def __init__(self, missions: MissionService, admission: Admission, audit: Audit) -> None:
+        """Answer from `missions`."""
+        self._missions = missions
         self._admission = admission
         self._audit = audit
 
@@ -57,7 +57,7 @@ class SubmissionRoutes:
         scope = Scope.FLY if wanted.attach is None else Scope.SENSE
         principal = self._admission.require(request, Role.PILOT, scope)
         with self._admission.auditing(principal, request):
-            found = self._desk.submit(principal, wanted, read_key(idempotency_key))
+            found = self._missions.submit(principal, wanted, read_key(idempotency_key))
         self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
         return found
 
@@ -65,7 +65,7 @@ class SubmissionRoutes:
         """Cancel a mission; drones in flight come home."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         with self._admission.auditing(principal, request):
-            found = self._desk.cancel(principal, mission)
+            found = self._missions.cancel(principal, mission)
         self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
         return found
 
@@ -73,7 +73,7 @@ class SubmissionRoutes:
         """Approve a mission that waits for an operator."""
         principal = self._admission.require(request, Role.OPERATOR)
         with self._admission.auditing(principal, request):
-            found = self._desk.approve(principal, mission)
+            found = self._missions.approve(principal, mission)
         self._audit.write(principal, "mission.approve", mission, accepted=True)
         return found
 
@@ -81,7 +81,7 @@ class SubmissionRoutes:
         """Let a tenant attach missions to this one's cameras, and no others than these."""
         principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
         with self._admission.auditing(principal, request):
-            found = self._desk.grant(principal, mission, tenant, body.sensors)
+            found = self._missions.grant(principal, mission, tenant, body.sensors)
         said = f"to {tenant}: {', '.join(body.sensors) or 'all cameras'}"
         self._audit.write(principal, "mission.grant", mission, said, accepted=True)
         return found
@@ -90,7 +90,7 @@ class SubmissionRoutes:
         """Withdraw what a tenant was granted; what it has attached gets no further picture."""
         principal = self._admission.require(request, Role.PILOT)
         with self._admission.auditing(principal, request):
-            found = self._desk.grant(principal, mission, tenant, None)
+            found = self._missions.grant(principal, mission, tenant, None)
         said = f"from {tenant}"
         self._audit.write(
             principal, "mission.withdraw", mission, said, accepted=True, required=False
@@ -100,17 +100,19 @@ class SubmissionRoutes:
     def recording(self, mission: str, request: Request) -> FileResponse:
         """The flight's recording, an MCAP file, once it is over."""
         principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
-        path = self._desk.file(principal, mission, "recording")
+        path = self._missions.file(principal, mission, "recording")
         return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
 
     def delete_recording(self, mission: str, request: Request) -> None:
         """Remove the recording of a mission that is over."""
         principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
         with self._admission.auditing(principal, request):
-            self._desk.delete_recording(principal, mission)
+            self._missions.delete_recording(principal, mission)
         self._audit.write(principal, "recording.delete", mission, accepted=True)
 
     def picture(self, mission: str, request: Request) -> FileResponse:
         """Picture of the rehearsed flight."""
         principal = self._admission.require(request, Role.VIEWER)
-        return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
+        return FileResponse(
+            self._missions.file(principal, mission, "picture"), media_type="image/png"
+        )

@@ -13,7 +13,7 @@ import pytest
 
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.orders import FlightOrder, Outcome
 
 HOLD = """
 import sys, time

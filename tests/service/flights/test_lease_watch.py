@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from aerodaas.protocol.schemas import SilencePolicy
-from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
 
 pytestmark = pytest.mark.wall_clock

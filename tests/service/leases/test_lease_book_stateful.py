@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role, Scope
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.lease_book import Candidate, LeaseBook, Shelf
+from aerodaas.service.lease_book import Candidate, LeaseBook, LeaseTable
 from aerodaas.service.store import Account, Lease, Store, Tenant
 
 ROBOTS = ("a", "b", "c", "d")
@@ -76,7 +76,7 @@ class Leases(RuleBasedStateMachine):
         self.shelf = self.make_shelf()
         self.book = LeaseBook(self.shelf, lambda: next(self.ids))
 
-    def make_shelf(self) -> Shelf:
+    def make_shelf(self) -> LeaseTable:
         """Where the leases are kept."""
         return MemoryShelf()
 
@@ -273,7 +273,7 @@ class Leases(RuleBasedStateMachine):
 class KeptLeases(Leases):
     """The same, kept in a database."""
 
-    def make_shelf(self) -> Shelf:
+    def make_shelf(self) -> LeaseTable:
         """In a file."""
         self.folder = tempfile.TemporaryDirectory(prefix="aerodaas-")
         self.store = Store.open(Path(self.folder.name) / "service.db")

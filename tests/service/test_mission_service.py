@@ -1,4 +1,4 @@
-"""The desk: one mission's failure is its own, and limits of time and room are kept."""
+"""The service: one mission's failure is its own, and limits of time and room are kept."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from aerodaas.protocol.schemas import (
     VerdictOut,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service import models
+from aerodaas.service import model_store as models
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.fleet_registry import FleetRegistry
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import Outcome, Progress
-from aerodaas.service.garage import Garage
-from aerodaas.service.models import ModelShelf
+from aerodaas.service.flights.orders import Outcome, Progress
+from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.mission_service import MissionService
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 
@@ -54,8 +54,8 @@ class Process:
         return self.ended
 
 
-class Desk:
-    """A desk over a fleet of two, whose processes never run."""
+class MissionsAlone:
+    """A service over a fleet of two, whose processes never run."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
         path = folder / "fleet.json"
@@ -79,56 +79,56 @@ class Desk:
         return self.processes[-1]
 
     def open(self) -> None:
-        """Open the desk, as a service does when it starts."""
-        quotas, garage = Quotas(self.store), Garage(self.settings.config, self.store)
-        self.bookings = Bookings(self.settings.config, self.store, garage, quotas)
-        self.desk = MissionDesk(
+        """Open the service, as a service does when it starts."""
+        quotas, registry = Quotas(self.store), FleetRegistry(self.settings.config, self.store)
+        self.leases = LeaseService(self.settings.config, self.store, registry, quotas)
+        self.missions = MissionService(
             self.settings,
             self.store,
-            bookings=self.bookings,
-            garage=garage,
-            models=ModelShelf(self.settings.models),
+            leases=self.leases,
+            registry=registry,
+            models=ModelStore(self.settings.models),
         )
 
     def close(self) -> None:
         """Leave flights to themselves: the stand-in of a rehearsal has no id to be killed by."""
         if not self.settings.rehearse:
-            self.desk.close()
+            self.missions.close()
         self.store.close()
 
     def submit(self, robot: str, key: str | None = None, **more: object) -> MissionOut:
         """Submit a mission for one drone."""
         content = {"document": document(robot, (5, 0)), **more}
-        return self.desk.submit(PILOT, MissionIn.model_validate(content), key)
+        return self.missions.submit(PILOT, MissionIn.model_validate(content), key)
 
     def phase(self, mission: MissionOut) -> MissionPhase:
         """Present phase of a mission."""
-        return self.desk.shown(mission.id).phase
+        return self.missions.shown(mission.id).phase
 
     def turns(self, count: int = 4) -> None:
-        """Let the desk move on."""
+        """Let the service move on."""
         for _ in range(count):
-            self.desk.turn()
+            self.missions.turn()
 
 
 @pytest.fixture
-def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
-    """A desk that rehearses nothing."""
-    made = Desk(tmp_path, monkeypatch, rehearse=False)
+def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MissionsAlone]:
+    """A service that rehearses nothing."""
+    made = MissionsAlone(tmp_path, monkeypatch, rehearse=False)
     yield made
     made.close()
 
 
-def test_what_one_mission_meets_is_its_own(one: Desk) -> None:
+def test_what_one_mission_meets_is_its_own(one: MissionsAlone) -> None:
     """A lease that cannot be had refuses that mission, with the reason; the next one flies."""
     stuck = one.submit("one")
     one.turns(1)
     one.store.robots.put(one.store.robots.get("one") or _out("one"))
-    one.desk._garage.take_out(["one"])
+    one.missions._registry.take_out(["one"])
     good = one.submit("two")
     one.turns()
     assert one.phase(stuck) is MissionPhase.REFUSED
-    assert "out of service" in one.desk.shown(stuck.id).reason
+    assert "out of service" in one.missions.shown(stuck.id).reason
     assert one.phase(good) is MissionPhase.FLYING
 
 
@@ -140,7 +140,7 @@ def _out(name: str) -> Any:  # noqa: ANN401 - a row
 
 def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that does not end is refused, and not waited for."""
-    made = Desk(tmp_path, monkeypatch, rehearse=True, rehearsal_seconds=60.0)
+    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, rehearsal_seconds=60.0)
     ended: list[bool] = []
     monkeypatch.setattr(
         missions.ActiveMission, "end_rehearsal", lambda _: ended.append(True), raising=True
@@ -150,13 +150,13 @@ def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert made.phase(slow) is MissionPhase.REHEARSING
     FlightFolder(made.started[-1]).advance(Progress(flown=12.4, processor=7.0))
     made.turns(1)
-    assert "12 s flown" in made.desk.shown(slow.id).reason
+    assert "12 s flown" in made.missions.shown(slow.id).reason
     began = time.monotonic()
     with monkeypatch.context() as later:
         later.setattr("aerodaas.service.mission.time.monotonic", lambda: began + 241.0)
         made.turns(1)
     assert made.phase(slow) is MissionPhase.REFUSED
-    reason = made.desk.shown(slow.id).reason
+    reason = made.missions.shown(slow.id).reason
     assert "the provider is busy: of 240 s, its rehearsal had 7 s of a processor" in reason
     assert ended
     made.store.close()
@@ -164,19 +164,19 @@ def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_rehearsals_take_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As many at once as the provider has cores; nobody waits for all that others have sent."""
-    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
+    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=1, most_flights=0)
     made.store.tenants.add(Tenant("city"))
     made.store.accounts.add(Account("warden", "city", Role.PILOT, frozenset(Scope), 0.0))
     farm = [made.submit("one") for _ in range(3)]
     made.turns(1)
-    city = made.desk.submit(
+    city = made.missions.submit(
         replace(PILOT, account="warden", tenant="city"),
         MissionIn.model_validate({"document": document("two", (5, 0))}),
     )
     made.turns()
     assert [made.phase(one).value for one in farm] == ["rehearsing", "submitted", "submitted"]
     assert made.phase(city) is MissionPhase.SUBMITTED
-    assert "number 1 " in made.desk.shown(city.id).reason
+    assert "number 1 " in made.missions.shown(city.id).reason
     approved = Outcome(landed=True, began=0.0, ended=1.0, verdict=VerdictOut(approved=True))
     for count, begun in enumerate((city, farm[1], farm[2]), 1):
         FlightFolder(made.started[-1]).end(approved)
@@ -191,7 +191,7 @@ def test_rehearsals_of_a_former_service_take_turns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """However many it had under way."""
-    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=3)
+    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=3)
     for _ in range(3):
         made.submit("one")
     made.turns()
@@ -203,7 +203,7 @@ def test_rehearsals_of_a_former_service_take_turns(
     made.close()
 
 
-def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_takes_no_missions(one: MissionsAlone, monkeypatch: pytest.MonkeyPatch) -> None:
     """The flying ones need the room that is left."""
     monkeypatch.setattr(models, "_LEAST_FREE", 1 << 60)
     with pytest.raises(RefusedError, match="make room") as refused:
@@ -211,7 +211,7 @@ def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatc
     assert refused.value.status == 507
 
 
-def test_one_key_is_one_mission_however_many_send_it_at_once(one: Desk) -> None:
+def test_one_key_is_one_mission_however_many_send_it_at_once(one: MissionsAlone) -> None:
     """Also while none of them is kept yet; what the others wrote is gone."""
     with ThreadPoolExecutor(8) as pool:
         ids = {found.id for found in pool.map(lambda _: one.submit("one", "k"), range(8))}
@@ -220,29 +220,29 @@ def test_one_key_is_one_mission_however_many_send_it_at_once(one: Desk) -> None:
     assert {path.name for path in one.settings.missions.iterdir()} == ids
 
 
-def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: Desk) -> None:
+def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: MissionsAlone) -> None:
     """The answer to a repeated submission does not depend on what happened since."""
     first = one.submit("one", "k")
-    one.desk._garage.take_out(["one"])
+    one.missions._registry.take_out(["one"])
     assert one.submit("one", "k").id == first.id
     with pytest.raises(RefusedError, match="out of service"):
         one.submit("one", "other")
 
 
-def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: Desk) -> None:
+def test_missions_that_wait_together_fly_no_longer_than_the_quota(one: MissionsAlone) -> None:
     """Each alone was within it when it was submitted, and no lease counted yet."""
     one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
     first, second = one.submit("one"), one.submit("two")
     one.turns()
     assert one.phase(first) is MissionPhase.FLYING
     assert one.phase(second) is MissionPhase.REFUSED
-    assert "leaves 5.0 flight minutes" in one.desk.shown(second.id).reason
+    assert "leaves 5.0 flight minutes" in one.missions.shown(second.id).reason
 
 
-def test_a_lease_counts_once_for_the_quota(one: Desk) -> None:
+def test_a_lease_counts_once_for_the_quota(one: MissionsAlone) -> None:
     """Its mission needs no further minutes."""
     one.store.tenants.put(Tenant("farm", flight_minutes=20.0))
-    lease = one.bookings.request(PILOT, LeaseIn(robots=["one"], minutes=15.0))
+    lease = one.leases.request(PILOT, LeaseIn(robots=["one"], minutes=15.0))
     mission = one.submit("one", lease=lease.id)
     one.turns()
     assert one.phase(mission) is MissionPhase.FLYING
@@ -279,7 +279,7 @@ def test_what_no_file_can_hold_is_refused_before_one_is_made(
         MissionIn.model_validate({"document": document("one", (5, 0), **changes)})
 
 
-def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
+def test_a_mission_is_taken_up_again_by_the_next_service(one: MissionsAlone) -> None:
     """A flight that was ordered and has not begun is begun; one that has begun is not."""
     first, second = one.submit("one"), one.submit("two")
     one.turns()
@@ -288,7 +288,7 @@ def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
     (flights[second.id] / "begun").touch()
     one.started.clear()
     # A service that ends leaves its flights alone: the stand-in has no process id to be killed by.
-    one.desk.close()
+    one.missions.close()
     one.open()
     one.turns(1)
     assert one.started == [flights[first.id]]
@@ -298,27 +298,29 @@ def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By the next one; one that has a result is judged by that, and not flown twice."""
-    made = Desk(tmp_path, monkeypatch, rehearse=True, most_rehearsals=2)
+    made = MissionsAlone(tmp_path, monkeypatch, rehearse=True, most_rehearsals=2)
     lost, judged = made.submit("one"), made.submit("two")
     made.turns(1)
     assert len(made.started) == 2
     outcome = Outcome(
         landed=True, reason="", began=0.0, ended=1.0, verdict=VerdictOut(approved=True)
     )
-    made.desk._missions[judged.id].rehearsal.end(outcome)
+    made.missions._missions[judged.id].rehearsal.end(outcome)
     made.started.clear()
     made.open()
     made.turns(3)
     assert made.started == [
-        made.desk._missions[lost.id].rehearsal.path,
-        made.desk._missions[judged.id].flight.path,
+        made.missions._missions[lost.id].rehearsal.path,
+        made.missions._missions[judged.id].flight.path,
     ]
     assert made.phase(lost) is MissionPhase.REHEARSING
     made.store.close()
 
 
-def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the desk goes on when it is back."""
+def test_leases_end_while_the_database_is_gone(
+    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the service goes on when it is back."""
     mission = one.submit("one")
     one.turns()
     assert one.phase(mission) is MissionPhase.FLYING
@@ -329,8 +331,8 @@ def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.Mo
 
     with monkeypatch.context() as broken:
         broken.setattr(one.store.missions, "put", gone)
-        broken.setattr(one.bookings, "tick", lambda: ticks.append(True))
-        queued = one.desk._missions[mission.id]
+        broken.setattr(one.leases, "tick", lambda: ticks.append(True))
+        queued = one.missions._missions[mission.id]
         broken.setattr(queued, "flown", gone)
         with pytest.raises(StoreError):
             one.turns(1)
@@ -340,7 +342,7 @@ def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.Mo
 
 
 def test_what_fails_each_turn_is_logged_once(
-    one: Desk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """And again once it is something else; its end, too. A fault of ours has its traceback."""
     failures = iter([StoreError("no room"), StoreError("no room"), StoreError("gone")])
@@ -349,28 +351,28 @@ def test_what_fails_each_turn_is_logged_once(
         raise next(failures, KeyError("ours"))
 
     with monkeypatch.context() as broken:
-        broken.setattr(one.bookings, "tick", failing)
+        broken.setattr(one.leases, "tick", failing)
         for _ in range(5):
-            one.desk._try()
+            one.missions._try()
     for _ in range(2):
-        one.desk._try()
+        one.missions._try()
     said = [(line.getMessage(), bool(line.exc_info)) for line in caplog.records]
     assert said == [
-        ("the desk: no room", False),
-        ("the desk: gone", False),
-        ("the desk: 'ours'", True),
-        ("the desk: goes on", False),
+        ("missions: no room", False),
+        ("missions: gone", False),
+        ("missions: 'ours'", True),
+        ("missions: goes on", False),
     ]
 
 
 def test_so_is_a_flight_that_cannot_be_heard(
-    one: Desk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """It flies on by itself."""
     mission = one.submit("one")
     one.turns()
     with monkeypatch.context() as broken:
-        broken.setattr(one.desk._missions[mission.id], "flown", _unreadable)
+        broken.setattr(one.missions._missions[mission.id], "flown", _unreadable)
         one.turns(3)
     one.turns(2)
     assert one.phase(mission) is MissionPhase.FLYING
@@ -382,7 +384,7 @@ def _unreadable(*_: object) -> None:
     raise OSError("unreadable")
 
 
-def test_a_flight_is_followed_once(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_is_followed_once(one: MissionsAlone, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many ask for it first: each link more would look for its flight for ever."""
     made: list[object] = []
 
@@ -399,7 +401,7 @@ def test_a_flight_is_followed_once(one: Desk, monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(missions, "FlightLink", Link)
     mission = one.submit("one")
-    active = one.desk._missions[mission.id]
+    active = one.missions._missions[mission.id]
     with ThreadPoolExecutor(8) as pool:
         links = set(pool.map(lambda _: active.follow(), range(8)))
     assert links == set(made)
@@ -410,29 +412,29 @@ def test_trees_stand_where_the_missions_own_seed_has_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On the map of a mission that asked for one; the fleet's seed is for all others."""
-    desk = Desk(tmp_path, monkeypatch)
-    wooded = desk.settings.config.model_copy(
+    served = MissionsAlone(tmp_path, monkeypatch)
+    wooded = served.settings.config.model_copy(
         update={"simulation": SimulationConfig(world="campus")}
     )
-    desk.settings = replace(desk.settings, config=wooded)
-    desk.open()
+    served.settings = replace(served.settings, config=wooded)
+    served.open()
     known = SceneryOut.of(wooded)
-    own, other = desk.submit("one", seed=3), desk.submit("two")
-    assert desk.desk.scenery(PILOT, own.id) == SceneryOut.of(wooded, 3) != known
-    assert desk.desk.scenery(PILOT, other.id) == known
+    own, other = served.submit("one", seed=3), served.submit("two")
+    assert served.missions.scenery(PILOT, own.id) == SceneryOut.of(wooded, 3) != known
+    assert served.missions.scenery(PILOT, other.id) == known
 
 
-def test_a_cancellation_during_launch_is_kept(one: Desk) -> None:
+def test_a_cancellation_during_launch_is_kept(one: MissionsAlone) -> None:
     """The flight's process does not listen yet: it finds it in its folder, whoever serves then."""
     mission = one.submit("one")
     one.turns()
     assert one.phase(mission) is MissionPhase.FLYING
-    answer = one.desk.cancel(PILOT, mission.id)
+    answer = one.missions.cancel(PILOT, mission.id)
     assert (answer.phase, answer.reason) == (MissionPhase.FLYING, "cancelled by pilot")
-    one.desk.close()
+    one.missions.close()
     one.open()
     one.turns(1)
-    assert one.desk.shown(mission.id).reason == "cancelled by pilot"
+    assert one.missions.shown(mission.id).reason == "cancelled by pilot"
     flight = FlightFolder(one.started[-1])
     assert flight.cancelled == "cancelled by pilot"
     aborted = "one: aborted: cancelled by pilot before take-off"
@@ -446,9 +448,9 @@ def test_a_cancellation_during_launch_is_kept(one: Desk) -> None:
 def test_a_mission_is_cancelled_once_in_each_phase(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, phase: MissionPhase
 ) -> None:
-    """The second time it is told as over, before and after the desk has moved on."""
+    """The second time it is told as over, before and after the service has moved on."""
     early = {MissionPhase.SUBMITTED, MissionPhase.REHEARSING}
-    made = Desk(
+    made = MissionsAlone(
         tmp_path,
         monkeypatch,
         rehearse=phase in early,
@@ -459,10 +461,10 @@ def test_a_mission_is_cancelled_once_in_each_phase(
     mission = made.submit("one")
     made.turns(0 if phase is MissionPhase.SUBMITTED else 4)
     assert made.phase(mission) is phase
-    found = made.desk.cancel(PILOT, mission.id)
+    found = made.missions.cancel(PILOT, mission.id)
     assert found.reason == "cancelled by pilot"
     if phase is MissionPhase.FLYING:
-        assert made.desk.cancel(PILOT, mission.id).phase is phase
+        assert made.missions.cancel(PILOT, mission.id).phase is phase
         FlightFolder(made.started[-1]).end(
             Outcome(landed=True, reason=found.reason, began=0.0, ended=1.0)
         )
@@ -471,20 +473,20 @@ def test_a_mission_is_cancelled_once_in_each_phase(
     assert made.phase(mission) is MissionPhase.CANCELLED
     for _ in range(2):
         with pytest.raises(RefusedError, match="over") as refused:
-            made.desk.cancel(PILOT, mission.id)
+            made.missions.cancel(PILOT, mission.id)
         assert refused.value.status == 409
         made.turns(1)
     made.close()
 
 
 def test_a_cancellation_that_is_neither_kept_nor_heard_is_refused(
-    one: Desk, monkeypatch: pytest.MonkeyPatch
+    one: MissionsAlone, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """On a full disk, of a flight that does not listen: nobody may believe that it comes home."""
     mission = one.submit("one")
     one.turns()
     monkeypatch.setattr(FlightFolder, "cancel", _unreadable)
     with pytest.raises(MissionError, match="does not answer"):
-        one.desk.cancel(PILOT, mission.id)
+        one.missions.cancel(PILOT, mission.id)
     one.turns(1)
-    assert one.desk.shown(mission.id).reason == ""
+    assert one.missions.shown(mission.id).reason == ""

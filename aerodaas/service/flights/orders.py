@@ -1,43 +1,186 @@
-"""Briefing: the orders of a mission's rehearsal and flight, and what a document asks for."""
+"""Orders of a flight and their outcome: what the service and the flight's process write down."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.clock import WallOffset
+from aerodaas.config.checked import checked
+from aerodaas.config.json_text import read_json
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
-from aerodaas.protocol.schemas import Role, Scope
-from aerodaas.service.access.principal import Principal, require
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import (
-    Attached,
-    EdgeTurnsOrder,
-    FlightOrder,
-    OtherLease,
-    Outcome,
-    TenantLimits,
+from aerodaas.protocol.schemas import (
+    Area,
+    Positive,
+    Role,
+    Scope,
+    SilencePolicy,
+    StatusOut,
+    VerdictOut,
 )
-from aerodaas.service.garage import Garage
-from aerodaas.service.settings import ServiceSettings
-from aerodaas.service.store import Lease, Mission, Store, Usage
+from aerodaas.service.access.principal import Principal, require
+from aerodaas.service.errors import RefusedError
 
-__all__ = ["Briefing", "robots_of", "usage_of"]
+if TYPE_CHECKING:
+    from aerodaas.service.fleet_registry import FleetRegistry
+    from aerodaas.service.lease_service import LeaseService
+    from aerodaas.service.settings import ServiceSettings
+    from aerodaas.service.store import Lease, Mission, Store
+
+__all__ = [
+    "EdgeTurnsOrder",
+    "FlightOrder",
+    "FlightOrders",
+    "HostFlight",
+    "OtherLease",
+    "Outcome",
+    "Progress",
+    "TenantLimits",
+    "robots_of",
+]
+
+
+@dataclass(frozen=True)
+class TenantLimits:
+    """Limits of a tenant, on top of the provider's; None for no further limit."""
+
+    max_height: Positive | None = None
+    """Metres above home."""
+    max_speed: Positive | None = None
+    """m/s, level and upright."""
+    max_range: Positive | None = None
+    """Metres from the place of take-off."""
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class OtherLease(_Record):
+    """Area of another granted lease, from which the rehearsed flight has to stay away."""
+
+    id: str
+    area: Area
+
+
+class HostFlight(_Record):
+    """The flight by whose cameras a mission senses."""
+
+    mission: str
+    socket: Path
+    """At which its process serves the API."""
+    sensors: list[str]
+    """Cameras that are shared, by full id."""
+
+
+class EdgeTurnsOrder(_Record):
+    """The tenant's share of the edge."""
+
+    turns: Path
+    """Socket of the service that gives turns."""
+    tenant: str
+    weight: float
+
+
+class FlightOrder(_Record):
+    """All that a flight's process needs to know; the document lies beside it."""
+
+    mission: str
+    """Id of the mission."""
+    lease: str
+    fleet: Path
+    """The provider's environment file."""
+    robots: list[str]
+    locks: Path
+    """Folder of the drones' locks, see `RobotLocks`."""
+    ends: float
+    """End of the lease, Unix seconds; after it the drones come home, whatever becomes of the
+    service."""
+    offset: WallOffset | None = None
+    """Of the wall clock by which `ends` is meant; None for the present one."""
+    minutes: float
+    """Length of the lease."""
+    limits: TenantLimits = TenantLimits()
+    area: Area | None = None
+    actuators: list[str] = Field(default_factory=list)
+    """Actuators that the tenant may move, as `robot/actuator`."""
+    silence: SilencePolicy = SilencePolicy.CONTINUE
+    silence_seconds: float = 30.0
+    speed: Literal["max"] | float = 1.0
+    """Mission seconds a wall second; `max`: as fast as the machine goes, in simulated time,
+    where all robots are simulated."""
+    seed: int | None = None
+    address: str | None = None
+    """Ray cluster to join; None for one of its own."""
+    edge: EdgeTurnsOrder | None = None
+    """None where flights use the edge as they like."""
+    attached: HostFlight | None = None
+    """For a mission that senses only, which has no robots."""
+    rehearsal: bool = False
+    """Fly in simulation, and judge the recording."""
+    rehearsal_seconds: float = 300.0
+    """Most seconds of a processor that the rehearsal uses."""
+    rehearsal_bytes: int = 2 << 30
+    """Most memory of the same."""
+    battery: dict[str, float] = Field(default_factory=dict)
+    """Charge by robot, 0 to 1, with which the rehearsal begins."""
+    others: list[OtherLease] = Field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path) -> FlightOrder:
+        """Read an order; raises ConfigError for one that is malformed."""
+        return checked(cls, read_json(path, "the flight's order"), str(path))
+
+
+class Progress(_Record):
+    """How far a rehearsal has come."""
+
+    flown: float = 0.0
+    """Mission seconds."""
+    processor: float = 0.0
+    """Seconds of a processor that it has used."""
+
+
+class Outcome(_Record):
+    """How a flight ended; written last."""
+
+    landed: bool
+    """Whether it ended as planned."""
+    reason: str = ""
+    began: float
+    ended: float
+    """Unix seconds."""
+    status: dict[str, StatusOut] = Field(default_factory=dict)
+    """Last status by robot."""
+    alerts: list[str] = Field(default_factory=list)
+    flight_seconds: float = 0.0
+    """Sum of its robots' time in flight, mission seconds."""
+    distance: float = 0.0
+    battery_used: float = 0.0
+    compute_seconds: dict[str, float] = Field(default_factory=dict)
+    cloud_calls: int = 0
+    verdict: VerdictOut | None = None
+    """Of a rehearsal."""
+
 
 _UNPROCESSABLE = 422
 
 
-class Briefing:
+class FlightOrders:
     """Writes orders by the provider's settings and the tenant's limits."""
 
     def __init__(
-        self, settings: ServiceSettings, store: Store, bookings: Bookings, garage: Garage
+        self, settings: ServiceSettings, store: Store, leases: LeaseService, registry: FleetRegistry
     ) -> None:
         """Brief by these."""
         self._settings = settings
         self._store = store
-        self._bookings = bookings
-        self._garage = garage
+        self._leases = leases
+        self._registry = registry
 
     def check(
         self, principal: Principal, document: MissionDocument, *, attached: bool = False
@@ -102,16 +245,16 @@ class Briefing:
     def rehearsal(self, mission: Mission) -> FlightOrder:
         """The order of a mission's rehearsal, which begins with the drones' present charge."""
         order = self._order(mission, "rehearsal", None)
-        states = self._garage.states
+        states = self._registry.states
         battery = {
             name: charge for name in mission.robots if (charge := states[name].battery) is not None
         }
         others = [
             OtherLease(id=one.id, area=list(one.area))
-            for one in self._bookings.granted()
+            for one in self._leases.granted()
             if one.area is not None and one.id != mission.lease
         ]
-        own = self._bookings.lease(mission.lease) if mission.lease is not None else None
+        own = self._leases.lease(mission.lease) if mission.lease is not None else None
         return order.model_copy(
             update={
                 "rehearsal": True,
@@ -129,7 +272,7 @@ class Briefing:
         """The order of a mission's flight under a granted lease."""
         return self._order(mission, lease.id, lease)
 
-    def attached(self, mission: Mission, to: Attached) -> FlightOrder:
+    def attached(self, mission: Mission, to: HostFlight) -> FlightOrder:
         """The order of a mission that senses by the cameras of another one, in real time."""
         order = self._order(mission, "attached", None)
         return order.model_copy(update={"attached": to, "speed": 1.0, "address": None})
@@ -144,8 +287,8 @@ class Briefing:
             fleet=self._settings.fleet,
             robots=list(mission.robots),
             locks=self._settings.locks,
-            ends=self._bookings.now() + 60.0 * minutes if ends is None else ends,
-            offset=self._bookings.offset,
+            ends=self._leases.now() + 60.0 * minutes if ends is None else ends,
+            offset=self._leases.offset,
             minutes=minutes if granted is None else granted.minutes,
             limits=TenantLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),
             area=None if granted is None or granted.area is None else list(granted.area),
@@ -169,22 +312,6 @@ class Briefing:
 def robots_of(document: MissionDocument) -> list[str]:
     """Robots that a document navigates, in the order in which it names them."""
     return list(dict.fromkeys(one.robot for one in document.navigation))
-
-
-def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
-    """What a mission has used."""
-    return Usage(
-        mission=mission.id,
-        tenant=mission.tenant,
-        account=mission.account,
-        started=outcome.began,
-        flight_seconds=outcome.flight_seconds,
-        distance=outcome.distance,
-        battery_used=outcome.battery_used,
-        compute_seconds=outcome.compute_seconds,
-        cloud_calls=outcome.cloud_calls,
-        recorded_bytes=recording.stat().st_size if recording.is_file() else 0,
-    )
 
 
 def _require_known(kind: str, wanted: list[str], known: set[str]) -> None:

@@ -1,4 +1,4 @@
-"""The garage: what is known of each drone, between its missions as well."""
+"""The registry: what is known of each drone, between its missions as well."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LinkState, StatusOut
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.monitor.reports import VehicleReport
 from aerodaas.service.store import RobotState, Store
 
-__all__ = ["OUT_OF_SERVICE", "Garage"]
+__all__ = ["OUT_OF_SERVICE", "FleetRegistry"]
 
 OUT_OF_SERVICE = "out of service until an operator has looked"
 _WRITE_SECONDS = 5.0
@@ -35,7 +35,7 @@ _DROPOUT_SECONDS = 3.0
 """Seconds for which a link may be lost before its drone counts as out of reach."""
 
 
-class Garage:
+class FleetRegistry:
     """Charge, place and fitness of the fleet's drones; safe in any thread."""
 
     def __init__(self, config: EnvironmentConfig, store: Store) -> None:
@@ -45,7 +45,7 @@ class Garage:
         self._states: dict[str, RobotState] = {}
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
-        self._news = {robot.id: VehicleNews() for robot in config.robots}
+        self._news = {robot.id: VehicleReport() for robot in config.robots}
         self._told: dict[str, tuple[float, float, float]] = {}
         """Mission time of each robot's newest status; when it came, as Unix time and by
         `time.monotonic`."""
@@ -62,7 +62,7 @@ class Garage:
         with self._lock:
             return dict(self._states)
 
-    def news(self, robot: str) -> VehicleNews:
+    def news(self, robot: str) -> VehicleReport:
         """Link, mode and faults of a robot."""
         with self._lock:
             return self._news[robot]
@@ -103,7 +103,7 @@ class Garage:
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.news(name)
             faults = (f"its mission has told nothing since {_moment(told)}",)
-            news = VehicleNews(
+            news = VehicleReport(
                 link=link,
                 since=before.since if before.link is link else told,
                 heard=before.heard if lost else told,
@@ -115,10 +115,10 @@ class Garage:
             least = _WRITE_SECONDS if ended is None else 0.0
             self._take(name, news, heard=news.heard, least=least)
 
-    def observe(self, news: Mapping[str, VehicleNews]) -> None:
+    def observe(self, news: Mapping[str, VehicleReport]) -> None:
         """Take over what the monitor tells of the drones on the ground; without any, it is gone."""
         for name, before in list(self._news.items()):
-            one = news.get(name, VehicleNews(reason="the service looks for it again"))
+            one = news.get(name, VehicleReport(reason="the service looks for it again"))
             if one.link is LinkState.UNWATCHED and before.link is LinkState.MISSION:
                 continue
             if one.heard is None and one.link is LinkState.LOST:
@@ -134,7 +134,7 @@ class Garage:
         """Note that drones are a mission's from now on, or nobody's."""
         with self._lock:
             for name in robots:
-                self._news[name] = VehicleNews(link=link, since=time.time())
+                self._news[name] = VehicleReport(link=link, since=time.time())
                 self._told.pop(name, None)
 
     def objection(self, robot: str) -> str:
@@ -179,7 +179,7 @@ class Garage:
             if objection := self.objection(name):
                 raise RefusedError(409, f"{name}: {objection}")
 
-    def _moved(self, name: str, news: VehicleNews) -> bool:
+    def _moved(self, name: str, news: VehicleReport) -> bool:
         """Whether a drone's charge or place differs from what was written down."""
         if name not in self._written:
             return True
@@ -187,7 +187,7 @@ class Garage:
         charged = abs((news.battery or 0.0) - (row.battery or 0.0)) >= _CHARGE
         return charged or math.dist(news.position or _HOME, row.position or _HOME) >= _METRES
 
-    def _take(self, name: str, news: VehicleNews, *, heard: float | None, least: float) -> None:
+    def _take(self, name: str, news: VehicleReport, *, heard: float | None, least: float) -> None:
         """Take over news, and write them down if the last row is `least` seconds old."""
         with self._lock:
             self._date(name, news)
@@ -208,7 +208,7 @@ class Garage:
         if due:
             self._store.robots.put(state)
 
-    def _date(self, name: str, news: VehicleNews) -> None:
+    def _date(self, name: str, news: VehicleReport) -> None:
         """Note since when a link is lost and a list is known: the wall clock may be set later."""
         before, wall, now = self._news[name], time.time(), time.monotonic()
         if news.link is LinkState.LOST and before.link is not LinkState.LOST:

@@ -26,7 +26,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.limits import RequestLimits
 
-__all__ = ["ModelShelf", "require_room"]
+__all__ = ["ModelStore", "require_room"]
 
 _LEAST_FREE = 1 << 30
 """Bytes that stay free on the disk: flights under way are recorded there."""
@@ -47,7 +47,7 @@ def require_room(folder: Path) -> None:
         )
 
 
-class ModelShelf:
+class ModelStore:
     """Folder of models."""
 
     def __init__(self, folder: Path, trial: Callable[[Path], None] = lambda _: None) -> None:

@@ -7,14 +7,14 @@ from pydantic import BaseModel, ConfigDict, Field
 from aerodaas.messages.health import HealthItem
 from aerodaas.protocol.schemas import LinkState
 
-__all__ = ["MonitorNews", "VehicleNews", "Wanted"]
+__all__ = ["MonitorReport", "MonitorRequest", "VehicleReport"]
 
 
 class _Line(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Wanted(_Line):
+class MonitorRequest(_Line):
     """Vehicles that the monitor is to hold; it lets go of all others."""
 
     number: int
@@ -22,7 +22,7 @@ class Wanted(_Line):
     robots: frozenset[str]
 
 
-class VehicleNews(_Line):
+class VehicleReport(_Line):
     """One vehicle as the monitor sees it."""
 
     held: bool = False
@@ -50,9 +50,9 @@ class VehicleNews(_Line):
     """Unix seconds of that list."""
 
 
-class MonitorNews(_Line):
+class MonitorReport(_Line):
     """All vehicles as the monitor sees them."""
 
     number: int
-    """Of the newest `Wanted` that it obeys."""
-    robots: dict[str, VehicleNews] = Field(default_factory=dict)
+    """Of the newest `MonitorRequest` that it obeys."""
+    robots: dict[str, VehicleReport] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Bookings: the book of leases with the fleet as it is now, and the quotas of tenants."""
+"""LeaseService: the book of leases with the fleet as it is now, and the quotas of tenants."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.garage import Garage
+from aerodaas.service.fleet_registry import FleetRegistry
 from aerodaas.service.lease_book import Candidate, Fleet, LeaseBook
 from aerodaas.service.store import Lease, Mission, Store
 
-__all__ = ["Bookings"]
+__all__ = ["LeaseService"]
 
 _SET_SECONDS = 0.1
 """Least seconds by which the wall clock counts as set."""
 _OFFSET = TypeAdapter(WallOffset)
 
 
-class Bookings:
+class LeaseService:
     """Leases of all tenants; safe in any thread.
 
     Their ends are Unix times, for people. When the wall clock is set, also while no service runs,
@@ -39,7 +39,7 @@ class Bookings:
         self,
         config: EnvironmentConfig,
         store: Store,
-        garage: Garage,
+        registry: FleetRegistry,
         quotas: Quotas,
         clock: Path | None = None,
     ) -> None:
@@ -48,14 +48,14 @@ class Bookings:
         Args:
             config: The provider's environment.
             store: Its open database.
-            garage: Tells of the drones.
+            registry: Tells of the drones.
             quotas: Of the tenants.
             clock: File of the wall clock's offset by which the database has its ends; None for one
                 that a further service does not learn.
         """
         self._config = config
         self._store = store
-        self._garage = garage
+        self._registry = registry
         self._quotas = quotas
         self._book = LeaseBook(store.leases)
         self._clock_file = clock
@@ -214,7 +214,7 @@ class Bookings:
                     call(lease)
 
     def _fleet(self) -> Fleet:
-        states, busy, fleet = self._garage.states, self.flying(), {}
+        states, busy, fleet = self._registry.states, self.flying(), {}
         for robot in self._config.robots:
             state = states[robot.id]
             place = state.position or robot.start
@@ -226,7 +226,7 @@ class Bookings:
                 camera=any(one.type == "camera" for one in robot.sensors),
                 position=(place[0], place[1]),
                 battery_minutes=None if usable is None else max(0.0, usable) * minutes,
-                objection="" if robot.id in busy else self._garage.objection(robot.id),
+                objection="" if robot.id in busy else self._registry.objection(robot.id),
                 busy=robot.id in busy,
             )
         return fleet

@@ -1,4 +1,4 @@
-"""The desk: takes missions in, moves them on, and answers for those that there are."""
+"""Missions of a provider: submitted, moved on from phase to phase, shown and commanded."""
 
 from __future__ import annotations
 
@@ -34,22 +34,21 @@ from aerodaas.protocol.schemas import (
 from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.attachments import Attachments
 from aerodaas.service.backend import PilotCommand
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.briefing import Briefing, usage_of
-from aerodaas.service.errors import RefusedError, StoreError, TroubleLog
+from aerodaas.service.errors import RefusedError, RepeatedErrorLog, StoreError
+from aerodaas.service.fleet_registry import OUT_OF_SERVICE, FleetRegistry
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
-from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.garage import OUT_OF_SERVICE, Garage
+from aerodaas.service.flights.orders import FlightOrder, FlightOrders
 from aerodaas.service.idempotency import fingerprint
-from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown
-from aerodaas.service.models import ModelShelf, require_room
+from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown, usage_of
+from aerodaas.service.model_store import ModelStore, require_room
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 
-__all__ = ["MissionDesk"]
+__all__ = ["MissionService"]
 
 _TURN_SECONDS = 0.1
 _REHEARSAL_SHARE = 4.0
@@ -58,7 +57,7 @@ _MOST_SHOWN = 100
 """Most missions of a list that are over: of one's own, and of those that others share."""
 
 
-class MissionDesk:
+class MissionService:
     """Missions of all tenants; safe in any thread."""
 
     def __init__(
@@ -66,9 +65,9 @@ class MissionDesk:
         settings: ServiceSettings,
         store: Store,
         *,
-        bookings: Bookings,
-        garage: Garage,
-        models: ModelShelf,
+        leases: LeaseService,
+        registry: FleetRegistry,
+        models: ModelStore,
         monitor: FleetMonitor | None = None,
     ) -> None:
         """Take up the missions that the database has; `start` moves them on.
@@ -77,23 +76,23 @@ class MissionDesk:
         """
         self._settings = settings
         self._store = store
-        self._bookings = bookings
-        self._garage = garage
+        self._leases = leases
+        self._registry = registry
         self._models = models
         self._monitor = monitor
-        self._briefing = Briefing(settings, store, bookings, garage)
+        self._orders = FlightOrders(settings, store, leases, registry)
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        self._trouble = TroubleLog(logging.getLogger(__name__))
+        self._trouble = RepeatedErrorLog(logging.getLogger(__name__))
         self._robot_locks = RobotLocks(settings.locks)
         self._robots = [robot.id for robot in settings.config.robots]
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
-        self._attachments = Attachments(settings, bookings, self._missions)
-        bookings.flying = self._busy
-        bookings.on_end.append(self._tell_flights)
-        bookings.on_extension.append(self._tell_flights)
+        self._attachments = Attachments(settings, leases, self._missions)
+        leases.flying = self._busy
+        leases.on_end.append(self._tell_flights)
+        leases.on_extension.append(self._tell_flights)
         self._rehearsals = itertools.count(1)
         self._last_rehearsed: dict[str, int] = {}
         """Number of each tenant's last rehearsal."""
@@ -107,7 +106,7 @@ class MissionDesk:
 
     def start(self) -> None:
         """Move missions on from now on, in a thread of its own."""
-        threading.Thread(target=self._run, name="desk", daemon=True).start()
+        threading.Thread(target=self._run, name="missions", daemon=True).start()
 
     def close(self) -> None:
         """Move on no more; flights go on by themselves."""
@@ -131,17 +130,17 @@ class MissionDesk:
         self._require_open(principal.tenant)
         require_room(self._settings.state)
         attached = wanted.attach is not None
-        robots = self._briefing.check(principal, wanted.document, attached=attached)
+        robots = self._orders.check(principal, wanted.document, attached=attached)
         if attached:
             with self._lock:
                 self._attachments.check(principal, wanted)
-        self._garage.require_fit(robots)
+        self._registry.require_fit(robots)
         if wanted.lease is not None:
             # It has used up its minutes of the quota already.
-            self._bookings.require(principal, wanted.lease, robots)
+            self._leases.require(principal, wanted.lease, robots)
         own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
-        cloud = self._briefing.may_call_cloud(wanted.document)
-        self._bookings.require_quota(principal.tenant, own, cloud=cloud)
+        cloud = self._orders.may_call_cloud(wanted.document)
+        self._leases.require_quota(principal.tenant, own, cloud=cloud)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
@@ -331,7 +330,7 @@ class MissionDesk:
             raise RefusedError(403, f"{mission} is {one.row.tenant}'s")
         if one.attached_to is None:
             require(principal, Role.PILOT, Scope.FLY)
-        self._briefing.require_scopes(principal, one.document())
+        self._orders.require_scopes(principal, one.document())
 
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
@@ -394,17 +393,17 @@ class MissionDesk:
         try:
             self.turn()
         except StoreError as error:
-            self._trouble.tell("the desk", error)
+            self._trouble.tell("missions", error)
         except Exception as error:  # noqa: BLE001 - see below
             # Without this thread, no lease and no mission would ever move on again.
-            self._trouble.tell("the desk", error, trace=True)
+            self._trouble.tell("missions", error, trace=True)
         else:
-            self._trouble.over("the desk")
+            self._trouble.over("missions")
 
     def turn(self) -> None:
         """Move every mission on by what has happened."""
         # First: leases end also while the database fails.
-        self._bookings.tick()
+        self._leases.tick()
         with self._lock:
             self._rehearsal_places = self._places()
             for one in list(self._missions.values()):
@@ -423,7 +422,7 @@ class MissionDesk:
         taken = self._busy() | {
             robot for one in self._missions.values() if one.handing_over for robot in one.row.robots
         }
-        states = self._garage.states.values()
+        states = self._registry.states.values()
         self._monitor.watch({one.id for one in states if one.enabled and one.id not in taken})
 
     def _move(self, one: ActiveMission) -> None:
@@ -463,7 +462,7 @@ class MissionDesk:
         if place := self._rehearsal_places.get(one.row.id, 1):
             one.wait_for(f"waits for its rehearsal: number {place} of those that wait")
             return
-        one.rehearse(self._briefing.rehearsal(one.row), self._models)
+        one.rehearse(self._orders.rehearsal(one.row), self._models)
         self._last_rehearsed[one.row.tenant] = next(self._rehearsals)
         if one.phase is not MissionPhase.REHEARSING:
             one.to(MissionPhase.REHEARSING)
@@ -504,23 +503,23 @@ class MissionDesk:
         if one.attached_to is not None:
             if self._has_place(one):
                 attached = self._attachments.begin(one)
-                self._begin_flight(one, self._briefing.attached(one.row, attached))
+                self._begin_flight(one, self._orders.attached(one.row, attached))
             return
         if one.row.lease is None:
-            lease = self._bookings.for_mission(one.row)
+            lease = self._leases.for_mission(one.row)
             one.change(lease=lease.id)
         else:
-            lease = self._bookings.lease(one.row.lease)
+            lease = self._leases.lease(one.row.lease)
         if lease.state is LeaseState.ENDED:
             self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
         elif lease.state is LeaseState.GRANTED and self._has_place(one) and self._handed_over(one):
-            self._begin_flight(one, self._briefing.flight(one.row, lease))
+            self._begin_flight(one, self._orders.flight(one.row, lease))
 
     def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
         one.brief(order, self._models)
         one.to(MissionPhase.FLYING, started=time.time())
         self._in_flight[one.row.id] = one
-        self._garage.hand(one.row.robots, LinkState.MISSION)
+        self._registry.hand(one.row.robots, LinkState.MISSION)
         one.take_off()
 
     def _handed_over(self, one: ActiveMission) -> bool:
@@ -533,9 +532,9 @@ class MissionDesk:
         robots = one.row.robots
         if one.handing_over:
             # One that somebody else has armed meanwhile is not let go of.
-            one.handing_over = not any(map(self._garage.objection, robots))
+            one.handing_over = not any(map(self._registry.objection, robots))
             return one.handing_over and self._monitor.released(robots)
-        held_up = [f"{name}: {why}" for name in robots if (why := self._garage.waits_for(name))]
+        held_up = [f"{name}: {why}" for name in robots if (why := self._registry.waits_for(name))]
         one.handing_over = not held_up
         if held_up:
             one.wait_for(f"waits for {'; '.join(held_up)}")
@@ -568,26 +567,26 @@ class MissionDesk:
         one.wait_for(one.flight.cancelled)
         link = one.follow()
         if link.mission is not None:
-            self._garage.note(link.mission.status)
+            self._registry.note(link.mission.status)
         if one.attached_to is not None:
             self._attachments.watch(one)
         elif one.row.lease is not None and not one.recalled:
             # It may have ended, or been extended, while nobody could tell the flight.
-            one.tell_lease(self._bookings.lease(one.row.lease))
+            one.tell_lease(self._leases.lease(one.row.lease))
         try:
             outcome = one.flown()
         except LostFlightError as error:
             reason = f"its process died in flight ({error})"
             if one.row.robots:
                 reason += f"; its drones are {OUT_OF_SERVICE}"
-            self._garage.take_out(one.row.robots)
-            self._garage.hand(one.row.robots, LinkState.UNWATCHED)
+            self._registry.take_out(one.row.robots)
+            self._registry.hand(one.row.robots, LinkState.UNWATCHED)
             self._end(one, MissionPhase.FAILED, reason)
             return
         if outcome is None:
             return
-        self._garage.note(outcome.status, ended=outcome.ended)
-        self._garage.hand(one.row.robots, LinkState.UNWATCHED)
+        self._registry.note(outcome.status, ended=outcome.ended)
+        self._registry.hand(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
         # One that was called home before its take-off has been aborted by that.
@@ -596,7 +595,7 @@ class MissionDesk:
         reason = outcome.reason
         if up := [name for name, last in outcome.status.items() if _may_fly(last)]:
             # Its actor may fly it still, or a pilot: nobody else connects with it before a look.
-            self._garage.take_out(up)
+            self._registry.take_out(up)
             reason += f"; {', '.join(up)}: not known to be down, {OUT_OF_SERVICE}"
         self._end(one, phase, reason)
 
@@ -605,7 +604,7 @@ class MissionDesk:
         if one.attached_to is not None:
             self._attachments.leave(one)
         if one.row.lease is not None:
-            self._bookings.give_back(one.row)
+            self._leases.give_back(one.row)
 
     def _active(self, row: Mission) -> ActiveMission:
         return ActiveMission(row, Path(row.folder), self._store.missions.put)

@@ -1,4 +1,4 @@
-"""A provider's desk over two drones with cameras, whose monitor and flights are a test's own."""
+"""A provider's service over two drones with cameras, whose monitor and flights are a test's own."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.desk import MissionDesk
+from aerodaas.service.fleet_registry import FleetRegistry
 from aerodaas.service.fleet_view import FleetView
-from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.service.garage import Garage
-from aerodaas.service.models import ModelShelf
-from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.flights.orders import FlightOrder, Outcome
+from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.mission_service import MissionService
+from aerodaas.service.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
+from aerodaas.service.monitor.reports import VehicleReport
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 
@@ -45,9 +45,9 @@ PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
 class Monitor:
     """A monitor whose letting go a test decides."""
 
-    def __init__(self, garage: Garage) -> None:
-        self._garage = garage
-        self._news: dict[str, VehicleNews] = {}
+    def __init__(self, registry: FleetRegistry) -> None:
+        self._registry = registry
+        self._news: dict[str, VehicleReport] = {}
         self.wanted: set[str] = set()
         self.held: set[str] = set()
 
@@ -66,8 +66,8 @@ class Monitor:
     def see(self, name: str, **changes: object) -> None:
         """Tell of one drone, as connected and fit but for the changes."""
         fit: dict[str, Any] = {"link": LinkState.CONNECTED, "heard": time.time(), "battery": 0.9}
-        self._news[name] = VehicleNews(**{"held": True, **fit, **changes})
-        self._garage.observe(self._news)
+        self._news[name] = VehicleReport(**{"held": True, **fit, **changes})
+        self._registry.observe(self._news)
 
 
 class Link:
@@ -112,7 +112,7 @@ class Link:
 
 
 class Provider:
-    """A desk with two drones, in whose flights a test is the process."""
+    """A service with two drones, in whose flights a test is the process."""
 
     def __init__(
         self,
@@ -137,24 +137,24 @@ class Provider:
         self.store = Store.open(folder / "service.db")
         self.store.tenants.add(Tenant("farm"))
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
-        self.garage = Garage(config, self.store)
-        self.bookings = Bookings(config, self.store, self.garage, Quotas(self.store))
-        self.monitor = Monitor(self.garage)
-        self.desk = MissionDesk(
+        self.registry = FleetRegistry(config, self.store)
+        self.leases = LeaseService(config, self.store, self.registry, Quotas(self.store))
+        self.monitor = Monitor(self.registry)
+        self.missions = MissionService(
             self.settings,
             self.store,
-            bookings=self.bookings,
-            garage=self.garage,
-            models=ModelShelf(self.settings.models),
+            leases=self.leases,
+            registry=self.registry,
+            models=ModelStore(self.settings.models),
             monitor=cast("FleetMonitor", self.monitor),
         )
         self.fleet = FleetView(
             config,
             {"robots": []},
             self.settings.actuators,
-            self.garage,
-            self.bookings,
-            self.desk,
+            self.registry,
+            self.leases,
+            self.missions,
             Accounts(self.store),
         )
 
@@ -172,28 +172,28 @@ class Provider:
     def submit(self, name: str = "one") -> MissionOut:
         """Submit a mission for one drone."""
         content = {"document": document(name, (5, 0))}
-        return self.desk.submit(PILOT, MissionIn.model_validate(content))
+        return self.missions.submit(PILOT, MissionIn.model_validate(content))
 
     def flying(self, **more: object) -> MissionOut:
         """Submit a mission for drone `one`, and have it fly."""
         self.monitor.see("one")
         content = {"document": document("one", (5, 0)), **more}
-        mission = self.desk.submit(PILOT, MissionIn.model_validate(content))
+        mission = self.missions.submit(PILOT, MissionIn.model_validate(content))
         self.turns(2)
         self.monitor.held.clear()
-        self.desk._missions[mission.id].link = cast("Any", Link())
+        self.missions._missions[mission.id].link = cast("Any", Link())
         self.turns()
         assert self.phase(mission) is MissionPhase.FLYING
         return mission
 
     def turns(self, count: int = 4) -> None:
-        """Let the desk move on."""
+        """Let the service move on."""
         for _ in range(count):
-            self.desk.turn()
+            self.missions.turn()
 
     def phase(self, mission: MissionOut) -> MissionPhase:
         """Present phase of a mission."""
-        return self.desk.shown(mission.id).phase
+        return self.missions.shown(mission.id).phase
 
     def land(self, **changes: object) -> None:
         """End the newest flight, with its drone on the ground but for the changes."""
