@@ -288,7 +288,7 @@ class Run:
         if self._flight is not None:
             self._flight.end_sensing()
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert of this process; nothing once the run is over."""
         if self._flight is not None and not self._finished.is_set():
             self._flight.note(kind, text)

@@ -211,7 +211,7 @@ class FlightProcess:
             raise MissionError(f"{robot} does not fly in this mission")
         return self._run.command(robot, command)
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Tell nobody of a command: the service has written down who has given it."""
 
     @property

@@ -78,7 +78,7 @@ class Attachments:
         cameras = [name for name in running if name in self._cameras]
         return [name for name in cameras if _may_have(tenant, [name], host)]
 
-    def begin(self, one: ActiveMission) -> HostFlight:
+    def share_cameras(self, one: ActiveMission) -> HostFlight:
         """Have the flight share its cameras with a mission; raises MissionError if it does not."""
         host = self._missions.get(str(one.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
@@ -93,7 +93,7 @@ class Attachments:
             raise MissionError(answer.text)
         return HostFlight(mission=host.row.id, socket=host.flight.socket, sensors=wanted)
 
-    def watch(self, one: ActiveMission) -> None:
+    def end_if_withdrawn(self, one: ActiveMission) -> None:
         """End an attached mission whose flight has ended, or that may sense no more."""
         host = self._missions.get(str(one.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
@@ -102,18 +102,18 @@ class Attachments:
             self._withdraw(host, one)
             self._end(one, f"{host.row.tenant} has withdrawn its grant")
 
-    def leave(self, one: ActiveMission) -> None:
+    def stop_sharing(self, one: ActiveMission) -> None:
         """Share no more with a mission that is over."""
         self._told.pop(one.row.id, None)
         host = self._missions.get(str(one.attached_to))
         if host is not None:
             self._withdraw(host, one)
 
-    def granted(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
+    def grant(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
         """Let a tenant attach missions to these cameras; what it has attached to others ends."""
         self._grant(host, tenant, {**host.grants, tenant: sensors})
 
-    def withdrawn(self, host: ActiveMission, tenant: str) -> None:
+    def withdraw_grant(self, host: ActiveMission, tenant: str) -> None:
         """Share nothing with a tenant any more, from the next picture on."""
         others = {name: one for name, one in host.grants.items() if name != tenant}
         self._grant(host, tenant, others)
@@ -130,7 +130,7 @@ class Attachments:
         host.change(request={**host.row.request, "grants": dict(grants)})
         for one in self._beside(host):
             if one.row.tenant == tenant and one.phase is MissionPhase.FLYING:
-                self.watch(one)
+                self.end_if_withdrawn(one)
 
     def _host(self, principal: Principal, name: str) -> ActiveMission:
         """The mission to attach to; for whom it neither is nor shares with, there is none."""

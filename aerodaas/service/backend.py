@@ -64,7 +64,7 @@ class Missions(ShownMissions, Protocol):
         """Whether a mission is the account's own, so that its presence counts."""
         ...
 
-    def hear(self, mission: str) -> None:
+    def record_presence(self, mission: str) -> None:
         """Note that the user of a mission is there."""
         ...
 

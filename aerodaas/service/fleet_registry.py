@@ -45,7 +45,7 @@ class FleetRegistry:
         self._states: dict[str, RobotState] = {}
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
-        self._news = {robot.id: VehicleReport() for robot in config.robots}
+        self._reports = {robot.id: VehicleReport() for robot in config.robots}
         self._told: dict[str, tuple[float, float, float]] = {}
         """Mission time of each robot's newest status; when it came, as Unix time and by
         `time.monotonic`."""
@@ -62,21 +62,21 @@ class FleetRegistry:
         with self._lock:
             return dict(self._states)
 
-    def news(self, robot: str) -> VehicleReport:
+    def report(self, robot: str) -> VehicleReport:
         """Link, mode and faults of a robot."""
         with self._lock:
-            return self._news[robot]
+            return self._reports[robot]
 
     def preflight(self, robot: str) -> PreflightOut:
         """The list before take-off of a robot; raises RefusedError if there is none such."""
-        if robot not in self._news:
+        if robot not in self._reports:
             raise RefusedError(404, f"there is no robot {robot}")
         with self._lock:
-            news, made = self._news[robot], self._examined_at.get(robot)
-        age = None if news.examined is None or made is None else time.monotonic() - made
-        return PreflightOut.of(robot, news.health, age)
+            report, made = self._reports[robot], self._examined_at.get(robot)
+        age = None if report.examined is None or made is None else time.monotonic() - made
+        return PreflightOut.of(robot, report.health, age)
 
-    def note(
+    def record_status(
         self,
         status: Mapping[str, StatusOut],
         *,
@@ -84,7 +84,7 @@ class FleetRegistry:
     ) -> None:
         """Take over what a mission tells of its drones.
 
-        The same status again is no news: who told it may hang, and with it what keeps the drone.
+        The same status again is no report: who told it may hang, and with it what keeps the drone.
 
         Args:
             status: Newest status by robot.
@@ -92,7 +92,7 @@ class FleetRegistry:
                 written down at once; None while it goes on.
         """
         for name, one in status.items():
-            if name not in self._news:
+            if name not in self._reports:
                 continue
             now = time.monotonic()
             if self._told.get(name, (None,))[0] != one.time or ended is not None:
@@ -101,9 +101,9 @@ class FleetRegistry:
             silent = now - came > _SILENT_SECONDS and one.state not in _OVER
             lost = silent or one.mode == VehicleMode.LOST.value
             link = LinkState.LOST if lost else LinkState.MISSION
-            before = self.news(name)
+            before = self.report(name)
             faults = (f"its mission has told nothing since {_moment(told)}",)
-            news = VehicleReport(
+            report = VehicleReport(
                 link=link,
                 since=before.since if before.link is link else told,
                 heard=before.heard if lost else told,
@@ -113,12 +113,12 @@ class FleetRegistry:
                 faults=faults if silent else tuple(one.faults),
             )
             least = _WRITE_SECONDS if ended is None else 0.0
-            self._take(name, news, heard=news.heard, least=least)
+            self._record(name, report, heard=report.heard, least=least)
 
-    def observe(self, news: Mapping[str, VehicleReport]) -> None:
+    def record_reports(self, report: Mapping[str, VehicleReport]) -> None:
         """Take over what the monitor tells of the drones on the ground; without any, it is gone."""
-        for name, before in list(self._news.items()):
-            one = news.get(name, VehicleReport(reason="the service looks for it again"))
+        for name, before in list(self._reports.items()):
+            one = report.get(name, VehicleReport(reason="the service looks for it again"))
             if one.link is LinkState.UNWATCHED and before.link is LinkState.MISSION:
                 continue
             if one.heard is None and one.link is LinkState.LOST:
@@ -126,43 +126,42 @@ class FleetRegistry:
             moved = self._moved(name, one)
             # While the database fails, the newest state is kept here, and written later.
             with contextlib.suppress(StoreError):
-                self._take(
+                self._record(
                     name, one, heard=one.heard, least=_WRITE_SECONDS if moved else _STILL_SECONDS
                 )
 
-    def hand(self, robots: Iterable[str], link: LinkState) -> None:
+    def set_link(self, robots: Iterable[str], link: LinkState) -> None:
         """Note that drones are a mission's from now on, or nobody's."""
         with self._lock:
             for name in robots:
-                self._news[name] = VehicleReport(link=link, since=time.time())
+                self._reports[name] = VehicleReport(link=link, since=time.time())
                 self._told.pop(name, None)
 
     def objection(self, robot: str) -> str:
         """Why a drone on the ground can be neither leased nor flown now; empty if it can."""
         with self._lock:
-            enabled, news = self._states[robot].enabled, self._news[robot]
+            enabled, report = self._states[robot].enabled, self._reports[robot]
             lost_at = self._lost_at.get(robot, math.inf)
         if not enabled:
             return OUT_OF_SERVICE
-        if news.link is LinkState.LOST and time.monotonic() - lost_at > _DROPOUT_SECONDS:
-            return f"not reachable since {_moment(news.since)}: {news.reason}"
-        if news.link is not LinkState.CONNECTED:
+        if report.link is LinkState.LOST and time.monotonic() - lost_at > _DROPOUT_SECONDS:
+            return f"not reachable since {_moment(report.since)}: {report.reason}"
+        if report.link is not LinkState.CONNECTED:
             return ""
         least = self._return_at[robot]
-        if news.battery is not None and news.battery <= least:
-            return (
-                f"its battery holds {news.battery:.0%}, and it comes home at {least:.0%}: charge it"
-            )
-        return "; ".join(news.objections)
+        if report.battery is not None and report.battery <= least:
+            charge = f"its battery holds {report.battery:.0%}"
+            return f"{charge}, and it comes home at {least:.0%}: charge it"
+        return "; ".join(report.objections)
 
-    def waits_for(self, robot: str) -> str:
+    def obstacle(self, robot: str) -> str:
         """Why a mission cannot have a drone from the monitor yet; empty if it can."""
         with self._lock:
-            link = self._news[robot].link
+            link = self._reports[robot].link
         known = link is LinkState.CONNECTED
         return self.objection(robot) or ("" if known else "the service connects to it")
 
-    def take_out(self, robots: Iterable[str]) -> None:
+    def take_out_of_service(self, robots: Iterable[str]) -> None:
         """Take drones out of service until `enable`."""
         for name in robots:
             self._change(name, enabled=False)
@@ -179,26 +178,28 @@ class FleetRegistry:
             if objection := self.objection(name):
                 raise RefusedError(409, f"{name}: {objection}")
 
-    def _moved(self, name: str, news: VehicleReport) -> bool:
+    def _moved(self, name: str, report: VehicleReport) -> bool:
         """Whether a drone's charge or place differs from what was written down."""
         if name not in self._written:
             return True
         row = self._written[name][1]
-        charged = abs((news.battery or 0.0) - (row.battery or 0.0)) >= _CHARGE
-        return charged or math.dist(news.position or _HOME, row.position or _HOME) >= _METRES
+        charged = abs((report.battery or 0.0) - (row.battery or 0.0)) >= _CHARGE
+        return charged or math.dist(report.position or _HOME, row.position or _HOME) >= _METRES
 
-    def _take(self, name: str, news: VehicleReport, *, heard: float | None, least: float) -> None:
-        """Take over news, and write them down if the last row is `least` seconds old."""
+    def _record(
+        self, name: str, report: VehicleReport, *, heard: float | None, least: float
+    ) -> None:
+        """Take over report, and write them down if the last row is `least` seconds old."""
         with self._lock:
-            self._date(name, news)
-            self._news[name] = news
+            self._stamp(name, report)
+            self._reports[name] = report
             if heard is None:
                 return
             before = self._states[name]
             state = self._states[name] = replace(
                 before,
-                battery=before.battery if news.battery is None else news.battery,
-                position=news.position or before.position,
+                battery=before.battery if report.battery is None else report.battery,
+                position=report.position or before.position,
                 heard=heard,
             )
             moment = time.monotonic()
@@ -208,13 +209,13 @@ class FleetRegistry:
         if due:
             self._store.robots.put(state)
 
-    def _date(self, name: str, news: VehicleReport) -> None:
+    def _stamp(self, name: str, report: VehicleReport) -> None:
         """Note since when a link is lost and a list is known: the wall clock may be set later."""
-        before, wall, now = self._news[name], time.time(), time.monotonic()
-        if news.link is LinkState.LOST and before.link is not LinkState.LOST:
-            self._lost_at[name] = now - max(0.0, wall - news.since)
-        if news.examined is not None and news.examined != before.examined:
-            self._examined_at[name] = now - max(0.0, wall - news.examined)
+        before, wall, now = self._reports[name], time.time(), time.monotonic()
+        if report.link is LinkState.LOST and before.link is not LinkState.LOST:
+            self._lost_at[name] = now - max(0.0, wall - report.since)
+        if report.examined is not None and report.examined != before.examined:
+            self._examined_at[name] = now - max(0.0, wall - report.examined)
 
     def _change(self, robot: str, *, enabled: bool) -> RobotState:
         with self._lock:

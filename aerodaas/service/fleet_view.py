@@ -82,7 +82,7 @@ class FleetView:
 
     def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
         lease = self._leases.holder(robot.id)
-        news, ready = self._registry.news(robot.id), self._registry.preflight(robot.id)
+        news, ready = self._registry.report(robot.id), self._registry.preflight(robot.id)
         flying, shared = self._missions.shared(robot.id, principal.tenant)
         mine = lease is not None and sees(principal, lease.tenant)
         # Only of a lease that this account sees.

@@ -21,11 +21,11 @@ __all__ = [
     "LeaseTable",
     "check_wish",
     "distance",
+    "expired",
     "grants",
     "is_waited_for",
     "lease_of",
     "lease_out",
-    "over",
     "waited_for",
 ]
 
@@ -137,7 +137,7 @@ MINUTE = 60.0
 """Seconds."""
 
 
-def over(live: Iterable[Lease], now: float) -> list[Lease]:
+def expired(live: Iterable[Lease], now: float) -> list[Lease]:
     """Those whose time is over, as ended."""
     return [
         replace(
@@ -255,7 +255,7 @@ class LeaseBook:
         self._live = {lease.id: lease for lease in shelf.live()}
         self._number = shelf.highest_number()
         self._unsaved: dict[str, Lease] = {}
-        self._news: list[Lease] = []
+        self._changes: list[Lease] = []
 
     def request(
         self, wish: LeaseIn, tenant: str, account: str, now: float, fleet: Fleet
@@ -297,7 +297,7 @@ class LeaseBook:
                 now=now,
             )
             self._write(now, fleet, lease)
-            return self._live[lease.id], self._told()
+            return self._live[lease.id], self._take_changes()
 
     def extend(
         self, id_: str, minutes: float, now: float, fleet: Fleet, allowed: float = math.inf
@@ -337,7 +337,7 @@ class LeaseBook:
                 lease, minutes=lease.minutes + minutes, ends=lease.ends + minutes * MINUTE
             )
             self._write(now, fleet, longer)
-            return longer, self._told()
+            return longer, self._take_changes()
 
     def give_back(self, id_: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End a queued or granted lease at its tenant's wish.
@@ -355,14 +355,14 @@ class LeaseBook:
         """
         return self._end(id_, LeaseEnd.REVOKED, reason, now, fleet)
 
-    def tick(self, now: float, fleet: Fleet) -> tuple[Lease, ...]:
+    def advance(self, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End what is over, and grant what has become free; call it every second or so.
 
         While the database fails, ends are returned, and grants wait.
         """
         with self._lock:
             self._settle(now, fleet)
-            return self._told()
+            return self._take_changes()
 
     def set_clock(self, seconds: float) -> None:
         """Move the ends of all leases by what the wall clock was set by: their minutes stay."""
@@ -410,11 +410,11 @@ class LeaseBook:
         self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
     ) -> tuple[Lease, ...]:
         with self._lock:
-            self._drop(over(self._live.values(), now))
+            self._drop(expired(self._live.values(), now))
             lease = self._demand(id_)
             self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
             self._settle(now, fleet)
-            return self._told()
+            return self._take_changes()
 
     def _demand(self, id_: str) -> Lease:
         lease = self._live.get(id_)
@@ -424,7 +424,7 @@ class LeaseBook:
 
     def _settle(self, now: float, fleet: Fleet) -> None:
         """End what is over and grant what is free; while the database fails, nothing is granted."""
-        self._drop(over(self._live.values(), now))
+        self._drop(expired(self._live.values(), now))
         try:
             self._write(now, fleet)
         except StoreError:
@@ -434,7 +434,7 @@ class LeaseBook:
         for lease in ended:
             del self._live[lease.id]
             self._unsaved[lease.id] = lease
-            self._news.append(lease)
+            self._changes.append(lease)
 
     def _write(self, now: float, fleet: Fleet, *changed: Lease) -> None:
         """Take over `changed` and what can be granted with it, if the database does."""
@@ -446,8 +446,8 @@ class LeaseBook:
             self._shelf.put(*rows.values())
         self._unsaved.clear()
         self._live = live
-        self._news += granted
+        self._changes += granted
 
-    def _told(self) -> tuple[Lease, ...]:
-        news, self._news = tuple(self._news), []
-        return news
+    def _take_changes(self) -> tuple[Lease, ...]:
+        changes, self._changes = tuple(self._changes), []
+        return changes

@@ -108,7 +108,7 @@ class LeaseService:
         lease, changed = self._book.request(
             wish, principal.tenant, principal.account, now, self._fleet()
         )
-        self._tell(changed)
+        self._announce(changed)
         return self.lease(lease.id)
 
     def require_quota(self, tenant: str, minutes: float, *, cloud: bool = False) -> None:
@@ -129,7 +129,7 @@ class LeaseService:
         lease, changed = self._book.request(
             wish, mission.tenant, mission.account, self.now(), self._fleet()
         )
-        self._tell(changed)
+        self._announce(changed)
         return self.lease(lease.id)
 
     def require(self, principal: Principal, lease: str, robots: Collection[str]) -> None:
@@ -144,7 +144,7 @@ class LeaseService:
 
     def lease(self, lease: str) -> Lease:
         """A lease, whoever asks; raises RefusedError if there is none."""
-        return self._book.get(lease) or self._store.leases.demand(lease)
+        return self._book.get(lease) or self._store.leases.require(lease)
 
     def seen(self, principal: Principal, lease: str) -> Lease:
         """A lease that this account may see; raises RefusedError for any other."""
@@ -169,7 +169,7 @@ class LeaseService:
         extended, changed = self._book.extend(
             lease, minutes, now, self._fleet(), left.flight_minutes
         )
-        self._tell(changed)
+        self._announce(changed)
         for call in self.on_extension:
             call(extended)
         return extended
@@ -184,22 +184,22 @@ class LeaseService:
             changed = self._book.revoke(lease, reason, self.now(), self._fleet())
         else:
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
-        self._tell(changed)
+        self._announce(changed)
         return self.lease(lease)
 
     def give_back(self, mission: Mission) -> None:
         """Give back the lease that was asked for with a mission, once that is over."""
         own = mission.request.get("lease") is None
         if own and mission.lease is not None and self._book.get(mission.lease) is not None:
-            self._tell(self._book.give_back(mission.lease, self.now(), self._fleet()))
+            self._announce(self._book.give_back(mission.lease, self.now(), self._fleet()))
 
     def holder(self, robot: str) -> Lease | None:
         """The lease that holds a robot now."""
         return self._book.holder(robot, self.now())
 
-    def tick(self) -> None:
+    def advance(self) -> None:
         """End what is over, and grant what has become free."""
-        self._tell(self._book.tick(self.now(), self._fleet()))
+        self._announce(self._book.advance(self.now(), self._fleet()))
 
     def _own(self, principal: Principal, lease: str) -> Lease:
         found = self.seen(principal, lease)
@@ -207,7 +207,7 @@ class LeaseService:
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
         return found
 
-    def _tell(self, changed: Collection[Lease]) -> None:
+    def _announce(self, changed: Collection[Lease]) -> None:
         for lease in changed:
             if lease.state is LeaseState.ENDED:
                 for call in self.on_end:

@@ -104,7 +104,7 @@ class ActiveMission:
         """Whether nothing follows any more."""
         return self.phase.over
 
-    def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
+    def set_phase(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
         """Change the phase, and what else changes with it."""
         assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
         self.change(phase=phase, reason=reason, **changes)
@@ -117,7 +117,7 @@ class ActiveMission:
         self.waits_for = ""
         self.version += 1
 
-    def wait_for(self, what: str) -> None:
+    def set_waiting(self, what: str) -> None:
         """Tell what a mission in this phase waits for; the database need not know."""
         if what != self.waits_for:
             self.waits_for = what
@@ -153,7 +153,7 @@ class ActiveMission:
         if not ended or self.rehearsal.flying:
             progress = self.rehearsal.progress()
             if time.monotonic() - self._rehearsed_since < seconds:
-                self.wait_for(f"is being rehearsed: {progress.flown:.0f} s flown so far")
+                self.set_waiting(f"is being rehearsed: {progress.flown:.0f} s flown so far")
                 return None
             self.end_rehearsal()
             text = (
@@ -175,12 +175,12 @@ class ActiveMission:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
-    def brief(self, order: FlightOrder, models: ModelStore) -> None:
+    def prepare_flight(self, order: FlightOrder, models: ModelStore) -> None:
         """Write down the flight's order, before anything of it begins."""
         self._prepare(self.flight, order, models)
         self._known_lease = FlightLeaseIn(ends=order.ends)
 
-    def take_off(self) -> None:
+    def start_flight(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
         if self._flying is None and not self.flight.begun:
             own = self.attached_to is None
@@ -205,7 +205,7 @@ class ActiveMission:
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelStore) -> None:
         document = self.document()
         folder.make(order, document.text())
-        models.lend(self.row.tenant, document, folder.models)
+        models.link_models(self.row.tenant, document, folder.models)
 
     def end_flight(self) -> None:
         """End the process of an attached mission, which has no drone, and all it has started."""
@@ -217,7 +217,7 @@ class ActiveMission:
         """The link to the flight, made when it is first needed, in any thread."""
         with self._linking:
             if self.link is None:
-                self.link = FlightLink(self.flight, self._told)
+                self.link = FlightLink(self.flight, self._count_change)
             return self.link
 
     @property
@@ -225,7 +225,7 @@ class ActiveMission:
         """Whether the flight knows that its lease has ended."""
         return self._known_lease is not None and self._known_lease.ends is None
 
-    def tell_lease(self, lease: Lease) -> None:
+    def send_lease(self, lease: Lease) -> None:
         """Tell the flight what has become of its lease, unless it knows.
 
         A flight that is being launched, or hangs, is told again once it has told its state.
@@ -243,7 +243,7 @@ class ActiveMission:
         except MissionError:
             self._missed_lease = state, number
 
-    def flown(self) -> Outcome | None:
+    def flight_outcome(self) -> Outcome | None:
         """How the flight ended; None while it goes on.
 
         Raises LostFlightError if its process died in flight.
@@ -267,7 +267,7 @@ class ActiveMission:
         if self.link is not None:
             self.link.close()
 
-    def _told(self) -> None:
+    def _count_change(self) -> None:
         self.version += 1
 
     def _last_words(self) -> str:

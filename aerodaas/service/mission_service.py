@@ -83,7 +83,7 @@ class MissionService:
         self._orders = FlightOrders(settings, store, leases, registry)
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        self._trouble = RepeatedErrorLog(logging.getLogger(__name__))
+        self._errors = RepeatedErrorLog(logging.getLogger(__name__))
         self._robot_locks = RobotLocks(settings.locks)
         self._robots = [robot.id for robot in settings.config.robots]
         self._texts: dict[str, tuple[int, str, bool]] = {}
@@ -200,7 +200,7 @@ class MissionService:
             one = self._one(mission)
             if one.phase is not MissionPhase.AWAITING_APPROVAL:
                 raise RefusedError(409, f"{mission} does not wait for approval: {one.phase.value}")
-            one.to(MissionPhase.QUEUED, f"approved by {principal.account}")
+            one.set_phase(MissionPhase.QUEUED, f"approved by {principal.account}")
             return shown(one)
 
     def cancel(self, principal: Principal, mission: str) -> MissionOut:
@@ -213,7 +213,7 @@ class MissionService:
                 one.end_rehearsal()
                 self._end(one, MissionPhase.CANCELLED, reason)
                 return shown(one)
-            one.wait_for(reason)
+            one.set_waiting(reason)
         one.cancel_flight(reason)
         return shown(one)
 
@@ -239,9 +239,9 @@ class MissionService:
         with self._lock:
             one = self._one(mission)
             if sensors is None:
-                self._attachments.withdrawn(one, tenant)
+                self._attachments.withdraw_grant(one, tenant)
             else:
-                self._attachments.granted(one, tenant, sensors)
+                self._attachments.grant(one, tenant, sensors)
             return shown(one)
 
     def shared(self, robot: str, tenant: str) -> tuple[str | None, list[str]]:
@@ -270,7 +270,7 @@ class MissionService:
         """
         found = shown(self._seen(principal, mission))
         if _is_user(principal, found):
-            self.hear(mission)
+            self.record_presence(mission)
         return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
@@ -332,11 +332,11 @@ class MissionService:
             require(principal, Role.PILOT, Scope.FLY)
         self._orders.require_scopes(principal, one.document())
 
-    def hear(self, mission: str) -> None:
+    def record_presence(self, mission: str) -> None:
         """Note that the user of a mission is there."""
         one = self._missions.get(mission)
         if one is not None and one.phase is MissionPhase.FLYING:
-            one.follow().hear()
+            one.follow().record_presence()
 
     def items(
         self, mission: str, stream: str, form: PictureForm
@@ -383,7 +383,7 @@ class MissionService:
         """Bring home what flies under a lease that has ended; prolong what flies under a longer."""
         for one in self._flying():
             if one.row.lease == lease.id:
-                one.tell_lease(lease)
+                one.send_lease(lease)
 
     def _run(self) -> None:
         while not self._closed.wait(_TURN_SECONDS):
@@ -391,19 +391,19 @@ class MissionService:
 
     def _try(self) -> None:
         try:
-            self.turn()
+            self.advance()
         except StoreError as error:
-            self._trouble.tell("missions", error)
+            self._errors.log_error("missions", error)
         except Exception as error:  # noqa: BLE001 - see below
             # Without this thread, no lease and no mission would ever move on again.
-            self._trouble.tell("missions", error, trace=True)
+            self._errors.log_error("missions", error, trace=True)
         else:
-            self._trouble.over("missions")
+            self._errors.log_recovery("missions")
 
-    def turn(self) -> None:
+    def advance(self) -> None:
         """Move every mission on by what has happened."""
         # First: leases end also while the database fails.
-        self._leases.tick()
+        self._leases.advance()
         with self._lock:
             self._rehearsal_places = self._places()
             for one in list(self._missions.values()):
@@ -423,7 +423,7 @@ class MissionService:
             robot for one in self._missions.values() if one.handing_over for robot in one.row.robots
         }
         states = self._registry.states.values()
-        self._monitor.watch({one.id for one in states if one.enabled and one.id not in taken})
+        self._monitor.hold({one.id for one in states if one.enabled and one.id not in taken})
 
     def _move(self, one: ActiveMission) -> None:
         """Move one mission on; what it meets is its own failure, unless the database is gone."""
@@ -436,9 +436,9 @@ class MissionService:
                 self._end(one, MissionPhase.REFUSED, str(error))
             else:
                 # The flight goes on by itself; the next turn looks again.
-                self._trouble.tell(one.row.id, error)
+                self._errors.log_error(one.row.id, error)
         else:
-            self._trouble.over(one.row.id)
+            self._errors.log_recovery(one.row.id)
 
     def _step(self, one: ActiveMission) -> None:
         steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {
@@ -460,12 +460,12 @@ class MissionService:
     def _rehearse(self, one: ActiveMission) -> None:
         """Begin a mission's rehearsal, once it is its turn."""
         if place := self._rehearsal_places.get(one.row.id, 1):
-            one.wait_for(f"waits for its rehearsal: number {place} of those that wait")
+            one.set_waiting(f"waits for its rehearsal: number {place} of those that wait")
             return
         one.rehearse(self._orders.rehearsal(one.row), self._models)
         self._last_rehearsed[one.row.tenant] = next(self._rehearsals)
         if one.phase is not MissionPhase.REHEARSING:
-            one.to(MissionPhase.REHEARSING)
+            one.set_phase(MissionPhase.REHEARSING)
 
     def _places(self) -> dict[str, int]:
         """The place in the queue of each mission that waits for a rehearsal; 0 for its turn."""
@@ -495,14 +495,14 @@ class MissionService:
 
     def _admit(self, one: ActiveMission) -> None:
         if self._settings.approval:
-            one.to(MissionPhase.AWAITING_APPROVAL, "waits for an operator's approval")
+            one.set_phase(MissionPhase.AWAITING_APPROVAL, "waits for an operator's approval")
         else:
-            one.to(MissionPhase.QUEUED, "waits for its drones")
+            one.set_phase(MissionPhase.QUEUED, "waits for its drones")
 
     def _take_off(self, one: ActiveMission) -> None:
         if one.attached_to is not None:
             if self._has_place(one):
-                attached = self._attachments.begin(one)
+                attached = self._attachments.share_cameras(one)
                 self._begin_flight(one, self._orders.attached(one.row, attached))
             return
         if one.row.lease is None:
@@ -516,11 +516,11 @@ class MissionService:
             self._begin_flight(one, self._orders.flight(one.row, lease))
 
     def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
-        one.brief(order, self._models)
-        one.to(MissionPhase.FLYING, started=time.time())
+        one.prepare_flight(order, self._models)
+        one.set_phase(MissionPhase.FLYING, started=time.time())
         self._in_flight[one.row.id] = one
-        self._registry.hand(one.row.robots, LinkState.MISSION)
-        one.take_off()
+        self._registry.set_link(one.row.robots, LinkState.MISSION)
+        one.start_flight()
 
     def _handed_over(self, one: ActiveMission) -> bool:
         """Whether the monitor has let go of a mission's drones, each of which was fit to fly.
@@ -534,10 +534,10 @@ class MissionService:
             # One that somebody else has armed meanwhile is not let go of.
             one.handing_over = not any(map(self._registry.objection, robots))
             return one.handing_over and self._monitor.released(robots)
-        held_up = [f"{name}: {why}" for name in robots if (why := self._registry.waits_for(name))]
+        held_up = [f"{name}: {why}" for name in robots if (why := self._registry.obstacle(name))]
         one.handing_over = not held_up
         if held_up:
-            one.wait_for(f"waits for {'; '.join(held_up)}")
+            one.set_waiting(f"waits for {'; '.join(held_up)}")
         return False
 
     def _has_place(self, wanted: ActiveMission) -> bool:
@@ -545,9 +545,9 @@ class MissionService:
         busy = self._flown_robots() | self._robot_locks.held(wanted.row.robots)
         full = len(self._flying()) >= self._settings.most_flights
         if taken := sorted(busy.intersection(wanted.row.robots)):
-            wanted.wait_for(f"waits for {', '.join(taken)}: in another flight")
+            wanted.set_waiting(f"waits for {', '.join(taken)}: in another flight")
         elif full:
-            wanted.wait_for(f"waits for the end of one of {self._settings.most_flights} flights")
+            wanted.set_waiting(f"waits for the end of one of {self._settings.most_flights} flights")
         return not (taken or full)
 
     def _busy(self) -> set[str]:
@@ -563,30 +563,30 @@ class MissionService:
 
     def _watch(self, one: ActiveMission) -> None:
         # After a restart: a flight whose order was written may not have begun.
-        one.take_off()
-        one.wait_for(one.flight.cancelled)
+        one.start_flight()
+        one.set_waiting(one.flight.cancelled)
         link = one.follow()
         if link.mission is not None:
-            self._registry.note(link.mission.status)
+            self._registry.record_status(link.mission.status)
         if one.attached_to is not None:
-            self._attachments.watch(one)
+            self._attachments.end_if_withdrawn(one)
         elif one.row.lease is not None and not one.recalled:
             # It may have ended, or been extended, while nobody could tell the flight.
-            one.tell_lease(self._leases.lease(one.row.lease))
+            one.send_lease(self._leases.lease(one.row.lease))
         try:
-            outcome = one.flown()
+            outcome = one.flight_outcome()
         except LostFlightError as error:
             reason = f"its process died in flight ({error})"
             if one.row.robots:
                 reason += f"; its drones are {OUT_OF_SERVICE}"
-            self._registry.take_out(one.row.robots)
-            self._registry.hand(one.row.robots, LinkState.UNWATCHED)
+            self._registry.take_out_of_service(one.row.robots)
+            self._registry.set_link(one.row.robots, LinkState.UNWATCHED)
             self._end(one, MissionPhase.FAILED, reason)
             return
         if outcome is None:
             return
-        self._registry.note(outcome.status, ended=outcome.ended)
-        self._registry.hand(one.row.robots, LinkState.UNWATCHED)
+        self._registry.record_status(outcome.status, ended=outcome.ended)
+        self._registry.set_link(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
         # One that was called home before its take-off has been aborted by that.
@@ -595,14 +595,14 @@ class MissionService:
         reason = outcome.reason
         if up := [name for name, last in outcome.status.items() if _may_fly(last)]:
             # Its actor may fly it still, or a pilot: nobody else connects with it before a look.
-            self._registry.take_out(up)
+            self._registry.take_out_of_service(up)
             reason += f"; {', '.join(up)}: not known to be down, {OUT_OF_SERVICE}"
         self._end(one, phase, reason)
 
     def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
-        one.to(phase, reason, ended=time.time())
+        one.set_phase(phase, reason, ended=time.time())
         if one.attached_to is not None:
-            self._attachments.leave(one)
+            self._attachments.stop_sharing(one)
         if one.row.lease is not None:
             self._leases.give_back(one.row)
 
@@ -630,7 +630,7 @@ class MissionService:
     def _any(self, mission: str) -> ActiveMission:
         """A mission that may be over; raises RefusedError if there is none."""
         one = self._missions.get(mission)
-        return one or self._active(self._store.missions.demand(mission))
+        return one or self._active(self._store.missions.require(mission))
 
     def _with_news(self, row: Mission) -> MissionOut:
         return shown(self._missions.get(row.id) or self._active(row))

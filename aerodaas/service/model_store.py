@@ -95,7 +95,7 @@ class ModelStore:
             _make_room(path.parent, len(content), tenant)
             write_private(path, content)
 
-    def lend(self, tenant: str, document: MissionDocument, folder: Path) -> None:
+    def link_models(self, tenant: str, document: MissionDocument, folder: Path) -> None:
         """Put a tenant's models into `folder` as its document names them.
 
         Raises ConfigError for a missing one.

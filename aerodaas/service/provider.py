@@ -59,7 +59,9 @@ def build_service(
     leases = LeaseService(settings.config, store, registry, quotas, settings.state / "clock")
     monitor = None
     if settings.monitor:
-        monitor = FleetMonitor(settings.fleet, settings.state / "monitor.log", registry.observe)
+        monitor = FleetMonitor(
+            settings.fleet, settings.state / "monitor.log", registry.record_reports
+        )
     missions = MissionService(
         settings, store, leases=leases, registry=registry, models=models, monitor=monitor
     )

@@ -78,7 +78,7 @@ class Run:
         self.commands.append(command)
         return Answer(accepted=True, text="so be it")
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Remember it."""
         self.notes.append(f"{kind}: {text}")
 

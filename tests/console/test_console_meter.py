@@ -27,8 +27,8 @@ def flying_to(target: int, *pending: int, stamp: int = 10**9) -> FlightState:
 def test_places_behind_are_remembered() -> None:
     """Who comes late sees where the drone has been."""
     meter = FlightMeter()
-    meter.note(flying_to(1, 2))
-    meter.note(flying_to(2))
+    meter.record(flying_to(1, 2))
+    meter.record(flying_to(2))
     assert meter.status["drone"].places == {"wp1": (1, 2, 3), "wp2": (2, 2, 3)}
 
 
@@ -36,10 +36,10 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
     """A status is sent often; all that lies ahead is in it."""
     meter = FlightMeter()
     for number in range(300):
-        meter.note(flying_to(number))
+        meter.record(flying_to(number))
     places = meter.status["drone"].places
     assert (len(places), "wp99" in places, "wp100" in places) == (200, False, True)
-    meter.note(flying_to(*range(1000, 1400)))
+    meter.record(flying_to(*range(1000, 1400)))
     places = meter.status["drone"].places
     assert set(places) == {f"wp{number}" for number in range(1000, 1400)}
 
@@ -50,10 +50,10 @@ def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("aerodaas.service.own.flight.host_time_ns", lambda: int(now * 1e9))
     meter, state = FlightMeter(), flying_to(1)
     for _ in range(2):
-        meter.note(state)
+        meter.record(state)
         assert meter.told == {"drone": 100.0}
         now += 5.0
-    meter.note(flying_to(1, stamp=2 * 10**9))
+    meter.record(flying_to(1, stamp=2 * 10**9))
     assert meter.told == {"drone": 110.0}
 
 
@@ -61,11 +61,11 @@ def test_decisions_of_the_analytics_scheduler_are_told_once_there_are_some() -> 
     """As the dispatcher reports them."""
     meter = FlightMeter()
     state = flying_to(1)
-    meter.note(state)
+    meter.record(state)
     assert meter.analytics is None
     values: dict[str, object] = {"outcomes": {}, "qos_total": 0.0, "qoe_total": 0.0}
     state.reports["dispatcher"] = cast("ActorReport", SimpleNamespace(values=values))
-    meter.note(state)
+    meter.record(state)
     assert meter.analytics is None
     values |= {
         "outcomes": {"done": 7, "late": 1, "timeout": 2, "failed": 3, "dropped": 4},
@@ -73,7 +73,7 @@ def test_decisions_of_the_analytics_scheduler_are_told_once_there_are_some() -> 
         "qos_total": 2.5,
         "qoe_total": 1.5,
     }
-    meter.note(state)
+    meter.record(state)
     assert meter.analytics == AnalyticsOut(
         time=1.0, in_time=7, late=6, dropped=4, edge=5, cloud=8, qos=2.5, qoe=1.5
     )

@@ -30,7 +30,7 @@ class _Mission:
     def text(self, mission: str) -> tuple[str, bool]:
         return json.dumps({"id": mission, "version": self.number}), False
 
-    def hear(self, mission: str) -> None:
+    def record_presence(self, mission: str) -> None:
         del mission
 
 

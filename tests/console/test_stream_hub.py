@@ -73,7 +73,7 @@ def _run(check: Callable[[StreamHub, Camera], Awaitable[None]]) -> Camera:
 
 
 async def _watch(hub: StreamHub) -> Watcher:
-    return hub.watch("m", "cam", PictureForm.H264)
+    return hub.add_watcher("m", "cam", PictureForm.H264)
 
 
 @pytest.mark.parametrize("joined", [0, 7, GROUP - 1, GROUP, GROUP + 3])
@@ -173,7 +173,7 @@ def test_each_frame_is_encoded_and_written_once_for_all(
 
     async def check() -> None:
         hub = StreamHub(items)
-        watchers = [hub.watch("m", "cam", form) for _ in range(5)]
+        watchers = [hub.add_watcher("m", "cam", form) for _ in range(5)]
         for number in range(COUNT):
             frames.put(Frame(Header(number, number, "cam"), np.zeros((48, 64, 3), np.uint8)))
             first, *others = [await asyncio.wait_for(one.next(), 20) for one in watchers]

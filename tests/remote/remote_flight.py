@@ -66,7 +66,7 @@ class DirectRun:
             raise MissionError(f"{robot} does not fly")
         return self.flown.tell(command)
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Keep alerts."""
         self.notes.append(f"{kind}: {text}")
 

@@ -67,7 +67,7 @@ class Monitor:
         """Tell of one drone, as connected and fit but for the changes."""
         fit: dict[str, Any] = {"link": LinkState.CONNECTED, "heard": time.time(), "battery": 0.9}
         self._news[name] = VehicleReport(**{"held": True, **fit, **changes})
-        self._registry.observe(self._news)
+        self._registry.record_reports(self._news)
 
 
 class Link:
@@ -104,7 +104,7 @@ class Link:
         self.asked.append(asked)
         return Answer(accepted=True)
 
-    def hear(self) -> None:
+    def record_presence(self) -> None:
         """Nothing."""
 
     def close(self) -> None:
@@ -189,7 +189,7 @@ class Provider:
     def turns(self, count: int = 4) -> None:
         """Let the service move on."""
         for _ in range(count):
-            self.missions.turn()
+            self.missions.advance()
 
     def phase(self, mission: MissionOut) -> MissionPhase:
         """Present phase of a mission."""

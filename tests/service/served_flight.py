@@ -40,7 +40,7 @@ class Drones:
         """Obey."""
         return self.obey(robot, command)
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Nothing."""
 
 

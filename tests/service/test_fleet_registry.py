@@ -62,44 +62,44 @@ def seen(provider: Provider) -> RobotOut:
 
 def test_a_status_that_stands_still_is_no_news(provider: Provider, clock: Clock) -> None:
     """A flight that hangs: lost since its last word, and nothing of it is as of now."""
-    provider.registry.hand(["one"], LinkState.MISSION)
-    provider.registry.note(status(10.0))
+    provider.registry.set_link(["one"], LinkState.MISSION)
+    provider.registry.record_status(status(10.0))
     assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
     clock.now = T0 + 4.0
-    provider.registry.note(status(10.0))
+    provider.registry.record_status(status(10.0))
     assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
     clock.now = T0 + 60.0
-    provider.registry.note(status(10.0))
+    provider.registry.record_status(status(10.0))
     silent = seen(provider)
     assert (silent.link, silent.since, silent.heard) == (LinkState.LOST, T0, T0)
     assert silent.faults == ["its mission has told nothing since 2027-01-15 08:00:00 UTC"]
-    provider.registry.note(status(10.1))
+    provider.registry.record_status(status(10.1))
     again = seen(provider)
     assert (again.link, again.heard, again.faults) == (LinkState.MISSION, T0 + 60.0, [])
 
 
 def test_the_next_mission_is_not_the_last_one(provider: Provider, clock: Clock) -> None:
     """Its clock may show the same time."""
-    provider.registry.note(status(10.0))
+    provider.registry.record_status(status(10.0))
     clock.now = T0 + 60.0
-    provider.registry.hand(["one"], LinkState.MISSION)
-    provider.registry.note(status(10.0))
+    provider.registry.set_link(["one"], LinkState.MISSION)
+    provider.registry.record_status(status(10.0))
     assert seen(provider).link is LinkState.MISSION
 
 
 def test_a_mission_that_is_over_may_be_silent(provider: Provider, clock: Clock) -> None:
     """Its drone stands, while the recording is closed and the report drawn."""
-    provider.registry.note(status(10.0, state="landed", mode="grounded"))
+    provider.registry.record_status(status(10.0, state="landed", mode="grounded"))
     clock.now = T0 + 60.0
-    provider.registry.note(status(10.0, state="landed", mode="grounded"))
+    provider.registry.record_status(status(10.0, state="landed", mode="grounded"))
     assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
 
 
 def test_what_a_lost_vehicle_said_is_not_as_of_now(provider: Provider, clock: Clock) -> None:
     """Its mission goes on, and has no word from it: charge and place are those of before."""
-    provider.registry.note(status(10.0))
+    provider.registry.record_status(status(10.0))
     clock.now = T0 + 30.0
-    provider.registry.note(status(40.0, mode="lost"))
+    provider.registry.record_status(status(40.0, mode="lost"))
     lost = seen(provider)
     assert (lost.link, lost.heard) == (LinkState.LOST, T0)
 
@@ -107,7 +107,9 @@ def test_what_a_lost_vehicle_said_is_not_as_of_now(provider: Provider, clock: Cl
 def test_the_end_of_a_flight_is_of_its_own_time(provider: Provider, clock: Clock) -> None:
     """Also where the service was away meanwhile."""
     clock.now = T0 + 3600.0
-    provider.registry.note(status(90.0, state="landed", mode="grounded", battery=0.4), ended=T0)
+    provider.registry.record_status(
+        status(90.0, state="landed", mode="grounded", battery=0.4), ended=T0
+    )
     assert (seen(provider).battery, seen(provider).heard) == (0.4, T0)
 
 
@@ -119,7 +121,7 @@ def test_a_charge_that_nobody_knows_lasts_for_no_minute(
     lease = provider.leases.request(PILOT, LeaseIn(battery_minutes=1.0, minutes=5.0))
     assert lease.state is LeaseState.QUEUED
     provider.monitor.see("two", battery=0.9)
-    provider.leases.tick()
+    provider.leases.advance()
     granted = provider.leases.lease(lease.id)
     assert (granted.state, granted.robots) == (LeaseState.GRANTED, ("two",))
     provider.missions.close()
@@ -182,7 +184,7 @@ def test_a_missions_drone_has_the_list_that_its_flight_went_through(
     """Which is asked for it; of one that does not answer there is none."""
     mission = provider.flying()
     provider.monitor.see("one", health=(WINDY,), examined=T0)
-    provider.registry.hand(["one"], LinkState.MISSION)
+    provider.registry.set_link(["one"], LinkState.MISSION)
     link = provider.missions._missions[mission.id].link
     well = HealthItem("wind", "2.0 m/s", "at most 10", Verdict.GOOD)
     told = PreflightOut.of("one", [well], 4.0)

@@ -239,11 +239,11 @@ def test_nobody_waits_for_a_flight_to_note_that_its_user_is_there(
         assert free.wait(20)
         heard.release()
 
-    monkeypatch.setattr(flight.lease, "hear", hang)
+    monkeypatch.setattr(flight.lease, "record_presence", hang)
     monkeypatch.setattr(link, "_HEARD_SECONDS", 0.01)
-    flight.link.hear()
+    flight.link.record_presence()
     assert begun.wait(20)
-    flight.link.hear()
+    flight.link.record_presence()
     assert flight.end().accepted
     assert not heard.acquire(blocking=False)
     free.set()
@@ -251,7 +251,7 @@ def test_nobody_waits_for_a_flight_to_note_that_its_user_is_there(
     assert heard.acquire(timeout=20)
     assert heard.acquire(timeout=20)
     assert not heard.acquire(timeout=0.2)
-    flight.link.hear()
+    flight.link.record_presence()
     assert heard.acquire(timeout=20)
 
 

@@ -51,7 +51,7 @@ def test_a_flight_begins_once_the_monitor_has_let_go(provider: Provider) -> None
     assert len(provider.started) == 1
     provider.turns()
     assert provider.monitor.wanted == {"two"}
-    assert provider.registry.news("one").link is LinkState.MISSION
+    assert provider.registry.report("one").link is LinkState.MISSION
     provider.land()
     provider.turns()
     assert provider.phase(mission) is MissionPhase.LANDED
@@ -144,7 +144,7 @@ def test_drones_in_flight_are_left_alone_after_a_restart(
     assert len(provider.started) == 1
     seen: list[set[str]] = []
     monitor = Monitor(provider.registry)
-    monkeypatch.setattr(monitor, "watch", lambda robots: seen.append(set(robots)))
+    monkeypatch.setattr(monitor, "hold", lambda robots: seen.append(set(robots)))
     again = MissionService(
         provider.settings,
         provider.store,
@@ -153,19 +153,19 @@ def test_drones_in_flight_are_left_alone_after_a_restart(
         models=ModelStore(provider.settings.models),
         monitor=cast("FleetMonitor", monitor),
     )
-    again.turn()
+    again.advance()
     again.close()
     assert seen == [{"two"}]
 
 
 def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
     """The monitor tells of all drones, those that it does not hold included."""
-    provider.registry.hand(["one"], LinkState.MISSION)
-    provider.registry.observe({"one": VehicleReport(), "two": VehicleReport()})
-    assert provider.registry.news("one").link is LinkState.MISSION
-    provider.registry.observe({})
-    assert provider.registry.news("one").link is LinkState.MISSION
-    assert provider.registry.news("two").reason == "the service looks for it again"
+    provider.registry.set_link(["one"], LinkState.MISSION)
+    provider.registry.record_reports({"one": VehicleReport(), "two": VehicleReport()})
+    assert provider.registry.report("one").link is LinkState.MISSION
+    provider.registry.record_reports({})
+    assert provider.registry.report("one").link is LinkState.MISSION
+    assert provider.registry.report("two").reason == "the service looks for it again"
 
 
 class Launching(Link):

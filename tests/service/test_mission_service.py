@@ -108,7 +108,7 @@ class MissionsAlone:
     def turns(self, count: int = 4) -> None:
         """Let the service move on."""
         for _ in range(count):
-            self.missions.turn()
+            self.missions.advance()
 
 
 @pytest.fixture
@@ -124,7 +124,7 @@ def test_what_one_mission_meets_is_its_own(one: MissionsAlone) -> None:
     stuck = one.submit("one")
     one.turns(1)
     one.store.robots.put(one.store.robots.get("one") or _out("one"))
-    one.missions._registry.take_out(["one"])
+    one.missions._registry.take_out_of_service(["one"])
     good = one.submit("two")
     one.turns()
     assert one.phase(stuck) is MissionPhase.REFUSED
@@ -223,7 +223,7 @@ def test_one_key_is_one_mission_however_many_send_it_at_once(one: MissionsAlone)
 def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: MissionsAlone) -> None:
     """The answer to a repeated submission does not depend on what happened since."""
     first = one.submit("one", "k")
-    one.missions._registry.take_out(["one"])
+    one.missions._registry.take_out_of_service(["one"])
     assert one.submit("one", "k").id == first.id
     with pytest.raises(RefusedError, match="out of service"):
         one.submit("one", "other")

@@ -110,13 +110,13 @@ def test_a_model_that_is_lent_outlives_the_shelf(shelf: ModelStore, tmp_path: Pa
     name = bring(shelf, "farm", "a")
     flight = tmp_path / "flight"
     flight.mkdir()
-    shelf.lend("farm", naming(name), flight)
+    shelf.link_models("farm", naming(name), flight)
     age(tmp_path / "models", name, 2 * DAY)
     bring(shelf, "farm", "b", 90)
     assert (flight / f"{name}.onnx").read_bytes() == b"a" * 40
     assert not shelf.has("farm", name)
     with pytest.raises(ConfigError, match="has not been sent"):
-        shelf.lend("city", naming(name), flight)
+        shelf.link_models("city", naming(name), flight)
 
 
 def test_a_mission_that_is_over_holds_no_models(

@@ -101,7 +101,7 @@ def test_the_recording_of_a_lost_flight_can_be_deleted(
     def lost(_: ActiveMission) -> None:
         raise LostFlightError("its processes have ended")
 
-    monkeypatch.setattr(ActiveMission, "flown", lost)
+    monkeypatch.setattr(ActiveMission, "flight_outcome", lost)
     provider.turns()
     assert provider.phase(mission) is MissionPhase.FAILED
     assert provider.missions.shown(mission.id).recording

@@ -66,11 +66,11 @@ def test_a_granted_lease_keeps_its_minutes(
     held = provider.leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
     waits = provider.leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
     wall.ahead += step
-    provider.leases.tick()
+    provider.leases.advance()
     assert provider.leases.lease(held.id).state is LeaseState.GRANTED
     assert provider.leases.lease(waits.id).state is LeaseState.QUEUED
     assert minutes_left(provider.leases, held.id) == pytest.approx(20.0, abs=0.1)
-    assert provider.store.leases.demand(held.id).ends == provider.leases.lease(held.id).ends
+    assert provider.store.leases.require(held.id).ends == provider.leases.lease(held.id).ends
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -98,7 +98,7 @@ def test_a_service_that_starts_again_knows_of_the_step(
     wall.ahead += step
     for _ in range(2):
         again = LeaseService(*parts, clock)
-        again.tick()
+        again.advance()
         assert again.lease(lease.id).state is LeaseState.GRANTED
         assert minutes_left(again, lease.id) == pytest.approx(20.0, abs=0.1)
 
@@ -111,7 +111,7 @@ def test_an_offset_of_another_boot_moves_nothing(tmp_path: Path, provider: Provi
         clock.write_text(content)
         leases = LeaseService(*parts, clock)
         lease = leases.request(PILOT, LeaseIn(robots=["one"], minutes=20))
-        leases.tick()
+        leases.advance()
         assert minutes_left(leases, lease.id) == pytest.approx(20.0, abs=0.1)
         leases.end(PILOT, lease.id)
 

@@ -73,7 +73,7 @@ class HereUser:
 
     def answered(self, message: object, blob: bytes = b"") -> None:
         """Take an answer, JSON and a blob, as it came from the user; never raises."""
-        self._relay.take(self, message, blob)
+        self._relay.accept_answer(self, message, blob)
 
     def answered_text(self, text: bytes, blob: bytes = b"") -> None:
         """As `answered`, with the JSON as it came; what cannot be an answer is not even parsed."""
@@ -89,7 +89,7 @@ class HereUser:
 
     def detach(self) -> None:
         """Tell the relay that this connection has ended."""
-        self._relay.leave(self)
+        self._relay.detach(self)
 
 
 class HereRelay:
@@ -139,7 +139,7 @@ class HereRelay:
         """Whether a question has no answer yet."""
         return bool(self._waiting)
 
-    def leave(self, user: HereUser) -> None:
+    def detach(self, user: HereUser) -> None:
         """Ask `user` no more; what waits for it is told so."""
         with self._lock:
             if self._user is user:
@@ -147,7 +147,7 @@ class HereRelay:
                 self._attached.clear()
         self._drop(user, "the user's side has left")
 
-    def take(self, user: HereUser, message: object, blob: bytes) -> None:
+    def accept_answer(self, user: HereUser, message: object, blob: bytes) -> None:
         """Take an answer of `user`; one to no question of theirs is ignored."""
         content = message if isinstance(message, dict) else {}
         number = content.get("number")
@@ -160,7 +160,7 @@ class HereRelay:
             if question is None or question.user is not user:
                 return
             del self._waiting[number]
-            self._note(question, content.get("took"))
+            self._measure(question, content.get("took"))
             question.answer = answer
         question.done.set()
 
@@ -224,7 +224,7 @@ class HereRelay:
         self._times.setdefault(key, HereTimes()).missed += 1
         return {"absent": reason}
 
-    def _note(self, question: _Question, took: object) -> None:
+    def _measure(self, question: _Question, took: object) -> None:
         seconds = time.monotonic() - question.asked
         times = self._times.setdefault(question.key, HereTimes())
         times.answers += 1

@@ -92,7 +92,7 @@ class MissionFollower:
             seen = self._changes
             try:
                 self._listen(lost=lost)
-                self._take(self._client.mission(self._mission.id))
+                self._update(self._client.mission(self._mission.id))
             except ConfigError as error:
                 with self._changed:
                     self._failed = error
@@ -118,9 +118,9 @@ class MissionFollower:
                     if lost:
                         self._say("the connection to the provider is back")
                         lost = False
-                    self._take(message)
+                    self._update(message)
 
-    def _take(self, mission: MissionOut) -> None:
+    def _update(self, mission: MissionOut) -> None:
         with self._changed:
             self._mission = mission
             self._changes += 1

@@ -117,9 +117,9 @@ class WireReader:
         with self._client.live(self._follower.mission.id, _RATE, self._stream) as live:
             for message in live:
                 if isinstance(message, ReceivedItem):
-                    self._take(message)
+                    self._accept(message)
 
-    def _take(self, message: ReceivedItem) -> None:
+    def _accept(self, message: ReceivedItem) -> None:
         item, wrong = None, message.left_out
         if not wrong:
             try:

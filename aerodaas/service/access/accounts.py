@@ -192,7 +192,7 @@ class Accounts:
 
     def get(self, name: str) -> AccountOut:
         """An account; raises RefusedError with status 404 if there is none."""
-        return _account_out(self._store.accounts.demand(name))
+        return _account_out(self._store.accounts.require(name))
 
     def all(self, tenant: str | None = None) -> list[AccountOut]:
         """Those of a tenant, or all, by name."""
@@ -206,7 +206,7 @@ class Accounts:
                 with 100 valid tokens; 403 for scopes beyond the account's.
         """
         now = self._clock()
-        account = self._store.accounts.demand(request.account)
+        account = self._store.accounts.require(request.account)
         if account.disabled:
             raise RefusedError(409, f"account {account.name} is disabled")
         scopes = account.scopes if request.scopes is None else frozenset(request.scopes)

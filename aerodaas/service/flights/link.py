@@ -158,7 +158,7 @@ class FlightLink:
         with self._place():
             return self._asked(PreflightOut, "GET", path, None, Role.VIEWER)
 
-    def hear(self) -> None:
+    def record_presence(self) -> None:
         """Have the flight told that its user is there; nobody waits for that, as it may hang."""
         self._heard.set()
 
@@ -236,14 +236,14 @@ class FlightLink:
             raise MissionError(f"the flight's stream has ended: {error}") from None
 
     def _follow(self) -> None:
-        trouble = RepeatedErrorLog(_log)
+        errors = RepeatedErrorLog(_log)
         while not self._closed.is_set():
             try:
                 self._follow_once()
             except (OSError, EOFError, WebSocketException):
                 pass  # Before the process listens and after its end there is nobody to connect to.
             except Exception as error:  # noqa: BLE001 - a state that is not as agreed, of any kind
-                trouble.tell(f"{self._folder.path.name}: its state cannot be read", error)
+                errors.log_error(f"{self._folder.path.name}: its state cannot be read", error)
             self._closed.wait(_AGAIN_SECONDS)
 
     def _follow_once(self) -> None:

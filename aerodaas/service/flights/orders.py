@@ -279,7 +279,7 @@ class FlightOrders:
 
     def _order(self, mission: Mission, lease: str, granted: Lease | None) -> FlightOrder:
         minutes = float(mission.request["minutes"])
-        tenant = self._store.tenants.demand(mission.tenant)
+        tenant = self._store.tenants.require(mission.tenant)
         ends = None if granted is None else granted.ends
         return FlightOrder(
             mission=mission.id,
@@ -305,7 +305,7 @@ class FlightOrders:
         settings = self._settings
         if settings.edge_slots is None:
             return None
-        weight = self._store.tenants.demand(tenant).weight
+        weight = self._store.tenants.require(tenant).weight
         return EdgeTurnsOrder(turns=settings.edge_turns, tenant=tenant, weight=weight)
 
 

@@ -54,7 +54,7 @@ class FlightRoutes:
         """The routes."""
         router = api_router(f"/v1/missions/{OWN}", "flight")
         router.add_api_route("/controls", self.control, methods=["POST"])
-        router.add_api_route("/presence", self.hear, methods=["POST"])
+        router.add_api_route("/presence", self.record_presence, methods=["POST"])
         router.add_api_route("/lease", self.change_lease, methods=["PUT"])
         router.add_api_route("/shares/{attached}", self.share, methods=["PUT"])
         router.add_api_route("/shares/{attached}", self.withdraw, methods=["DELETE"])
@@ -67,10 +67,10 @@ class FlightRoutes:
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         return self._flight.fly(principal, OWN, body)
 
-    def hear(self, request: Request) -> Answer:
+    def record_presence(self, request: Request) -> Answer:
         """Note that the user is there."""
         self._admission.require(request, Role.OPERATOR)
-        self._lease.hear()
+        self._lease.record_presence()
         return Answer(accepted=True)
 
     def change_lease(self, body: FlightLeaseIn, request: Request) -> Answer:

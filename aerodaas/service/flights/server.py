@@ -73,7 +73,7 @@ class LeaseWatch:
         """Stop watching."""
         self._over.set()
 
-    def hear(self) -> None:
+    def record_presence(self) -> None:
         """Note that the user has been heard of."""
         with self._lock:
             self._heard = time.monotonic()

@@ -61,7 +61,7 @@ _GONE = frozenset(
         HTTPStatus.TOO_MANY_REQUESTS,
     }
 )
-"""Refusals of who may not go on; any other one is the service's own trouble."""
+"""Refusals of who may not go on; any other one is the service's own errors."""
 
 
 class Tokens(Protocol):
@@ -133,7 +133,7 @@ class Admission:
     ) -> bool:
         """Whether the sender of a request that lasts still may have it; counts as no further one.
 
-        `look` raises RefusedError for who may not. The service's own trouble refuses nobody.
+        `look` raises RefusedError for who may not. The service's own errors refuses nobody.
         """
         token, address = bearer(connection.headers), address_of(connection.scope)
         try:

@@ -191,7 +191,7 @@ class _ImpatientProtocol(_Protocol):
     def resume_writing(self) -> None:
         super().resume_writing()
         self._stop_taking()
-        self._note()
+        self._update_awaiting()
 
     def handle_websocket_upgrade(  # pyright: ignore[reportIncompatibleMethodOverride]
         self,
@@ -212,11 +212,11 @@ class _ImpatientProtocol(_Protocol):
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
-        self._note()
+        self._update_awaiting()
 
     def _wait(self) -> None:
         """Start the clock where something else is awaited than before; more bytes of it do not."""
-        self._note()
+        self._update_awaiting()
         seconds = self._seconds()
         if seconds != self._awaited:
             self._stop_waiting()
@@ -224,7 +224,7 @@ class _ImpatientProtocol(_Protocol):
             if seconds:
                 self._closing = self.loop.call_later(seconds, self.transport.close)
 
-    def _note(self) -> None:
+    def _update_awaiting(self) -> None:
         # One whose answer is still on its way makes no room.
         if self._awaits_request() and not self.transport.get_write_buffer_size():
             self.config.shared.await_request(self)

@@ -53,7 +53,7 @@ class Watcher:
         self.left_out = 0
         """Items that newer ones took the place of."""
 
-    def begin(self, group: Sequence[Item]) -> None:
+    def start(self, group: Sequence[Item]) -> None:
         """Add what comes before the next item."""
         for item in group:
             self._begun += 1
@@ -102,7 +102,7 @@ class _Source:
         elif item.key is False and self.group:
             self.group = [*self.group, item] if len(self.group) < _LONGEST_GROUP else []
 
-    def tell(self, watchers: Sequence[Watcher], item: Item | None) -> None:
+    def send(self, watchers: Sequence[Watcher], item: Item | None) -> None:
         """Give watchers an item, in any thread: the loop is woken once for all of them."""
         with contextlib.suppress(RuntimeError):  # the loop has been closed
             self.loop.call_soon_threadsafe(_put_all, watchers, item)
@@ -124,7 +124,7 @@ class StreamHub:
         self._told: set[tuple[str, str]] = set()
         """Missions' streams of which it was told that items are left out."""
 
-    def watch(self, mission: str, stream: str, form: PictureForm) -> Watcher:
+    def add_watcher(self, mission: str, stream: str, form: PictureForm) -> Watcher:
         """Begin to watch a stream, its pictures in a form; `leave` ends it.
 
         All watchers are of one event loop, in which this is called.
@@ -136,11 +136,13 @@ class StreamHub:
                 source = self._sources[key] = _Source()
                 arguments = (key, source)
                 threading.Thread(target=self._read, args=arguments, daemon=True).start()
-            watcher.begin(source.group)
+            watcher.start(source.group)
             source.watchers.add(watcher)
         return watcher
 
-    def leave(self, mission: str, stream: str, form: PictureForm, watcher: Watcher) -> None:
+    def remove_watcher(
+        self, mission: str, stream: str, form: PictureForm, watcher: Watcher
+    ) -> None:
         """End watching; the stream is read until its last watcher has left."""
         with self._lock:
             source = self._sources.get((mission, stream, form))
@@ -158,14 +160,14 @@ class StreamHub:
                         return
                     if item is not None:
                         source.keep(item)
-                        source.tell(watchers, item)
+                        source.send(watchers, item)
         except AeroDaaSError:
             pass  # The flight is over, or has no such stream.
         finally:
             with self._lock:
                 if self._sources.get(key) is source:
                     del self._sources[key]
-                source.tell(list(source.watchers), None)
+                source.send(list(source.watchers), None)
 
     def _tell_left_out(self, stream: tuple[str, str], message: dict[str, Any]) -> None:
         if message.get("kind") == "left_out" and stream not in self._told:

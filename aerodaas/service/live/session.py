@@ -114,7 +114,7 @@ class LiveSession:
             now, version = loop.time(), self._missions.version(self._mission)
             if own and now - heard > _IDLE_SECONDS:
                 heard = now
-                await asyncio.to_thread(self._missions.hear, self._mission)
+                await asyncio.to_thread(self._missions.record_presence, self._mission)
             if version != sent or now - since > _IDLE_SECONDS:
                 sent, since = version, now
                 text, over = self._missions.text(self._mission)
@@ -138,11 +138,11 @@ class LiveSession:
     async def _items(self, stream: str, form: PictureForm) -> None:
         """Send the items of one stream; begins again where the flight has not begun yet."""
         while True:
-            watcher = self._hub.watch(self._mission, stream, form)
+            watcher = self._hub.add_watcher(self._mission, stream, form)
             try:
                 await self._forward(watcher)
             finally:
-                self._hub.leave(self._mission, stream, form, watcher)
+                self._hub.remove_watcher(self._mission, stream, form, watcher)
             await asyncio.sleep(_IDLE_SECONDS / 2)
 
     async def _forward(self, watcher: Watcher) -> None:

@@ -63,7 +63,7 @@ def _tell(
         changed.clear()
         # The number first, see `main`.
         number = obeyed[0]
-        robots = {name: watcher.news for name, watcher in watchers.items()}
+        robots = {name: watcher.report for name, watcher in watchers.items()}
         out.write(f"{MonitorReport(number=number, robots=robots).model_dump_json()}\n")
         out.flush()
         time.sleep(_LEAST_SECONDS)

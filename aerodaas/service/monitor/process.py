@@ -36,7 +36,7 @@ class FleetMonitor:
     def __init__(
         self, fleet: Path, log: Path, told: Callable[[Mapping[str, VehicleReport]], None]
     ) -> None:
-        """Watch the vehicles of the environment file `fleet`; `told` is called with all news."""
+        """Watch the vehicles of the environment file `fleet`; `told` is called with all report."""
         self._command = [sys.executable, "-m", "aerodaas.service.monitor", str(fleet)]
         self._log = log
         self._told = told
@@ -47,10 +47,10 @@ class FleetMonitor:
         self._wanted: frozenset[str] = frozenset()
         self._let_go_at: dict[str, float] = {}
         """Since when each vehicle is to be let go of, by `time.monotonic`."""
-        self._news = MonitorReport(number=0)
+        self._report = MonitorReport(number=0)
         self._closed = False
 
-    def watch(self, robots: Collection[str]) -> None:
+    def hold(self, robots: Collection[str]) -> None:
         """Hold these vehicles from now on and let go of all others; call it every second or so."""
         now = time.monotonic()
         with self._lock:
@@ -92,12 +92,12 @@ class FleetMonitor:
             return False
         if self._process is None or self._process.poll() is not None:
             return True
-        obeyed = self._news.number == self._number
-        return obeyed and not self._news.robots.get(robot, VehicleReport()).held
+        obeyed = self._report.number == self._number
+        return obeyed and not self._report.robots.get(robot, VehicleReport()).held
 
     def _start(self, now: float) -> None:
         self._started_at = now
-        self._news = MonitorReport(number=-1)
+        self._report = MonitorReport(number=-1)
         with self._log.open("ab") as log:
             process = self._process = subprocess.Popen(  # noqa: S603 - our own module
                 self._command,
@@ -130,12 +130,12 @@ class FleetMonitor:
         with process.stdout as lines:
             for line in lines:
                 try:
-                    news = MonitorReport.model_validate_json(line)
+                    report = MonitorReport.model_validate_json(line)
                 except ValidationError:
                     continue
                 with self._lock:
                     if process is not self._process:
                         return
-                    self._news = news
-                self._told(news.robots)
+                    self._report = report
+                self._told(report.robots)
         self._told({})

@@ -46,7 +46,7 @@ class VehicleWatcher:
         self._changed = changed
         self._lock = threading.Condition()
         self._wanted = False
-        self._news = VehicleReport()
+        self._report = VehicleReport()
         self._read_at = -math.inf
         """Monotonic seconds of the newest reading."""
 
@@ -61,15 +61,15 @@ class VehicleWatcher:
             self._lock.notify_all()
 
     @property
-    def news(self) -> VehicleReport:
+    def report(self) -> VehicleReport:
         """The vehicle as it was last seen; lost, if its driver has hung since."""
         with self._lock:
-            news, silence = self._news, time.monotonic() - self._read_at
-        if news.link is not LinkState.CONNECTED or silence <= _SILENT_SECONDS:
-            return news
+            report, silence = self._report, time.monotonic() - self._read_at
+        if report.link is not LinkState.CONNECTED or silence <= _SILENT_SECONDS:
+            return report
         reason = f"its driver has not answered for {silence:.0f} s"
-        return news.model_copy(
-            update={"link": LinkState.LOST, "since": news.heard, "reason": reason}
+        return report.model_copy(
+            update={"link": LinkState.LOST, "since": report.heard, "reason": reason}
         )
 
     def _run(self) -> None:
@@ -78,7 +78,7 @@ class VehicleWatcher:
             with self._lock:
                 self._lock.wait_for(lambda: self._wanted)
                 # Under the lock: from here on it is held, before anything is opened.
-                self._news = self._news.model_copy(update={"held": True})
+                self._report = self._report.model_copy(update={"held": True})
             reached = self._hold()
             pause = _PAUSE if reached else min(2.0 * pause, _LONGEST_PAUSE)
             with self._lock:
@@ -87,9 +87,9 @@ class VehicleWatcher:
     def _hold(self) -> bool:
         """Connect, and watch until it is wanted no more or lost; returns whether it was reached."""
         reached, reason = False, ""
-        if self._news.link is LinkState.UNWATCHED:
+        if self._report.link is LinkState.UNWATCHED:
             fresh = VehicleReport(held=True, link=LinkState.CONNECTING, since=time.time())
-            self._tell(**dict(fresh))
+            self._update(**dict(fresh))
         try:
             vehicle = load_vehicle(self._robot, self._environment, observing=True)
             vehicle.connect(_CONNECT_SECONDS)
@@ -107,7 +107,7 @@ class VehicleWatcher:
         if wanted:
             self._lose(reason, held=False)
         else:
-            self._tell(link=LinkState.UNWATCHED, since=time.time(), held=False, reason="")
+            self._update(link=LinkState.UNWATCHED, since=time.time(), held=False, reason="")
         return reached
 
     def _watch(self, vehicle: Vehicle) -> str:
@@ -133,9 +133,9 @@ class VehicleWatcher:
             else:
                 self._see(state, objections, now)
                 if items is not None:
-                    self._tell(health=tuple(items), examined=now)
+                    self._update(health=tuple(items), examined=now)
             if not state.armed and self._silence() > _ANEW_SECONDS:
-                return self._news.reason
+                return self._report.reason
             with self._lock:
                 unwanted = self._lock.wait_for(lambda: not self._wanted, _READ_SECONDS)
             if unwanted and not state.armed:
@@ -145,18 +145,18 @@ class VehicleWatcher:
 
     def _silence(self) -> float:
         """Seconds since the vehicle was heard last, while its link is lost."""
-        lost = self._news.link is LinkState.LOST
+        lost = self._report.link is LinkState.LOST
         return time.monotonic() - self._read_at if lost else 0.0
 
     def _see(self, state: VehicleState, objections: list[str], now: float) -> None:
         charge = state.battery.fraction
         place = tuple(float(axis) for axis in state.odometry.position)
-        connected = self._news.link is LinkState.CONNECTED
+        connected = self._report.link is LinkState.CONNECTED
         with self._lock:
             self._read_at = time.monotonic()
-        self._tell(
+        self._update(
             link=LinkState.CONNECTED,
-            since=self._news.since if connected else now,
+            since=self._report.since if connected else now,
             reason="",
             heard=now,
             battery=charge if math.isfinite(charge) else None,
@@ -167,14 +167,14 @@ class VehicleWatcher:
         )
 
     def _lose(self, reason: str, **more: object) -> None:
-        news = self._news
-        before = time.time() if news.heard is None else news.heard
-        since = news.since if news.link is LinkState.LOST else before
-        self._tell(link=LinkState.LOST, since=since, reason=reason, **more)
+        report = self._report
+        before = time.time() if report.heard is None else report.heard
+        since = report.since if report.link is LinkState.LOST else before
+        self._update(link=LinkState.LOST, since=since, reason=reason, **more)
 
-    def _tell(self, **changes: object) -> None:
+    def _update(self, **changes: object) -> None:
         with self._lock:
-            before, self._news = self._news, self._news.model_copy(update=changes)
-            told = (before.link, before.held) != (self._news.link, self._news.held)
+            before, self._report = self._report, self._report.model_copy(update=changes)
+            told = (before.link, before.held) != (self._report.link, self._report.held)
         if told:
             self._changed()

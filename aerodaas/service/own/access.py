@@ -63,10 +63,10 @@ class FlightTokens:
             remedy: Where a token is to be found.
             anybody: Account of all who ask, if they need no token.
         """
-        self.tell: Callable[[str], None] = lambda _: None
+        self.alert: Callable[[str], None] = lambda _: None
         """Tells people of many wrong tokens."""
         self._tokens = tokens
-        self._wrong = WrongTokens(self._tell, server=what)
+        self._wrong = WrongTokens(self._alert, server=what)
         self._remedy = remedy
         self._anybody = anybody
         self._lock = threading.Lock()
@@ -91,5 +91,5 @@ class FlightTokens:
             raise RefusedError(429, "too many wrong tokens", retry_after=pause)
         raise RefusedError(401, f"wrong or missing token: {self._remedy}")
 
-    def _tell(self, text: str) -> None:
-        self.tell(text)
+    def _alert(self, text: str) -> None:
+        self.alert(text)

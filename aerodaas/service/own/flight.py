@@ -79,7 +79,7 @@ class FlightMeter:
         """Mission seconds of the newest status."""
         return max((one.time for one in self.status.values()), default=0.0)
 
-    def note(self, state: FlightState) -> None:
+    def record(self, state: FlightState) -> None:
         """Take over a state of the run."""
         told = {}
         for name, report in state.robots.items():
@@ -177,7 +177,7 @@ class FlightRun(Protocol):
         """Execute a command on a robot's mission; raises AeroDaaSError."""
         ...
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert."""
         ...
 
@@ -205,12 +205,12 @@ class OwnFlight:
         """Whether a drone has obeyed a command since the last look."""
         self._closed = threading.Event()
         self._commands = ThreadPoolExecutor(_MOST_ASKED, "commands")
-        threading.Thread(target=self._look, name="console", daemon=True).start()
+        threading.Thread(target=self._poll_while_watched, name="console", daemon=True).start()
 
     def end(self) -> None:
         """Look no more: the flight is over."""
         if self._run.state is not None:
-            self._take(self._run.state)
+            self._record(self._run.state)
         self._closed.set()
 
     def close(self) -> None:
@@ -224,9 +224,9 @@ class OwnFlight:
         """What is flown in."""
         return self._run.config
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert."""
-        self._run.note(kind, text)
+        self._run.publish_alert(kind, text)
 
     @property
     def over(self) -> bool:
@@ -299,11 +299,11 @@ class OwnFlight:
             # One that still waits for its turn is never given: nobody expects it any more.
             asking.cancel()
             text = f"the drone did not answer within {_PATIENCE:g} s"
-            self._tell(asked, text)
+            self._alert(asked, text)
             raise SilentError(text) from None
         self._commanded = True
         word = "accepted" if answer.accepted else "refused"
-        self._tell(asked, f"{word}{': ' if answer.text else ''}{answer.text}")
+        self._alert(asked, f"{word}{': ' if answer.text else ''}{answer.text}")
         return answer
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
@@ -321,7 +321,7 @@ class OwnFlight:
         del principal, mission
         return False
 
-    def hear(self, mission: str) -> None:
+    def record_presence(self, mission: str) -> None:
         """Do nothing: see `flies`."""
 
     def version(self, mission: str) -> int:
@@ -376,10 +376,10 @@ class OwnFlight:
                 return StreamItem(stream.name, navigation, index=index, replaces=False)
         return command
 
-    def _tell(self, asked: str, answer: str) -> None:
+    def _alert(self, asked: str, answer: str) -> None:
         """Have an alert tell people of a command and its answer; not of one without words."""
         if asked:
-            self._run.note("console_command", f"{asked}: {answer}")
+            self._run.publish_alert("console_command", f"{asked}: {answer}")
 
     def _shown(self) -> MissionOut:
         states = {one.state for one in self.meter.status.values()}
@@ -407,28 +407,28 @@ class OwnFlight:
         """
         watched, self._asked = self._watched, time.monotonic()
         if self._commanded or not watched:
-            self._look_once()
+            self._poll()
 
     @property
     def _watched(self) -> bool:
         return time.monotonic() - self._asked < _WATCHED_SECONDS
 
-    def _look(self) -> None:
+    def _poll_while_watched(self) -> None:
         while not self._closed.wait(_LOOK_SECONDS):
             if self._watched:
-                self._look_once()
+                self._poll()
 
-    def _look_once(self) -> None:
+    def _poll(self) -> None:
         if self.over or self._run.over:
             return
         self._commanded = False
         # The thread that waits for the run meets the same error and handles it.
         with contextlib.suppress(AeroDaaSError):
-            self._take(self._run.look(0))
+            self._record(self._run.look(0))
 
-    def _take(self, state: FlightState) -> None:
+    def _record(self, state: FlightState) -> None:
         with self._looking:
-            self.meter.note(state)
+            self.meter.record(state)
             self._version += 1
 
 

@@ -68,9 +68,9 @@ class ApiServer(AppServer):
         token = self._tokens.token(Role.VIEWER if viewer else Role.PILOT)
         return f"http://{host}:{self._port}/#token={token}"
 
-    def serve(self, build: Callable[[Admission], FastAPI], tell: Callable[[str], None]) -> None:
-        """Serve what `build` makes, in a thread; `tell` tells people of many wrong tokens."""
-        self._tokens.tell = tell
+    def serve(self, build: Callable[[Admission], FastAPI], alert: Callable[[str], None]) -> None:
+        """Serve what `build` makes, in a thread; `alert` alerts people of many wrong tokens."""
+        self._tokens.alert = alert
         app = build(Admission(self._tokens))
         self.start(lambda: self._guard(app, self._host))
 
@@ -102,7 +102,7 @@ class FlightServer(ApiServer):
         """Serve a flight that has begun."""
         self.serve(
             lambda admission: flight_app(flight, admission, framed=self.framed),
-            lambda text: flight.note("wrong_tokens", text),
+            lambda text: flight.publish_alert("wrong_tokens", text),
         )
 
 

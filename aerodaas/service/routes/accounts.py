@@ -100,7 +100,7 @@ class AccountRoutes:
         principal = self._admission.require(request, Role.VIEWER)
         if principal.role.reaches(Role.ADMIN):
             return [_tenant_out(one) for one in self._store.tenants.all()]
-        return [_tenant_out(self._store.tenants.demand(principal.tenant))]
+        return [_tenant_out(self._store.tenants.require(principal.tenant))]
 
     def change_tenant(self, name: str, body: TenantChange, request: Request) -> TenantOut:
         """Change what a tenant may use: of missions that begin from now on."""

@@ -77,7 +77,7 @@ class Rows(Generic[Kind]):
         with self._database.reading() as session:
             return session.get(self._kind, key)
 
-    def demand(self, key: str) -> Kind:
+    def require(self, key: str) -> Kind:
         """The row of a key.
 
         Raises:

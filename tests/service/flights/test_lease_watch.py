@@ -100,7 +100,7 @@ def test_a_user_who_is_heard_is_not_silent() -> None:
     lease = watch(drones, LONG, silence=SilencePolicy.RETURN, silence_seconds=1.0)
     lease.start()
     for _ in range(8):
-        lease.hear()
+        lease.record_presence()
         assert not drones.called.wait(0.25)
     assert drones.called.wait(10)
 

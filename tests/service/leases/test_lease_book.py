@@ -104,10 +104,10 @@ def test_what_is_unknown_of_a_drone_fits_nothing(book: LeaseBook) -> None:
 def test_a_lease_is_over_to_the_second(book: LeaseBook) -> None:
     """It holds nothing from then on, even before anybody was told."""
     lease = ask(book, "near", minutes=1)
-    assert book.tick(NOW + 59.9, FLEET) == ()
+    assert book.advance(NOW + 59.9, FLEET) == ()
     assert book.holder("near", NOW + 59.9) == lease
     assert book.holder("near", NOW + 60) is None
-    (ended,) = book.tick(NOW + 75, FLEET)
+    (ended,) = book.advance(NOW + 75, FLEET)
     assert (ended.end, ended.ended) == (LeaseEnd.EXPIRED, NOW + 60)
     assert book.live() == []
 
@@ -119,8 +119,8 @@ def test_a_drone_that_still_comes_home_is_nobody_elses(book: LeaseBook) -> None:
     flying = FLEET | {"near": replace(FLEET["near"], busy=True)}
     (ended,) = book.revoke(first.id, "a storm", NOW, flying)
     assert (ended.end, ended.reason) == (LeaseEnd.REVOKED, "a storm")
-    assert book.tick(NOW + 1, flying) == ()
-    (granted,) = book.tick(NOW + 2, FLEET)
+    assert book.advance(NOW + 1, flying) == ()
+    (granted,) = book.advance(NOW + 2, FLEET)
     assert granted.id == second.id
 
 
@@ -205,7 +205,7 @@ def test_a_restart_finds_its_leases_and_ends_those_that_are_over(store: Store) -
     again = LeaseBook(store.leases)
     assert again.live() == book.live()
     assert again.holder("near", NOW + 61) is None
-    news = again.tick(NOW + 61, FLEET)
+    news = again.advance(NOW + 61, FLEET)
     assert [(one.id, one.state) for one in news] == [
         (short.id, LeaseState.ENDED),
         (waits[0].id, LeaseState.GRANTED),
@@ -226,23 +226,23 @@ def test_while_the_database_is_gone_leases_end_and_none_is_granted(tmp_path: Pat
         with pytest.raises(StoreError, match="is gone"):
             ask(book, "far")
         assert book.holder("far", NOW) is None
-        assert [one.id for one in book.tick(NOW + 60, FLEET)] == [first.id]
+        assert [one.id for one in book.advance(NOW + 60, FLEET)] == [first.id]
         assert book.unsaved == 1
         assert states(book, second) == ["queued"]
         (tmp_path / "away.db").rename(path)
-        assert [one.id for one in book.tick(NOW + 61, FLEET)] == [second.id]
+        assert [one.id for one in book.advance(NOW + 61, FLEET)] == [second.id]
         assert book.unsaved == 0
-        assert store.leases.demand(first.id).end is LeaseEnd.EXPIRED
+        assert store.leases.require(first.id).end is LeaseEnd.EXPIRED
         assert ask(book, "far").state is LeaseState.GRANTED
 
 
 def test_a_change_that_is_refused_leaves_its_news_to_the_next(book: LeaseBook) -> None:
     """So that no flight is forgotten."""
     first, second = ask(book, "near", minutes=1), ask(book, "near")
-    book.tick(NOW, FLEET)
+    book.advance(NOW, FLEET)
     with pytest.raises(RefusedError, match="no lease"):
         book.extend("unknown", 1, NOW + 60, FLEET)
-    news = book.tick(NOW + 60, FLEET)
+    news = book.advance(NOW + 60, FLEET)
     assert [one.id for one in news] == [first.id, second.id]
 
 

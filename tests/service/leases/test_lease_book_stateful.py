@@ -95,7 +95,7 @@ class Leases(RuleBasedStateMachine):
         assert not resting
         assert not self.fails()
         self.asked[lease.id] = replace(lease, state=LeaseState.QUEUED, robots=())
-        self.hear(news)
+        self.record_presence(news)
 
     @precondition(lambda self: self.book.live())
     @rule(data=st.data(), minutes=st.sampled_from([1.0, 20.0]))
@@ -105,14 +105,14 @@ class Leases(RuleBasedStateMachine):
         try:
             longer, news = self.book.extend(lease.id, minutes, self.now, self.fleet)
         except (RefusedError, StoreError):
-            self.tick()
+            self.advance()
             return
         # One that was queued, and whose turn has come since anybody looked, is granted first.
         before = self.now + 60 * lease.minutes if lease.ends is None else lease.ends
         assert longer.ends == before + 60 * minutes
         for other in self.queued():
             assert not self.usable(other) & set(longer.robots)
-        self.hear(news)
+        self.record_presence(news)
 
     @precondition(lambda self: self.book.live())
     @rule(data=st.data(), revoked=st.booleans())
@@ -126,19 +126,19 @@ class Leases(RuleBasedStateMachine):
         else:
             news = self.book.give_back(lease.id, self.now, self.fleet)
         assert [one.end is not None for one in news if one.id == lease.id][-1]
-        self.hear(news)
+        self.record_presence(news)
 
     @rule(seconds=st.sampled_from([1.0, 59.0, 60.0, 300.0, 4000.0]), looks=st.booleans())
     def pass_time(self, seconds: float, *, looks: bool) -> None:
         """Somebody looks afterwards, or nobody does."""
         self.now += seconds
         if looks:
-            self.tick()
+            self.advance()
 
     @rule()
-    def tick(self) -> None:
+    def advance(self) -> None:
         """Nothing that somebody can use lies idle."""
-        self.hear(self.book.tick(self.now, self.fleet))
+        self.record_presence(self.book.advance(self.now, self.fleet))
         for lease in self.book.live():
             assert lease.ends is None or lease.ends > self.now
         if self.fails():
@@ -184,7 +184,7 @@ class Leases(RuleBasedStateMachine):
         """What was told, or will be, is what the next book finds; the time goes on meanwhile."""
         if self.fails():
             return
-        self.hear(self.book.tick(self.now, self.fleet))
+        self.record_presence(self.book.advance(self.now, self.fleet))
         before = self.book.live()
         self.book = LeaseBook(self.shelf, lambda: next(self.ids))
         assert self.book.live() == before
@@ -202,7 +202,7 @@ class Leases(RuleBasedStateMachine):
         for robot in ROBOTS:
             assert (self.book.holder(robot, self.now) is not None) == (robot in held)
 
-    def hear(self, news: tuple[Lease, ...]) -> None:
+    def record_presence(self, news: tuple[Lease, ...]) -> None:
         """Each change of state is told once, in order, and keeps to the queue."""
         for lease in news:
             before = self.told.get(lease.id)

@@ -42,7 +42,7 @@ class Told:
         end = time.monotonic() + 30.0
         while not condition():
             assert time.monotonic() < end, self.news
-            self.monitor.watch(wanted)
+            self.monitor.hold(wanted)
             time.sleep(0.05)
 
 
@@ -59,7 +59,7 @@ def test_what_is_wanted_is_held_and_what_is_not_is_let_go(told: Told) -> None:
     assert told.monitor.released(["one", "two"]), "before it is told to hold anything"
     told.until(lambda: told.link("one") is told.link("two") is LinkState.CONNECTED, "one", "two")
     assert not told.monitor.released(["one"])
-    told.monitor.watch(["two"])
+    told.monitor.hold(["two"])
     assert not told.monitor.released(["one"]), "it has not said so yet"
     told.until(lambda: told.monitor.released(["one"]), "two")
     assert told.link("one") is LinkState.UNWATCHED
@@ -69,8 +69,8 @@ def test_what_is_wanted_is_held_and_what_is_not_is_let_go(told: Told) -> None:
 
 def test_what_it_was_told_last_counts_before_it_has_obeyed(told: Told) -> None:
     """Its older news say nothing of what it is about to open."""
-    told.monitor.watch(["one"])
-    told.monitor.watch([])
+    told.monitor.hold(["one"])
+    told.monitor.hold([])
     assert not told.monitor.released(["one"])
     told.until(lambda: told.monitor.released(["one"]))
     assert told.link("one") is not LinkState.CONNECTED

@@ -89,7 +89,7 @@ def test_a_row_comes_back_as_it_was(store: Store, part: str, key: str, row: obje
     assert rows.get(key) is None
     rows.add(row)
     assert rows.get(key) == row
-    assert rows.demand(key) == row
+    assert rows.require(key) == row
     rows.put(row)
     assert rows.get(key) == row
     with pytest.raises(RefusedError, match="already") as refused:
@@ -101,7 +101,7 @@ def test_a_row_comes_back_as_it_was(store: Store, part: str, key: str, row: obje
 def test_a_text_of_a_stranger_harms_nothing(store: Store, text: str) -> None:
     """What a database cannot hold is replaced."""
     store.leases.put(replace(LEASE, reason=text))
-    kept = store.leases.demand("l1")
+    kept = store.leases.require("l1")
     assert kept.reason.isprintable()
     assert len(kept.reason) == len(text)
 
@@ -117,7 +117,7 @@ def test_another_opening_finds_it_again(place: str | Path) -> None:
 def test_what_is_not_there_is_refused(store: Store) -> None:
     """By its key."""
     with pytest.raises(RefusedError, match="no mission m9") as refused:
-        store.missions.demand("m9")
+        store.missions.require("m9")
     assert refused.value.status == 404
     with pytest.raises(RefusedError, match="no mission m9"):
         store.missions.update("m9", lambda row: row)
@@ -134,19 +134,19 @@ def test_what_a_new_row_does_not_say_replaces_what_was_kept(store: Store) -> Non
     """Its defaults are as good as other values."""
     store.robots.put(RobotState("a", enabled=False, battery=0.5, position=(1.0, 2.0, 3.0)))
     store.robots.put(RobotState("a"))
-    assert store.robots.demand("a") == RobotState("a")
+    assert store.robots.require("a") == RobotState("a")
     store.robots.put(RobotState("a", battery=0.5))
     store.robots.update("a", lambda _: RobotState("a"))
-    assert store.robots.demand("a") == RobotState("a")
+    assert store.robots.require("a") == RobotState("a")
 
 
 def test_a_row_that_was_read_changes_nothing_by_itself(store: Store) -> None:
     """It belongs to no transaction, whoever changes it later."""
     store.robots.add(RobotState("a", battery=0.5))
-    row = store.robots.demand("a")
+    row = store.robots.require("a")
     row.battery = 0.1
     store.robots.put(RobotState("b"))
-    assert store.robots.demand("a").battery == 0.5
+    assert store.robots.require("a").battery == 0.5
 
 
 def test_a_change_that_fails_changes_nothing(store: Store) -> None:
@@ -158,7 +158,7 @@ def test_a_change_that_fails_changes_nothing(store: Store) -> None:
 
     with pytest.raises(RefusedError, match="no"):
         store.robots.update("a", refuse)
-    assert store.robots.demand("a").battery == 0.5
+    assert store.robots.require("a").battery == 0.5
 
 
 def test_threads_and_programs_change_one_row_one_after_the_other(
@@ -184,7 +184,7 @@ def test_threads_and_programs_change_one_row_one_after_the_other(
         for thread in threads:
             thread.join()
     assert not errors
-    assert store.usage.demand("m1").cloud_calls == 80
+    assert store.usage.require("m1").cloud_calls == 80
 
 
 def test_lists_have_what_is_asked_for_in_order(store: Store) -> None:

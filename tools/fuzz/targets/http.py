@@ -123,7 +123,7 @@ class _Link:
         del robot
         return self.flight.mission.handle(command, self._now)
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         require(f"{kind}{text}".isprintable(), "an alert that cannot be printed")
 
 
