@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from aerodaas.analytics.here.analysis import HereSite
-from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.here.relay import HereRelay, attach_absent_user
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.dataflow.graph import Graph
@@ -23,7 +23,6 @@ from aerodaas.environment.run import Run
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.runtime.reports import FlightState
-from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.orders import FlightOrder, Outcome

@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.here.channel import Channel, ChannelError
+from aerodaas.analytics.here.relay import Channel, ChannelError
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.document.compiling import write_mission
-from aerodaas.environment.here_server import HereServer
 from aerodaas.environment.offering import offered, the_only
+from aerodaas.environment.provider.here import HereServer
 
 _LATER = 60
 """Answers after which it misbehaves, in the air."""

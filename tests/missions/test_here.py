@@ -19,8 +19,7 @@ from flying import FLAT, Flyer, recorded
 
 from aerodaas import Environment
 from aerodaas.analytics.here.analysis import HereSite
-from aerodaas.analytics.here.channel import Channel, ChannelError
-from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.here.relay import Channel, ChannelError, HereRelay
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.document.building import build_mission
 from aerodaas.errors import MissionError

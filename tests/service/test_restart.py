@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from served import document, fleet, robot
-from test_desk import PILOT, MissionsAlone
+from test_mission_service import PILOT, MissionsAlone
 
 from aerodaas.errors import MissionError
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, MissionOut, MissionPhase, Role, Scope

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.analytics.here.channel import Channel, ChannelError
+from aerodaas.analytics.here.relay import Channel, ChannelError
 from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.errors import ModelError
 from aerodaas.messages.frames import Header

@@ -1,14 +1,17 @@
-"""HereRelay: takes questions of a flight's nodes to the user's side, and the answers back.
+"""Relay between the nodes of a flight and its user's side: questions go there, answers come back.
 
 It lives in the flight's process. Stand-ins (`HereAnalysis`) connect to its Unix socket, each with
-one question at a time; the user's side is whatever connection the flight attaches to it.
+one question at a time; the user's side is whatever connection the flight attaches to it. A message
+on the socket is JSON and one blob, both of a bounded size.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import queue
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -16,11 +19,102 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from aerodaas.analytics.here.channel import Channel, ChannelError
-from aerodaas.errors import ConfigError
+from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.unix_server import UnixServer
 
-__all__ = ["LARGEST_ANSWER", "HereRelay", "HereTimes", "HereUser", "Send", "oversize"]
+__all__ = [
+    "HEAD",
+    "LARGEST_ANSWER",
+    "LARGEST_TEXT",
+    "Channel",
+    "ChannelError",
+    "HereRelay",
+    "HereTimes",
+    "HereUser",
+    "Send",
+    "attach_absent_user",
+    "oversize",
+]
+
+LARGEST_TEXT = 4 << 20
+"""Bytes of a message's JSON."""
+_LARGEST_BLOB = 64 << 20
+"""Bytes of a message's blob: a picture."""
+HEAD = struct.Struct("<II")
+"""Before each message: bytes of its JSON, and of its blob."""
+
+
+class ChannelError(AeroDaaSError):
+    """The other process has ended, is silent, or sent what is no valid message."""
+
+
+class Channel:
+    """One end of a connection."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        """Exchange messages over `connection`."""
+        self._socket = connection
+
+    def send(self, text: dict[str, Any], blob: bytes = b"", timeout: float | None = None) -> None:
+        """Send one message; raises ChannelError if it is too large or not taken in time."""
+        data = json.dumps(text).encode()
+        if len(data) > LARGEST_TEXT or len(blob) > _LARGEST_BLOB:
+            raise ChannelError(f"a message of {len(data)} and {len(blob)} bytes is too large")
+        try:
+            self._socket.settimeout(timeout)
+            self._socket.sendall(HEAD.pack(len(data), len(blob)) + data + blob)
+        except TimeoutError:
+            raise ChannelError(f"took no message for {timeout:g} s") from None
+        except OSError as error:
+            raise ChannelError(f"its process has ended ({error.strerror})") from None
+
+    def receive(self, timeout: float | None = None) -> tuple[dict[str, Any], bytes]:
+        """Receive one message; raises ChannelError for none in time, and for a malformed one."""
+        data, blob = self.receive_bytes(timeout)
+        try:
+            found = json.loads(data)
+        except (ValueError, RecursionError):
+            raise ChannelError("sent a message that is not JSON") from None
+        if not isinstance(found, dict):
+            raise ChannelError("sent a message that is no JSON object")
+        return found, blob
+
+    def receive_bytes(self, timeout: float | None = None) -> tuple[bytes, bytes]:
+        """As `receive`, with the JSON as it came."""
+        until = None if timeout is None else time.monotonic() + timeout
+        text, blob = HEAD.unpack(self._read(HEAD.size, until))
+        if text > LARGEST_TEXT or blob > _LARGEST_BLOB:
+            raise ChannelError(
+                f"sent a message of {text} and {blob} bytes; the most are {LARGEST_TEXT} and "
+                f"{_LARGEST_BLOB}"
+            )
+        return self._read(text, until), self._read(blob, until)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+    def _read(self, size: int, until: float | None) -> bytes:
+        data = bytearray()
+        while len(data) < size:
+            left = None if until is None else max(1e-3, until - time.monotonic())
+            try:
+                self._socket.settimeout(left)
+                part = self._socket.recv(min(1 << 20, size - len(data)))
+            except TimeoutError:
+                part = b""
+                if until is not None and time.monotonic() >= until:
+                    raise ChannelError("did not answer in time") from None
+                continue
+            except OSError as error:
+                raise ChannelError(f"its process has ended ({error.strerror})") from None
+            if not part:
+                raise ChannelError("its process has ended")
+            data += part
+            if until is not None and time.monotonic() > until and len(data) < size:
+                raise ChannelError("did not answer in time")
+        return bytes(data)
+
 
 Send: TypeAlias = Callable[[dict[str, Any], bytes], None]
 """Sends one question, JSON and a blob, towards the user without waiting; raises if it cannot."""
@@ -249,3 +343,16 @@ def _checked(content: dict[str, Any], blob: bytes) -> dict[str, Any]:
     except (TypeError, ValueError, RecursionError) as error:
         wrong = f"an answer that is no JSON: {error}"[:200]
     return {"failed": wrong} if wrong else {key: content[key] for key in _PARTS if key in content}
+
+
+def attach_absent_user(relay: HereRelay) -> None:
+    """Answer the relay's questions with no result: code at the user's side is not rehearsed."""
+    questions: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    user = relay.attach(lambda question, _: questions.put(question))
+
+    def answer() -> None:
+        while True:
+            number = questions.get()["number"]
+            user.answered({"number": number, "item": None, "fired": [], "alerts": []})
+
+    threading.Thread(target=answer, name="absent user", daemon=True).start()

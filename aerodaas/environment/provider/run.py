@@ -17,7 +17,7 @@ from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.commands import send_command
 from aerodaas.environment.provider.follower import MissionFollower
-from aerodaas.environment.provider.here import HereLink
+from aerodaas.environment.provider.here import HereLink, HereServer
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
@@ -240,8 +240,6 @@ class ProvidedRun:
         """Serve what stays at this side, if anything does."""
         if not written.document.here:
             return
-        from aerodaas.environment.here_server import HereServer  # noqa: PLC0415 - only then
-
         server = HereServer(self._environment, written.document)
         server.open()
         self._here = HereLink(self._client, self._following, server, self._say)

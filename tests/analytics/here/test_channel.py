@@ -7,7 +7,7 @@ import struct
 
 import pytest
 
-from aerodaas.analytics.here.channel import LARGEST_TEXT, Channel, ChannelError
+from aerodaas.analytics.here.relay import LARGEST_TEXT, Channel, ChannelError
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from aerodaas.dataflow.mission_document import (
 )
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
-from aerodaas.environment.here_server import HereServer
+from aerodaas.environment.provider.here import HereServer
 from aerodaas.errors import AeroDaaSError, GraphError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.readings import Alert, Readings

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.analytics.here.channel import HEAD, Channel, ChannelError
+from aerodaas.analytics.here.relay import HEAD, Channel, ChannelError
 from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.detections import Detection, Detections
