@@ -51,7 +51,7 @@ class Monitor:
         self.wanted: set[str] = set()
         self.held: set[str] = set()
 
-    def watch(self, robots: Collection[str]) -> None:
+    def hold(self, robots: Collection[str]) -> None:
         """Hold these; what was held stays so until a test lets go of it."""
         self.wanted = set(robots)
         self.held |= self.wanted

@@ -331,9 +331,9 @@ def test_leases_end_while_the_database_is_gone(
 
     with monkeypatch.context() as broken:
         broken.setattr(one.store.missions, "put", gone)
-        broken.setattr(one.leases, "tick", lambda: ticks.append(True))
+        broken.setattr(one.leases, "advance", lambda: ticks.append(True))
         queued = one.missions._missions[mission.id]
-        broken.setattr(queued, "flown", gone)
+        broken.setattr(queued, "flight_outcome", gone)
         with pytest.raises(StoreError):
             one.turns(1)
     assert ticks
@@ -351,7 +351,7 @@ def test_what_fails_each_turn_is_logged_once(
         raise next(failures, KeyError("ours"))
 
     with monkeypatch.context() as broken:
-        broken.setattr(one.leases, "tick", failing)
+        broken.setattr(one.leases, "advance", failing)
         for _ in range(5):
             one.missions._try()
     for _ in range(2):
@@ -372,7 +372,7 @@ def test_so_is_a_flight_that_cannot_be_heard(
     mission = one.submit("one")
     one.turns()
     with monkeypatch.context() as broken:
-        broken.setattr(one.missions._missions[mission.id], "flown", _unreadable)
+        broken.setattr(one.missions._missions[mission.id], "flight_outcome", _unreadable)
         one.turns(3)
     one.turns(2)
     assert one.phase(mission) is MissionPhase.FLYING

@@ -79,14 +79,14 @@ def test_the_fleets_state_says_so() -> None:
         watcher.want(wanted=True)
 
         def lost() -> bool:
-            seen.append(watcher.news.link)
-            return watcher.news.link is LinkState.LOST
+            seen.append(watcher.report.link)
+            return watcher.report.link is LinkState.LOST
 
         wait_for(lost)
-        assert TRUTH in watcher.news.reason
+        assert TRUTH in watcher.report.reason
         assert LinkState.CONNECTED not in seen
         watcher.want(wanted=False)
-        wait_for(lambda: not watcher.news.held)
+        wait_for(lambda: not watcher.report.held)
 
 
 def test_preflight_says_so(
