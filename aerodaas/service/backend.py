@@ -1,4 +1,4 @@
-"""What the API shows and commands: missions and a fleet, whoever flies them."""
+"""Interfaces of the API to missions and a fleet, of a provider or of one's own flight."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from aerodaas.service.access.principal import Principal
 __all__ = ["Fleet", "Missions", "PilotCommand", "ShownMissions"]
 
 PilotCommand: TypeAlias = CommandIn | NavigationIn | RearrangeIn | ActuateIn | ControlsIn
-"""What a pilot asks of one robot of a mission."""
+"""Command of a pilot to one robot of a mission."""
 
 
 class ShownMissions(Protocol):

@@ -1,4 +1,4 @@
-"""The registry: what is known of each drone, between its missions as well."""
+"""Registry of the fleet: state of each drone, between its missions as well."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class FleetRegistry:
             return dict(self._states)
 
     def report(self, robot: str) -> VehicleReport:
-        """Link, mode and faults of a robot."""
+        """Newest report of a robot: its link, mode and faults."""
         with self._lock:
             return self._reports[robot]
 

@@ -53,7 +53,7 @@ class FleetView:
         return self._missions.preflight(robot) or known
 
     def fleet_scenery(self) -> SceneryOut:
-        """What lies below the fleet on a map; raises ConfigError if its world cannot be read."""
+        """Ground below the fleet on a map; raises ConfigError if its world cannot be read."""
         return self._scenery
 
     @cached_property

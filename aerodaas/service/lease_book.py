@@ -138,7 +138,7 @@ MINUTE = 60.0
 
 
 def expired(live: Iterable[Lease], now: float) -> list[Lease]:
-    """Those whose time is over, as ended."""
+    """Leases whose time is over, as ended."""
     return [
         replace(
             lease,
@@ -153,7 +153,7 @@ def expired(live: Iterable[Lease], now: float) -> list[Lease]:
 
 
 def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
-    """Those of the queue that can have their drones now, as granted.
+    """Leases of the queue that can have their drones now, as granted.
 
     Each lease that must wait keeps the robots it waits for from all later ones: of several robots,
     those that are free stay so for it, or it might never find them free together.
@@ -205,10 +205,10 @@ _LONGEST = 24 * 60
 
 
 class LeaseTable(Protocol):
-    """What the book keeps its leases in: `Store.leases`."""
+    """Table in which the book keeps its leases: `Store.leases`."""
 
     def live(self) -> list[Lease]:
-        """Those queued or granted, in the queue's order."""
+        """Leases queued or granted, in the queue's order."""
         ...
 
     def put(self, *rows: Lease) -> None:
@@ -375,7 +375,7 @@ class LeaseBook:
                     self._live[lease.id] = self._unsaved[lease.id] = moved
 
     def live(self) -> list[Lease]:
-        """Those queued or granted, in the queue's order."""
+        """Leases queued or granted, in the queue's order."""
         with self._lock:
             return list(self._live.values())
 

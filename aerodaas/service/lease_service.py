@@ -1,4 +1,4 @@
-"""LeaseService: the book of leases with the fleet as it is now, and the quotas of tenants."""
+"""Leases of a provider's fleet: the book of leases, the present fleet and tenants' quotas."""
 
 from __future__ import annotations
 

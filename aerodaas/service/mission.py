@@ -68,7 +68,7 @@ class ActiveMission:
         self.version = 0
         """Counts the changes."""
         self.waits_for = ""
-        """What it waits for in its phase, in words; empty if that is the reason of its row."""
+        """Reason for which it waits in its phase; empty if that is the reason of its row."""
         self.handing_over = False
         """Whether the monitor is to let go of its drones, for it flies next."""
         self._save = save
@@ -318,7 +318,7 @@ def shown(one: ActiveMission) -> MissionOut:
 
 
 def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
-    """What a mission has used."""
+    """Usage of a mission that is over."""
     return Usage(
         mission=mission.id,
         tenant=mission.tenant,

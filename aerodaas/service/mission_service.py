@@ -98,7 +98,7 @@ class MissionService:
         """Number of each tenant's last rehearsal."""
         self._rehearsal_places: dict[str, int] = {}
         self._in_flight: dict[str, ActiveMission] = {}
-        """Those of them that fly."""
+        """Missions of these that fly."""
         for row in store.missions.open():
             self._missions[row.id] = self._active(row)
             if row.phase is MissionPhase.FLYING:
@@ -274,7 +274,7 @@ class MissionService:
         return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """What lies below a mission that this account may see."""
+        """Ground below a mission that this account may see."""
         seed = self._seen(principal, mission).row.request.get("seed")
         return SceneryOut.of(self._settings.config, seed)
 

@@ -42,7 +42,7 @@ class Secret:
 
     @property
     def text(self) -> str:
-        """What a request carries."""
+        """Token as a request carries it."""
         return f"aerodaas_{self.id}_{self.secret}"
 
 
@@ -195,7 +195,7 @@ class Accounts:
         return _account_out(self._store.accounts.require(name))
 
     def all(self, tenant: str | None = None) -> list[AccountOut]:
-        """Those of a tenant, or all, by name."""
+        """Accounts of a tenant, or all, by name."""
         return [_account_out(row) for row in self._store.accounts.all(tenant)]
 
     def issue(self, request: TokenIn) -> TokenOut:
@@ -314,7 +314,7 @@ class Access:
         self._known: OrderedDict[str, tuple[Principal, float]] = OrderedDict()
 
     def of(self, token: str, address: str) -> Principal:
-        """Who sends a request.
+        """Find the account that sends a request.
 
         Args:
             token: What followed `Bearer` in its header; empty for none.
@@ -417,7 +417,7 @@ class Access:
         token: str,
         expires: float,
     ) -> Principal:
-        """Who sends a valid token of an account; remembered while the database does not answer."""
+        """Principal of a valid token; remembered while the database does not answer."""
         principal = Principal(
             account=account.name,
             tenant=account.tenant,

@@ -25,7 +25,7 @@ _STALE = 3600.0
 _AGAIN = 10.0
 """Least seconds between two fetches: made-up key ids do not make this service flood the issuer."""
 _FAILURES = (jwt.PyJWTError, ConfigError, OSError, ValueError, TypeError, RecursionError)
-"""What an issuer that is down, or that answers by something else, ends in."""
+"""Errors of an issuer that is down, or that answers by something else."""
 _DISCOVERY = "/.well-known/openid-configuration"
 
 

@@ -43,12 +43,12 @@ _WORD = re.compile(r"[^\W\d][\w\-]{0,63}")
 
 @dataclass(frozen=True)
 class OidcSettings:
-    """What the provider trusts an issuer with."""
+    """Settings by which the provider trusts an issuer."""
 
     issuer: str
     """URL, exactly as the issuer writes it."""
     audience: str
-    """What its tokens are for: this service."""
+    """Audience of its tokens: this service."""
     role_claim: str = "aerodaas_role"
     """Claim with a role or a list of them; dots go into objects."""
     tenant_claim: str = "aerodaas_tenant"
@@ -60,10 +60,10 @@ class OidcSettings:
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """What a valid token says."""
+    """Claims of a valid token."""
 
     subject: str
-    """Who, for ever: the issuer and its id of them."""
+    """Permanent id of the account: the issuer and its own id of it."""
     name: str
     """How to call them; others may be called so, too."""
     tenant: str
@@ -85,7 +85,7 @@ class OidcVerifier:
         """Invalid tokens since the last one that was told."""
 
     def issued(self, token: str) -> Issued | None:
-        """What a token says; None for one that is not valid here, whatever is wrong with it.
+        """Claims of a token; None for one that is not valid here, whatever is wrong with it.
 
         Raises:
             RefusedError: With status 403 for a valid one without tenant, or without a role that

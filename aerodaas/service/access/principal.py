@@ -1,4 +1,4 @@
-"""Who sends a request, and what they may do."""
+"""Principal of a request: its account, its role and its scopes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Principal:
     tenant: str
     role: Role
     scopes: frozenset[Scope]
-    """Those of the token that its account still has."""
+    """Scopes of the token that its account still has."""
     token: str
     """The token's id; an issuer's has its subject instead."""
 

@@ -1,4 +1,4 @@
-"""What a tenant may still use this month."""
+"""Quotas of tenants, and the rest of them in this month."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MINUTE = 60.0
 
 @dataclass(frozen=True, slots=True)
 class QuotasLeft:
-    """What a tenant may still use in a month; infinity where it has no quota."""
+    """Rest of a tenant's quotas in a month; infinity where it has no quota."""
 
     flight_minutes: float
     cloud_calls: float
@@ -36,7 +36,7 @@ class Quotas:
         self._store = store
 
     def left(self, tenant: str, now: float, committed: float = 0.0) -> QuotasLeft:
-        """What `tenant` may still use; below zero where it has used more than its quota.
+        """Rest of the quotas of `tenant`; below zero where it has used more than its quota.
 
         Args:
             tenant: Name of the tenant; an unknown one has no quotas.

@@ -1,4 +1,4 @@
-"""What missions have used, as a table."""
+"""Usage of missions as a table."""
 
 from __future__ import annotations
 

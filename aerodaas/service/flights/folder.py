@@ -51,7 +51,7 @@ class RobotLocks:
             yield
 
     def held(self, robots: Collection[str]) -> set[str]:
-        """Those of `robots` whose lock a living process holds."""
+        """Robots among `robots` whose lock a living process holds."""
         return {
             robot
             for robot in robots

@@ -176,7 +176,14 @@ class FlightOrders:
     def __init__(
         self, settings: ServiceSettings, store: Store, leases: LeaseService, registry: FleetRegistry
     ) -> None:
-        """Brief by these."""
+        """Write orders for one provider.
+
+        Args:
+            settings: Settings of the provider.
+            store: Its open database, which has the tenants' limits.
+            leases: Its leases, from whose areas rehearsed flights stay away.
+            registry: Its drones, with their charge.
+        """
         self._settings = settings
         self._store = store
         self._leases = leases

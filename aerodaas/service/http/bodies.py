@@ -79,7 +79,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _content(model: TypeAdapter[Any], body: bytes) -> Any:  # noqa: ANN401 - the model's
-    """What a body says; raises RequestValidationError, and RefusedError for one beyond bounds."""
+    """Content of a body; raises RequestValidationError, and RefusedError for one beyond limits."""
     values = max(body.count(b","), body.count(b":"))
     groups = body.count(b"{") + body.count(b"[")
     limits = RequestLimits

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["SUBPROTOCOL", "Admission", "Gate", "Tokens", "bearer"]
 
 SUBPROTOCOL = "aerodaas"
-"""What a browser's WebSocket speaks; beside it, its token: a browser sets no further headers."""
+"""Subprotocol of a browser's WebSocket, beside its token: a browser sets no further headers."""
 _BEARER = "bearer."
 
 
@@ -68,7 +68,7 @@ class Tokens(Protocol):
     """Tokens that are good, and whose they are."""
 
     def of(self, token: str, address: str) -> Principal:
-        """Who sends a `token` from an `address`; raises RefusedError for a wrong one."""
+        """Account of a `token` from an `address`; raises RefusedError for a wrong one."""
         ...
 
 

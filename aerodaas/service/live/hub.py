@@ -32,7 +32,7 @@ _KEY = "key"
 
 
 class Item(NamedTuple):
-    """What each watcher is sent."""
+    """Message to each watcher of a stream."""
 
     text: str
     """The message as JSON."""

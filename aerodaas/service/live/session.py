@@ -46,7 +46,7 @@ _IDLE_SECONDS = 1.0
 
 
 def wanted_streams(streams: str, form: PictureForm, depth: str) -> list[StreamRequest]:
-    """What is asked for by comma-separated lists of names, as much as one view may have.
+    """Streams that comma-separated lists of names ask for, as many as one view may have.
 
     Args:
         streams: Streams whose items are sent.

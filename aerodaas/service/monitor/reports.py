@@ -1,4 +1,4 @@
-"""What the service and its monitor's process say to each other: one JSON object a line."""
+"""Messages between the service and its monitor's process: one JSON object a line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class VehicleReport(_Line):
     mode: str = ""
     """One of `VehicleMode`."""
     faults: tuple[str, ...] = ()
-    """What the vehicle complains of."""
+    """Complaints of the vehicle."""
     objections: tuple[str, ...] = ()
     """Why the vehicle itself would refuse to take off now."""
     health: tuple[HealthItem, ...] = ()

@@ -76,7 +76,7 @@ class FlightTokens:
         return next(token for token, who in self._tokens.items() if who.role is role)
 
     def of(self, token: str, address: str) -> Principal:
-        """Who sends a token; raises RefusedError for a wrong one, from an `address`."""
+        """Account of a token; raises RefusedError for a wrong one, from an `address`."""
         if self._anybody is not None:
             return self._anybody
         # All of them are compared, each in constant time.

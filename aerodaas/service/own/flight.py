@@ -68,7 +68,7 @@ class FlightMeter:
         """The list before take-off by robot; replaced as the status is."""
         self.alerts: list[str] = []
         self.analytics: AnalyticsOut | None = None
-        """What the analytics scheduler has done; None before its first outcome."""
+        """Figures of the analytics scheduler; None before its first outcome."""
         self._places: dict[str, OrderedDict[str, _Place]] = defaultdict(OrderedDict)
         self._flown: dict[str, float] = defaultdict(float)
         self._charges: dict[str, tuple[float, float]] = {}
@@ -118,7 +118,7 @@ class FlightMeter:
         return status.model_copy(update={"places": dict(known)})
 
     def usage(self, reports: Mapping[str, ActorReport]) -> dict[str, Any]:
-        """What the flight has used, as `Outcome` has it; `reports` are its actors'."""
+        """Usage of the flight, as `Outcome` has it; `reports` are its actors'."""
         compute: dict[str, float] = defaultdict(float)
         calls = 0
         for name, report in reports.items():
@@ -156,7 +156,7 @@ class FlightRun(Protocol):
 
     @property
     def config(self) -> EnvironmentConfig:
-        """What is flown in."""
+        """Environment of the flight."""
         ...
 
     @property
@@ -166,7 +166,7 @@ class FlightRun(Protocol):
 
     @property
     def state(self) -> FlightState | None:
-        """What a look has found last."""
+        """State that was polled last."""
         ...
 
     def look(self, newest: int = 200) -> FlightState:
@@ -221,7 +221,7 @@ class OwnFlight:
 
     @property
     def config(self) -> EnvironmentConfig:
-        """What is flown in."""
+        """Environment of the flight."""
         return self._run.config
 
     def publish_alert(self, kind: str, text: str) -> None:
@@ -356,7 +356,7 @@ class OwnFlight:
 
     @cached_property
     def _ground(self) -> Ground | None:
-        """What is flown over; it is read when something is watched."""
+        """Terrain below the flight; it is read when a stream is watched."""
         return ground_of(self.config)
 
     def _as_stream_item(self, robot: str, command: AddNavigation) -> Command:

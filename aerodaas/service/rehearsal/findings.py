@@ -67,7 +67,7 @@ class Finding:
     """A reason to refuse a flight."""
 
     text: str
-    """What happened, with figures, and the remedy."""
+    """Event with its figures, and the remedy."""
     place: tuple[float, float] | None = None
     """Where it happened, metres east and north."""
 

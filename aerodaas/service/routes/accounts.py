@@ -144,7 +144,7 @@ class AccountRoutes:
         request: Request,
         form: Annotated[Literal["json", "csv"], Query(alias="format")] = "json",
     ) -> Any:  # noqa: ANN401 - JSON by its model, or CSV
-        """What missions have used: the tenant's own, or all for an operator."""
+        """Usage by mission: the tenant's own, or all for an operator."""
         principal = self._admission.require(request, Role.VIEWER)
         every = principal.role.reaches(Role.OPERATOR)
         rows = self._store.usage.all(None if every else principal.tenant)

@@ -43,7 +43,7 @@ class MissionRoutes:
         return self._missions.mission(self._admission.require(request, Role.VIEWER), mission)
 
     def scenery(self, mission: str, request: Request) -> SceneryOut:
-        """What lies below a mission on the map."""
+        """Ground below a mission on the map."""
         return self._missions.scenery(self._admission.require(request, Role.VIEWER), mission)
 
 

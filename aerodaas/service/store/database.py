@@ -109,7 +109,7 @@ class Database:
             )
 
     def _line(self, error: Exception) -> str:
-        """What went wrong, without the statement and its values, and the remedy."""
+        """Text of an error without the statement and its values, and the remedy."""
         said = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
         return f"{self._name}: {said}: {_remedy(said)}"
 

@@ -19,7 +19,7 @@ def _drop_tasks(session: Session) -> None:
 
 
 MIGRATIONS: dict[int, Callable[[Session], None]] = {2: _drop_tasks}
-"""What makes tables of the next version of those of a version; works on each kind of database."""
+"""Statements that turn the tables of a version into the next one's, on each kind of database."""
 VERSION = 3
 """Of the tables in `rows`: increased, with a migration, whenever they change."""
 

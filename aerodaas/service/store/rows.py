@@ -1,4 +1,4 @@
-"""What the service keeps: one mapped class a table, whose annotations are its columns.
+"""Rows of the service: one mapped class a table, whose annotations are its columns.
 
 A row is a plain value that belongs to no open transaction; `dataclasses.replace` makes a changed
 one. Moments are seconds of Unix time, lengths metres, durations as their names say.
@@ -87,7 +87,7 @@ _JSON = (
 
 
 class Row(MappedAsDataclass, DeclarativeBase):
-    """What every table's class is; its metadata holds the tables."""
+    """Base of every table's class; its metadata holds the tables."""
 
     type_annotation_map: ClassVar[dict[Any, Any]] = {
         str: _WordTuple(),
@@ -145,7 +145,7 @@ class Account(Row):
     created: Mapped[float]
     disabled: Mapped[bool] = mapped_column(default=False)
     subject: Mapped[str | None] = mapped_column(default=None, unique=True)
-    """Who it is at an OpenID Connect issuer: that one's URL and its id of them."""
+    """Subject at an OpenID Connect issuer: the issuer's URL and its id of the account."""
 
 
 class Token(Row):
@@ -192,7 +192,7 @@ class Lease(Row):
     area: Mapped[tuple[tuple[float, float], ...] | None] = mapped_column(default=None)
     state: Mapped[LeaseState] = mapped_column(default=LeaseState.QUEUED, index=True)
     robots: Mapped[tuple[str, ...]] = mapped_column(default=())
-    """Those that it holds or held; empty while it is queued."""
+    """Robots that it holds or held; empty while it is queued."""
     granted: Mapped[float | None] = mapped_column(default=None)
     ends: Mapped[float | None] = mapped_column(default=None)
     """When it expires, once it is granted."""
@@ -234,7 +234,7 @@ class Mission(Row):
 
 
 class RobotState(Row):
-    """What is known of a drone between its missions."""
+    """State of a drone between its missions."""
 
     __tablename__ = "robots"
 
@@ -248,7 +248,7 @@ class RobotState(Row):
 
 
 class AuditEntry(Row):
-    """Who did what, or tried to."""
+    """Entry of the audit log."""
 
     __tablename__ = "audit"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012 - SQLAlchemy's own
@@ -266,7 +266,7 @@ class AuditEntry(Row):
 
 
 class Usage(Row):
-    """What one mission has used."""
+    """Usage of one mission."""
 
     __tablename__ = "usage"
     __table_args__ = (Index("usage_by_month", "tenant", "started"),)

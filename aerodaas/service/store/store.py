@@ -139,7 +139,7 @@ class Accounts(Rows[Account]):
     """Accounts, by name."""
 
     def all(self, tenant: str | None = None) -> list[Account]:
-        """Those of a tenant, or all, by name."""
+        """Accounts of a tenant, or all, by name."""
         return self._select(tenant=tenant)
 
     def of_subject(self, subject: str) -> Account | None:
@@ -151,7 +151,7 @@ class Tokens(Rows[Token]):
     """Tokens, by id."""
 
     def all(self, account: str | None = None) -> list[Token]:
-        """Those of an account, or all, oldest first."""
+        """Tokens of an account, or all, oldest first."""
         return self._select(account=account, order=[Token.created])
 
     def owned(self, id_: str) -> tuple[Token, Account] | None:
@@ -168,7 +168,7 @@ class Leases(Rows[Lease]):
     """Leases, by id."""
 
     def live(self) -> list[Lease]:
-        """Those that are queued or granted, in the queue's order."""
+        """Leases that are queued or granted, in the queue's order."""
         return self._select(Lease.state != LeaseState.ENDED, order=[Lease.number])
 
     def all(self, tenant: str | None = None, limit: int | None = None) -> list[Lease]:
@@ -205,12 +205,12 @@ class Missions(Rows[Mission]):
 
 
 class Usages(Rows[Usage]):
-    """What missions have used, by mission."""
+    """Usage by mission."""
 
     def all(
         self, tenant: str | None = None, since: float = -math.inf, limit: int | None = None
     ) -> list[Usage]:
-        """Those of a tenant, or of all, that started at `since` or later; oldest first."""
+        """Usage of a tenant, or of all, that started at `since` or later; oldest first."""
         later = Usage.started >= since
         return self._select(later, tenant=tenant, order=[Usage.started], limit=limit)
 
