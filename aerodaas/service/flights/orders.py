@@ -240,7 +240,7 @@ class FlightOrders:
             f"{one.robot}/{name}"
             for one in document.navigation
             for waypoint in one.waypoints
-            for name in waypoint.actuate
+            for name, _ in waypoint.actuate
         }
         if refused := sorted(asked - may):
             raise RefusedError(
