@@ -42,7 +42,7 @@ class Attachments:
         """Attach to `missions` by the provider's settings."""
         self._most = settings.most_attached
         self._cameras = {
-            one.full_id for one in settings.config.all_sensors() if one.type == "camera"
+            sensor.full_id for sensor in settings.config.all_sensors() if sensor.type == "camera"
         }
         self._leases = leases
         self._missions = missions
@@ -78,36 +78,36 @@ class Attachments:
         cameras = [name for name in running if name in self._cameras]
         return [name for name in cameras if _may_have(tenant, [name], host)]
 
-    def share_cameras(self, one: ActiveMission) -> HostFlight:
+    def share_cameras(self, active: ActiveMission) -> HostFlight:
         """Have the flight share its cameras with a mission; raises MissionError if it does not."""
-        host = self._missions.get(str(one.attached_to))
+        host = self._missions.get(str(active.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
-            raise MissionError(f"{one.attached_to} is not flying any more")
-        if len([other for other in self._beside(host) if other is not one]) >= self._most:
+            raise MissionError(f"{active.attached_to} is not flying any more")
+        if len([other for other in self._beside(host) if other is not active]) >= self._most:
             raise MissionError(self._full(host))
-        wanted = one.document().sensors
-        if not set(wanted) <= set(self.shared(host, one.row.tenant)):
-            raise MissionError(f"{one.attached_to} does not share its cameras any more")
-        answer = host.follow().share(one.row.id, wanted)
+        wanted = active.document().sensors
+        if not set(wanted) <= set(self.shared(host, active.row.tenant)):
+            raise MissionError(f"{active.attached_to} does not share its cameras any more")
+        answer = host.follow().share(active.row.id, wanted)
         if not answer.accepted:
             raise MissionError(answer.text)
         return HostFlight(mission=host.row.id, socket=host.flight.socket, sensors=wanted)
 
-    def end_if_withdrawn(self, one: ActiveMission) -> None:
+    def end_if_withdrawn(self, active: ActiveMission) -> None:
         """End an attached mission whose flight has ended, or that may sense no more."""
-        host = self._missions.get(str(one.attached_to))
+        host = self._missions.get(str(active.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
-            self._end(one, "the flight that it was attached to has ended")
-        elif not _may_have(one.row.tenant, one.document().sensors, host):
-            self._withdraw(host, one)
-            self._end(one, f"{host.row.tenant} has withdrawn its grant")
+            self._end(active, "the flight that it was attached to has ended")
+        elif not _may_have(active.row.tenant, active.document().sensors, host):
+            self._withdraw(host, active)
+            self._end(active, f"{host.row.tenant} has withdrawn its grant")
 
-    def stop_sharing(self, one: ActiveMission) -> None:
+    def stop_sharing(self, active: ActiveMission) -> None:
         """Share no more with a mission that is over."""
-        self._told.pop(one.row.id, None)
-        host = self._missions.get(str(one.attached_to))
+        self._told.pop(active.row.id, None)
+        host = self._missions.get(str(active.attached_to))
         if host is not None:
-            self._withdraw(host, one)
+            self._withdraw(host, active)
 
     def grant(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
         """Let a tenant attach missions to these cameras; what it has attached to others ends."""
@@ -115,12 +115,12 @@ class Attachments:
 
     def withdraw_grant(self, host: ActiveMission, tenant: str) -> None:
         """Share nothing with a tenant any more, from the next picture on."""
-        others = {name: one for name, one in host.grants.items() if name != tenant}
+        others = {name: cameras for name, cameras in host.grants.items() if name != tenant}
         self._grant(host, tenant, others)
 
     def _beside(self, host: ActiveMission) -> list[ActiveMission]:
         """Missions that are attached to a flight, or are to be."""
-        return [one for one in self._missions.values() if one.attached_to == host.row.id]
+        return [active for active in self._missions.values() if active.attached_to == host.row.id]
 
     def _full(self, host: ActiveMission) -> str:
         return f"{self._most} missions are attached to {host.row.id}, the most that may be"
@@ -128,9 +128,9 @@ class Attachments:
     def _grant(self, host: ActiveMission, tenant: str, grants: Mapping[str, list[str]]) -> None:
         """Change the grants; what `tenant` has attached and may have no more ends at once."""
         host.change(request={**host.row.request, "grants": dict(grants)})
-        for one in self._beside(host):
-            if one.row.tenant == tenant and one.phase is MissionPhase.FLYING:
-                self.end_if_withdrawn(one)
+        for active in self._beside(host):
+            if active.row.tenant == tenant and active.phase is MissionPhase.FLYING:
+                self.end_if_withdrawn(active)
 
     def _host(self, principal: Principal, name: str) -> ActiveMission:
         """The mission to attach to; for whom it neither is nor shares with, there is none."""
@@ -147,21 +147,21 @@ class Attachments:
             raise RefusedError(403, f"{host.row.tenant} has not granted {name}'s cameras to you")
         raise RefusedError(404, f"there is no mission {name!r} in flight")
 
-    def _withdraw(self, host: ActiveMission, one: ActiveMission) -> None:
+    def _withdraw(self, host: ActiveMission, active: ActiveMission) -> None:
         # A flight that does not answer shares no more either once it is over.
         with contextlib.suppress(MissionError):
-            host.follow().withdraw(one.row.id)
+            host.follow().withdraw(active.row.id)
 
-    def _end(self, one: ActiveMission, reason: str) -> None:
+    def _end(self, active: ActiveMission, reason: str) -> None:
         """Tell an attached mission to end; one that does not is ended after a while."""
         now = time.monotonic()
-        if one.row.id not in self._told:
-            self._told[one.row.id] = now
+        if active.row.id not in self._told:
+            self._told[active.row.id] = now
             # Its cameras end in any case.
             with contextlib.suppress(MissionError):
-                one.follow().change_lease(FlightLeaseIn(reason=reason))
-        elif now - self._told[one.row.id] > _ENDING_SECONDS:
-            one.end_flight()
+                active.follow().change_lease(FlightLeaseIn(reason=reason))
+        elif now - self._told[active.row.id] > _ENDING_SECONDS:
+            active.end_flight()
 
 
 def _may_have(tenant: str, sensors: list[str], host: ActiveMission) -> bool:
@@ -181,7 +181,7 @@ def _require_senses_only(document: MissionDocument) -> None:
             f"{document.navigation[0].robot}",
         )
     for entry in document.analyses:
-        commands = [one.command for one in entry.triggers if one.command is not None]
+        commands = [rule.command for rule in entry.triggers if rule.command is not None]
         kind = None if entry.analysis is None else load_plugin("analytics", entry.analysis)
         if commands or (isinstance(kind, type) and issubclass(kind, RemoteAnalytics)):
             what = commands[0] if commands else f"its {entry.analysis}"

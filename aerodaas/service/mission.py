@@ -279,18 +279,18 @@ class ActiveMission:
         return lines[-1][-_LAST_WORDS:] if lines else "its process ended without a word"
 
 
-def shown(one: ActiveMission) -> MissionOut:
+def shown(active: ActiveMission) -> MissionOut:
     """A mission with its newest state: of its flight while it goes on, else as it ended."""
-    row = one.row
-    outcome = one.flight.outcome() if one.over else None
-    told = None if one.link is None else one.link.mission
-    newest = outcome or told
-    flying = None if one.over else told
+    row = active.row
+    outcome = active.flight.outcome() if active.over else None
+    state = None if active.link is None else active.link.mission
+    newest = outcome or state
+    flying = None if active.over else state
     verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
     if verdict is not None:
         reasons = [without_folders(reason) for reason in verdict.reasons]
         verdict = verdict.model_copy(update={"reasons": reasons})
-    if verdict is not None and one.rehearsal.picture.is_file():
+    if verdict is not None and active.rehearsal.picture.is_file():
         verdict = verdict.model_copy(update={"picture": f"/v1/missions/{row.id}/rehearsal.png"})
     return MissionOut(
         id=row.id,
@@ -298,12 +298,12 @@ def shown(one: ActiveMission) -> MissionOut:
         tenant=row.tenant,
         account=row.account,
         phase=row.phase,
-        reason=without_folders(one.waits_for or row.reason),
+        reason=without_folders(active.waits_for or row.reason),
         robots=list(row.robots),
         lease=row.lease,
         share=list(row.request.get("share", ())),
-        attach=one.attached_to,
-        grants=one.grants,
+        attach=active.attached_to,
+        grants=active.grants,
         submitted=row.submitted,
         started=row.started,
         ended=row.ended,
@@ -313,7 +313,7 @@ def shown(one: ActiveMission) -> MissionOut:
         alerts=[] if newest is None else newest.alerts,
         streams={} if flying is None else flying.streams,
         analytics=None if flying is None else flying.analytics,
-        recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
+        recording=active.phase is not MissionPhase.FLYING and active.flight.recording.is_file(),
     )
 
 

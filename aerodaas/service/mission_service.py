@@ -112,110 +112,114 @@ class MissionService:
         """Move on no more; flights go on by themselves."""
         self._closed.set()
         with self._lock:
-            for one in self._missions.values():
-                one.close()
+            for active in self._missions.values():
+                active.close()
         if self._monitor is not None:
             self._monitor.close()
 
-    def submit(self, principal: Principal, wanted: MissionIn, key: str | None = None) -> MissionOut:
+    def submit(
+        self, principal: Principal, submission: MissionIn, key: str | None = None
+    ) -> MissionOut:
         """Take a mission in, or find the one that was submitted before with the same `key`.
 
         Raises RefusedError, with the reason, for one that cannot be flown here, and with status
         422 for another one than was submitted with this key.
         """
         # First: what was taken in has used up its quota and its lease.
-        known = self._submitted(principal, wanted, key)
-        if known is not None:
-            return known
+        earlier = self._submitted(principal, submission, key)
+        if earlier is not None:
+            return earlier
         self._require_open(principal.tenant)
         require_room(self._settings.state)
-        attached = wanted.attach is not None
-        robots = self._orders.check(principal, wanted.document, attached=attached)
+        attached = submission.attach is not None
+        robots = self._orders.check(principal, submission.document, attached=attached)
         if attached:
             with self._lock:
-                self._attachments.check(principal, wanted)
+                self._attachments.check(principal, submission)
         self._registry.require_fit(robots)
-        if wanted.lease is not None:
+        if submission.lease is not None:
             # It has used up its minutes of the quota already.
-            self._leases.require(principal, wanted.lease, robots)
-        own = 0.0 if wanted.lease is not None else wanted.minutes * len(robots)
-        cloud = self._orders.may_call_cloud(wanted.document)
+            self._leases.require(principal, submission.lease, robots)
+        own = 0.0 if submission.lease is not None else submission.minutes * len(robots)
+        cloud = self._orders.may_call_cloud(submission.document)
         self._leases.require_quota(principal.tenant, own, cloud=cloud)
         name = secrets.token_hex(6)
         row = Mission(
             id=name,
-            name=wanted.document.name or "mission",
+            name=submission.document.name or "mission",
             tenant=principal.tenant,
             account=principal.account,
             phase=MissionPhase.SUBMITTED,
             robots=tuple(robots),
-            lease=wanted.lease,
+            lease=submission.lease,
             submitted=time.time(),
             folder=str(self._path(name)),
-            request=wanted.model_dump(mode="json", exclude={"document"}),
+            request=submission.model_dump(mode="json", exclude={"document"}),
             key=key,
-            fingerprint=None if key is None else fingerprint(wanted),
+            fingerprint=None if key is None else fingerprint(submission),
         )
         mission = self._active(row)
-        mission.write(wanted.document)
+        mission.write(submission.document)
         with self._lock:
             # The same submission may have been sent twice at once.
             try:
-                known = self._submitted(principal, wanted, key)
-                if known is None:
+                earlier = self._submitted(principal, submission, key)
+                if earlier is None:
                     self._require_open(principal.tenant)
                     self._store.missions.add(row)
                     self._missions[row.id] = mission
             finally:
                 if row.id not in self._missions:
                     mission.discard()
-        return known or shown(mission)
+        return earlier or shown(mission)
 
     def _require_open(self, tenant: str) -> None:
         """Raise RefusedError for a tenant with as many missions that are not over as it may."""
         most = self._settings.most_open
-        if sum(one.row.tenant == tenant for one in list(self._missions.values())) >= most:
+        if sum(active.row.tenant == tenant for active in list(self._missions.values())) >= most:
             raise RefusedError(
                 429, f"{tenant} has {most} missions that are not over: wait for one, or cancel some"
             )
 
     def _submitted(
-        self, principal: Principal, wanted: MissionIn, key: str | None
+        self, principal: Principal, submission: MissionIn, key: str | None
     ) -> MissionOut | None:
         """The mission that this submission has become; None if it was not sent before."""
         row = None if key is None else self._store.missions.of_key(principal.tenant, key)
         if row is None:
             return None
-        if row.fingerprint != fingerprint(wanted):
+        if row.fingerprint != fingerprint(submission):
             raise RefusedError(
                 422,
                 f"another mission was submitted with this Idempotency-Key ({row.id}): send a "
                 "new key with each new mission",
             )
-        return self._with_news(row)
+        return self._with_state(row)
 
     def approve(self, principal: Principal, mission: str) -> MissionOut:
         """Approve a mission that waits for it."""
         with self._lock:
-            one = self._one(mission)
-            if one.phase is not MissionPhase.AWAITING_APPROVAL:
-                raise RefusedError(409, f"{mission} does not wait for approval: {one.phase.value}")
-            one.set_phase(MissionPhase.QUEUED, f"approved by {principal.account}")
-            return shown(one)
+            active = self._open(mission)
+            if active.phase is not MissionPhase.AWAITING_APPROVAL:
+                raise RefusedError(
+                    409, f"{mission} does not wait for approval: {active.phase.value}"
+                )
+            active.set_phase(MissionPhase.QUEUED, f"approved by {principal.account}")
+            return shown(active)
 
     def cancel(self, principal: Principal, mission: str) -> MissionOut:
         """Cancel a mission; drones in flight come home first."""
         self._require_own(principal, mission)
         with self._lock:
-            one = self._one(mission)
+            active = self._open(mission)
             reason = f"{CANCELLED_BY}{principal.account}"
-            if one.phase is not MissionPhase.FLYING:
-                one.end_rehearsal()
-                self._end(one, MissionPhase.CANCELLED, reason)
-                return shown(one)
-            one.set_waiting(reason)
-        one.cancel_flight(reason)
-        return shown(one)
+            if active.phase is not MissionPhase.FLYING:
+                active.end_rehearsal()
+                self._end(active, MissionPhase.CANCELLED, reason)
+                return shown(active)
+            active.set_waiting(reason)
+        active.cancel_flight(reason)
+        return shown(active)
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
@@ -237,31 +241,32 @@ class MissionService:
         """Let a tenant attach missions to a mission's cameras; none at all for `sensors` None."""
         self._require_own(principal, mission)
         with self._lock:
-            one = self._one(mission)
+            active = self._open(mission)
             if sensors is None:
-                self._attachments.withdraw_grant(one, tenant)
+                self._attachments.withdraw_grant(active, tenant)
             else:
-                self._attachments.grant(one, tenant, sensors)
-            return shown(one)
+                self._attachments.grant(active, tenant, sensors)
+            return shown(active)
 
     def shared(self, robot: str, tenant: str) -> tuple[str | None, list[str]]:
         """The mission that flies a robot, and its cameras that a tenant may attach missions to."""
-        host = next((one for one in self._flying() if robot in one.row.robots), None)
+        host = next((active for active in self._flying() if robot in active.row.robots), None)
         if host is None:
             return None, []
-        own = {one.full_id for one in self._settings.config.all_sensors() if one.robot == robot}
-        return host.row.id, [one for one in self._attachments.shared(host, tenant) if one in own]
+        sensors = self._settings.config.all_sensors()
+        own = {sensor.full_id for sensor in sensors if sensor.robot == robot}
+        return host.row.id, [name for name in self._attachments.shared(host, tenant) if name in own]
 
     def _flown(self, principal: Principal, mission: str) -> ActiveMission:
         """A flying mission; raises RefusedError unless this account may command it."""
         self._require_own(principal, mission)
-        one = self._one(mission)
-        if one.phase is not MissionPhase.FLYING:
-            raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
-        if one.attached_to is not None:
-            text = f"{mission} is attached to {one.attached_to}: it senses only"
+        active = self._open(mission)
+        if active.phase is not MissionPhase.FLYING:
+            raise RefusedError(409, f"{mission} is not flying: {active.phase.value}")
+        if active.attached_to is not None:
+            text = f"{mission} is attached to {active.attached_to}: it senses only"
             raise RefusedError(403, text)
-        return one
+        return active
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; its own user counts as present.
@@ -287,10 +292,11 @@ class MissionService:
             rows = table.newest(_MOST_SHOWN, principal.tenant)
             rows += table.newest_shared(_MOST_SHOWN, principal.tenant)
         found = {
-            row.id: row for row in (*rows, *(one.row for one in list(self._missions.values())))
+            row.id: row
+            for row in (*rows, *(active.row for active in list(self._missions.values())))
         }
         return [
-            self._with_news(row)
+            self._with_state(row)
             for row in sorted(found.values(), key=lambda row: row.submitted, reverse=True)
             if sees(principal, row.tenant, row.request.get("share", ()))
         ]
@@ -303,18 +309,18 @@ class MissionService:
     def text(self, mission: str) -> tuple[str, bool]:
         """A mission as JSON, made once for all that watch it, and whether it is over."""
         version = self.version(mission)
-        known = self._texts.get(mission)
-        if known is None or known[0] != version or version < 0:
+        cached = self._texts.get(mission)
+        if cached is None or cached[0] != version or version < 0:
             found = self.shown(mission)
-            known = version, found.model_dump_json(), found.phase.over
+            cached = version, found.model_dump_json(), found.phase.over
             if version >= 0:
-                self._texts[mission] = known
-        return known[1], known[2]
+                self._texts[mission] = cached
+        return cached[1], cached[2]
 
     def version(self, mission: str) -> int:
         """A number that grows with each change of a mission; -1 once it is over."""
-        one = self._missions.get(mission)
-        return -1 if one is None else one.version
+        active = self._missions.get(mission)
+        return -1 if active is None else active.version
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
@@ -325,49 +331,49 @@ class MissionService:
 
         It sees what the mission sees and steers it: its token must be as good as for submitting.
         """
-        one = self._seen(principal, mission)
-        if one.row.tenant != principal.tenant:
-            raise RefusedError(403, f"{mission} is {one.row.tenant}'s")
-        if one.attached_to is None:
+        active = self._seen(principal, mission)
+        if active.row.tenant != principal.tenant:
+            raise RefusedError(403, f"{mission} is {active.row.tenant}'s")
+        if active.attached_to is None:
             require(principal, Role.PILOT, Scope.FLY)
-        self._orders.require_scopes(principal, one.document())
+        self._orders.require_scopes(principal, active.document())
 
     def record_presence(self, mission: str) -> None:
         """Note that the user of a mission is there."""
-        one = self._missions.get(mission)
-        if one is not None and one.phase is MissionPhase.FLYING:
-            one.follow().record_presence()
+        active = self._missions.get(mission)
+        if active is not None and active.phase is MissionPhase.FLYING:
+            active.follow().record_presence()
 
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Items of a flying mission's stream; raises AeroDaaSError if there is none."""
         with self._lock:
-            one = self._one(mission)
-            if one.phase is not MissionPhase.FLYING:
+            active = self._open(mission)
+            if active.phase is not MissionPhase.FLYING:
                 raise MissionError(f"{mission} is not flying")
-            link = one.follow()
+            link = active.follow()
         return link.items(stream, form)
 
     def flight(self, mission: str) -> FlightFolder | None:
         """The folder of a mission's flight; None unless it is flying."""
-        one = self._missions.get(mission)
-        return one.flight if one is not None and one.phase is MissionPhase.FLYING else None
+        active = self._missions.get(mission)
+        return active.flight if active is not None and active.phase is MissionPhase.FLYING else None
 
     def preflight(self, robot: str) -> PreflightOut | None:
         """The list before take-off that the flight of a robot has; None without a flight."""
-        one = next((one for one in self._flying() if robot in one.row.robots), None)
-        if one is None or one.link is None:
+        active = next((active for active in self._flying() if robot in active.row.robots), None)
+        if active is None or active.link is None:
             return None
         with contextlib.suppress(MissionError):
-            return one.link.preflight(robot)
+            return active.link.preflight(robot)
         return None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
-        one = self._seen(principal, mission)
-        files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
-        if not files[name].is_file() or (name == "recording" and not one.over):
+        active = self._seen(principal, mission)
+        files = {"recording": active.flight.recording, "picture": active.rehearsal.picture}
+        if not files[name].is_file() or (name == "recording" and not active.over):
             raise RefusedError(404, f"{mission} has no {name}")
         return files[name]
 
@@ -381,9 +387,9 @@ class MissionService:
 
     def _tell_flights(self, lease: Lease) -> None:
         """Bring home what flies under a lease that has ended; prolong what flies under a longer."""
-        for one in self._flying():
-            if one.row.lease == lease.id:
-                one.send_lease(lease)
+        for active in self._flying():
+            if active.row.lease == lease.id:
+                active.send_lease(lease)
 
     def _run(self) -> None:
         while not self._closed.wait(_TURN_SECONDS):
@@ -406,13 +412,13 @@ class MissionService:
         self._leases.advance()
         with self._lock:
             self._rehearsal_places = self._places()
-            for one in list(self._missions.values()):
-                self._move(one)
-                if one.over:
-                    one.close()
-                    del self._missions[one.row.id]
-                    self._in_flight.pop(one.row.id, None)
-                    self._texts.pop(one.row.id, None)
+            for active in list(self._missions.values()):
+                self._move(active)
+                if active.over:
+                    active.close()
+                    del self._missions[active.row.id]
+                    self._in_flight.pop(active.row.id, None)
+                    self._texts.pop(active.row.id, None)
             self._have_watched()
 
     def _have_watched(self) -> None:
@@ -420,134 +426,143 @@ class MissionService:
         if self._monitor is None:
             return
         taken = self._busy() | {
-            robot for one in self._missions.values() if one.handing_over for robot in one.row.robots
+            robot
+            for active in self._missions.values()
+            if active.handing_over
+            for robot in active.row.robots
         }
         states = self._registry.states.values()
-        self._monitor.hold({one.id for one in states if one.enabled and one.id not in taken})
+        self._monitor.hold(
+            {state.id for state in states if state.enabled and state.id not in taken}
+        )
 
-    def _move(self, one: ActiveMission) -> None:
+    def _move(self, active: ActiveMission) -> None:
         """Move one mission on; what it meets is its own failure, unless the database is gone."""
         try:
-            self._step(one)
+            self._step(active)
         except StoreError:
             raise
         except (AeroDaaSError, OSError) as error:
-            if one.phase is not MissionPhase.FLYING:
-                self._end(one, MissionPhase.REFUSED, str(error))
+            if active.phase is not MissionPhase.FLYING:
+                self._end(active, MissionPhase.REFUSED, str(error))
             else:
                 # The flight goes on by itself; the next turn looks again.
-                self._errors.log_error(one.row.id, error)
+                self._errors.log_error(active.row.id, error)
         else:
-            self._errors.log_recovery(one.row.id)
+            self._errors.log_recovery(active.row.id)
 
-    def _step(self, one: ActiveMission) -> None:
+    def _step(self, active: ActiveMission) -> None:
         steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {
             MissionPhase.SUBMITTED: self._begin,
             MissionPhase.REHEARSING: self._judge,
             MissionPhase.QUEUED: self._take_off,
             MissionPhase.FLYING: self._watch,
         }
-        step = steps.get(one.phase)
+        step = steps.get(active.phase)
         if step is not None:
-            step(one)
+            step(active)
 
-    def _begin(self, one: ActiveMission) -> None:
-        if not self._settings.rehearse or one.attached_to is not None:
-            self._admit(one)
+    def _begin(self, active: ActiveMission) -> None:
+        if not self._settings.rehearse or active.attached_to is not None:
+            self._admit(active)
             return
-        self._rehearse(one)
+        self._rehearse(active)
 
-    def _rehearse(self, one: ActiveMission) -> None:
+    def _rehearse(self, active: ActiveMission) -> None:
         """Begin a mission's rehearsal, once it is its turn."""
-        if place := self._rehearsal_places.get(one.row.id, 1):
-            one.set_waiting(f"waits for its rehearsal: number {place} of those that wait")
+        if place := self._rehearsal_places.get(active.row.id, 1):
+            active.set_waiting(f"waits for its rehearsal: number {place} of those that wait")
             return
-        one.rehearse(self._orders.rehearsal(one.row), self._models)
-        self._last_rehearsed[one.row.tenant] = next(self._rehearsals)
-        if one.phase is not MissionPhase.REHEARSING:
-            one.set_phase(MissionPhase.REHEARSING)
+        active.rehearse(self._orders.rehearsal(active.row), self._models)
+        self._last_rehearsed[active.row.tenant] = next(self._rehearsals)
+        if active.phase is not MissionPhase.REHEARSING:
+            active.set_phase(MissionPhase.REHEARSING)
 
     def _places(self) -> dict[str, int]:
         """The place in the queue of each mission that waits for a rehearsal; 0 for its turn."""
         waiting, running = [], []
-        for one in self._missions.values():
-            lost = one.phase is MissionPhase.REHEARSING and one.rehearsal_lost
-            if lost or one.phase is MissionPhase.SUBMITTED:
-                waiting.append((one.row.id, one.row.tenant))
-            elif one.phase is MissionPhase.REHEARSING:
-                running.append(one.row.tenant)
+        for active in self._missions.values():
+            lost = active.phase is MissionPhase.REHEARSING and active.rehearsal_lost
+            if lost or active.phase is MissionPhase.SUBMITTED:
+                waiting.append((active.row.id, active.row.tenant))
+            elif active.phase is MissionPhase.REHEARSING:
+                running.append(active.row.tenant)
         free = max(0, self._settings.most_rehearsals - len(running))
         order = in_turn(waiting, running, self._last_rehearsed)
         return {id_: max(0, number - free) for number, id_ in enumerate(order, 1)}
 
-    def _judge(self, one: ActiveMission) -> None:
-        if one.rehearsal_lost:
-            self._rehearse(one)
+    def _judge(self, active: ActiveMission) -> None:
+        if active.rehearsal_lost:
+            self._rehearse(active)
             return
-        verdict = one.verdict(_REHEARSAL_SHARE * self._settings.rehearsal_seconds)
+        verdict = active.verdict(_REHEARSAL_SHARE * self._settings.rehearsal_seconds)
         if verdict is None:
             return
-        one.row = replace(one.row, verdict=verdict.model_dump(mode="json"))
+        active.row = replace(active.row, verdict=verdict.model_dump(mode="json"))
         if verdict.approved:
-            self._admit(one)
+            self._admit(active)
         else:
-            self._end(one, MissionPhase.REFUSED, "; ".join(verdict.reasons))
+            self._end(active, MissionPhase.REFUSED, "; ".join(verdict.reasons))
 
-    def _admit(self, one: ActiveMission) -> None:
+    def _admit(self, active: ActiveMission) -> None:
         if self._settings.approval:
-            one.set_phase(MissionPhase.AWAITING_APPROVAL, "waits for an operator's approval")
+            active.set_phase(MissionPhase.AWAITING_APPROVAL, "waits for an operator's approval")
         else:
-            one.set_phase(MissionPhase.QUEUED, "waits for its drones")
+            active.set_phase(MissionPhase.QUEUED, "waits for its drones")
 
-    def _take_off(self, one: ActiveMission) -> None:
-        if one.attached_to is not None:
-            if self._has_place(one):
-                attached = self._attachments.share_cameras(one)
-                self._begin_flight(one, self._orders.attached(one.row, attached))
+    def _take_off(self, active: ActiveMission) -> None:
+        if active.attached_to is not None:
+            if self._has_place(active):
+                attached = self._attachments.share_cameras(active)
+                self._begin_flight(active, self._orders.attached(active.row, attached))
             return
-        if one.row.lease is None:
-            lease = self._leases.for_mission(one.row)
-            one.change(lease=lease.id)
+        if active.row.lease is None:
+            lease = self._leases.for_mission(active.row)
+            active.change(lease=lease.id)
         else:
-            lease = self._leases.lease(one.row.lease)
+            lease = self._leases.lease(active.row.lease)
         if lease.state is LeaseState.ENDED:
-            self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
-        elif lease.state is LeaseState.GRANTED and self._has_place(one) and self._handed_over(one):
-            self._begin_flight(one, self._orders.flight(one.row, lease))
+            self._end(active, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
+        elif (
+            lease.state is LeaseState.GRANTED
+            and self._has_place(active)
+            and self._handed_over(active)
+        ):
+            self._begin_flight(active, self._orders.flight(active.row, lease))
 
-    def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
-        one.prepare_flight(order, self._models)
-        one.set_phase(MissionPhase.FLYING, started=time.time())
-        self._in_flight[one.row.id] = one
-        self._registry.set_link(one.row.robots, LinkState.MISSION)
-        one.start_flight()
+    def _begin_flight(self, active: ActiveMission, order: FlightOrder) -> None:
+        active.prepare_flight(order, self._models)
+        active.set_phase(MissionPhase.FLYING, started=time.time())
+        self._in_flight[active.row.id] = active
+        self._registry.set_link(active.row.robots, LinkState.MISSION)
+        active.start_flight()
 
-    def _handed_over(self, one: ActiveMission) -> bool:
+    def _handed_over(self, active: ActiveMission) -> bool:
         """Whether the monitor has let go of a mission's drones, each of which was fit to fly.
 
         A flight begins only then, so that one process at a time is connected with a drone.
         """
         if self._monitor is None:
             return True
-        robots = one.row.robots
-        if one.handing_over:
+        robots = active.row.robots
+        if active.handing_over:
             # One that somebody else has armed meanwhile is not let go of.
-            one.handing_over = not any(map(self._registry.objection, robots))
-            return one.handing_over and self._monitor.released(robots)
+            active.handing_over = not any(map(self._registry.objection, robots))
+            return active.handing_over and self._monitor.released(robots)
         held_up = [f"{name}: {why}" for name in robots if (why := self._registry.obstacle(name))]
-        one.handing_over = not held_up
+        active.handing_over = not held_up
         if held_up:
-            one.set_waiting(f"waits for {'; '.join(held_up)}")
+            active.set_waiting(f"waits for {'; '.join(held_up)}")
         return False
 
-    def _has_place(self, wanted: ActiveMission) -> bool:
+    def _has_place(self, queued: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
-        busy = self._flown_robots() | self._robot_locks.held(wanted.row.robots)
+        busy = self._flown_robots() | self._robot_locks.held(queued.row.robots)
         full = len(self._flying()) >= self._settings.most_flights
-        if taken := sorted(busy.intersection(wanted.row.robots)):
-            wanted.set_waiting(f"waits for {', '.join(taken)}: in another flight")
+        if taken := sorted(busy.intersection(queued.row.robots)):
+            queued.set_waiting(f"waits for {', '.join(taken)}: in another flight")
         elif full:
-            wanted.set_waiting(f"waits for the end of one of {self._settings.most_flights} flights")
+            queued.set_waiting(f"waits for the end of one of {self._settings.most_flights} flights")
         return not (taken or full)
 
     def _busy(self) -> set[str]:
@@ -555,39 +570,39 @@ class MissionService:
         return self._flown_robots() | self._robot_locks.held(self._robots)
 
     def _flown_robots(self) -> set[str]:
-        return {robot for one in self._flying() for robot in one.row.robots}
+        return {robot for active in self._flying() for robot in active.row.robots}
 
     def _flying(self) -> list[ActiveMission]:
         missions = list(self._in_flight.values())
-        return [one for one in missions if one.phase is MissionPhase.FLYING]
+        return [active for active in missions if active.phase is MissionPhase.FLYING]
 
-    def _watch(self, one: ActiveMission) -> None:
+    def _watch(self, active: ActiveMission) -> None:
         # After a restart: a flight whose order was written may not have begun.
-        one.start_flight()
-        one.set_waiting(one.flight.cancelled)
-        link = one.follow()
+        active.start_flight()
+        active.set_waiting(active.flight.cancelled)
+        link = active.follow()
         if link.mission is not None:
             self._registry.record_status(link.mission.status)
-        if one.attached_to is not None:
-            self._attachments.end_if_withdrawn(one)
-        elif one.row.lease is not None and not one.recalled:
+        if active.attached_to is not None:
+            self._attachments.end_if_withdrawn(active)
+        elif active.row.lease is not None and not active.recalled:
             # It may have ended, or been extended, while nobody could tell the flight.
-            one.send_lease(self._leases.lease(one.row.lease))
+            active.send_lease(self._leases.lease(active.row.lease))
         try:
-            outcome = one.flight_outcome()
+            outcome = active.flight_outcome()
         except LostFlightError as error:
             reason = f"its process died in flight ({error})"
-            if one.row.robots:
+            if active.row.robots:
                 reason += f"; its drones are {OUT_OF_SERVICE}"
-            self._registry.take_out_of_service(one.row.robots)
-            self._registry.set_link(one.row.robots, LinkState.UNWATCHED)
-            self._end(one, MissionPhase.FAILED, reason)
+            self._registry.take_out_of_service(active.row.robots)
+            self._registry.set_link(active.row.robots, LinkState.UNWATCHED)
+            self._end(active, MissionPhase.FAILED, reason)
             return
         if outcome is None:
             return
         self._registry.record_status(outcome.status, ended=outcome.ended)
-        self._registry.set_link(one.row.robots, LinkState.UNWATCHED)
-        self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
+        self._registry.set_link(active.row.robots, LinkState.UNWATCHED)
+        self._store.usage.put(usage_of(active.row, outcome, active.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
         # One that was called home before its take-off has been aborted by that.
         if CANCELLED_BY in outcome.reason:
@@ -597,14 +612,14 @@ class MissionService:
             # Its actor may fly it still, or a pilot: nobody else connects with it before a look.
             self._registry.take_out_of_service(up)
             reason += f"; {', '.join(up)}: not known to be down, {OUT_OF_SERVICE}"
-        self._end(one, phase, reason)
+        self._end(active, phase, reason)
 
-    def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
-        one.set_phase(phase, reason, ended=time.time())
-        if one.attached_to is not None:
-            self._attachments.stop_sharing(one)
-        if one.row.lease is not None:
-            self._leases.give_back(one.row)
+    def _end(self, active: ActiveMission, phase: MissionPhase, reason: str) -> None:
+        active.set_phase(phase, reason, ended=time.time())
+        if active.attached_to is not None:
+            self._attachments.stop_sharing(active)
+        if active.row.lease is not None:
+            self._leases.give_back(active.row)
 
     def _active(self, row: Mission) -> ActiveMission:
         return ActiveMission(row, Path(row.folder), self._store.missions.put)
@@ -612,27 +627,27 @@ class MissionService:
     def _path(self, mission: str) -> Path:
         return self._settings.missions / mission
 
-    def _one(self, mission: str) -> ActiveMission:
-        one = self._missions.get(mission)
+    def _open(self, mission: str) -> ActiveMission:
+        active = self._missions.get(mission)
         # One that is over stays among them until the next turn.
-        if one is None or one.over:
+        if active is None or active.over:
             phase = self.shown(mission).phase.value
             raise RefusedError(409, f"{mission} is over: {phase}")
-        return one
+        return active
 
     def _seen(self, principal: Principal, mission: str) -> ActiveMission:
         """A mission that this account may see, over or not; raises RefusedError for any other."""
-        one = self._any(mission)
-        if not sees(principal, one.row.tenant, one.row.request.get("share", ())):
+        active = self._any(mission)
+        if not sees(principal, active.row.tenant, active.row.request.get("share", ())):
             raise RefusedError(404, f"there is no mission {mission!r}")
-        return one
+        return active
 
     def _any(self, mission: str) -> ActiveMission:
         """A mission that may be over; raises RefusedError if there is none."""
-        one = self._missions.get(mission)
-        return one or self._active(self._store.missions.require(mission))
+        active = self._missions.get(mission)
+        return active or self._active(self._store.missions.require(mission))
 
-    def _with_news(self, row: Mission) -> MissionOut:
+    def _with_state(self, row: Mission) -> MissionOut:
         return shown(self._missions.get(row.id) or self._active(row))
 
     def _require_own(self, principal: Principal, mission: str) -> None:

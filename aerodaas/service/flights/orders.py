@@ -199,13 +199,14 @@ class FlightOrders:
         config = self._settings.config
         robots = robots_of(document)
         _require_known("robot", robots, {robot.id for robot in config.robots})
-        _require_known("sensor", document.sensors, {one.full_id for one in config.all_sensors()})
+        sensors = {sensor.full_id for sensor in config.all_sensors()}
+        _require_known("sensor", document.sensors, sensors)
         if config.compute != "auto":
-            wanted = [one.compute for one in document.analyses if one.compute is not None]
-            _require_known("compute resource", wanted, {one.id for one in config.compute})
-        for one in document.analyses:
-            if one.analysis is not None:
-                require_plugin("analytics", one.analysis)
+            resources = [entry.compute for entry in document.analyses if entry.compute is not None]
+            _require_known("compute resource", resources, {node.id for node in config.compute})
+        for entry in document.analyses:
+            if entry.analysis is not None:
+                require_plugin("analytics", entry.analysis)
         if not (robots or attached):
             text = "its navigation is empty: it flies no drone, and is attached to no mission"
             raise RefusedError(_UNPROCESSABLE, text)
@@ -215,18 +216,20 @@ class FlightOrders:
 
     def may_call_cloud(self, document: MissionDocument) -> bool:
         """Whether an analysis may run elsewhere than on the edge; a scheduler may place any."""
-        known = self._settings.config.compute
-        if known == "auto":
+        nodes = self._settings.config.compute
+        if nodes == "auto":
             return bool(document.analyses)
-        elsewhere = {one.id for one in known if one.kind != "edge"}
+        elsewhere = {node.id for node in nodes if node.kind != "edge"}
         if document.analytics_scheduler is not None:
             return bool(elsewhere and document.analyses)
-        return any(one.compute in elsewhere for one in document.analyses)
+        return any(entry.compute in elsewhere for entry in document.analyses)
 
     def require_scopes(self, principal: Principal, document: MissionDocument) -> None:
         """Raise RefusedError for a token not good for what a document senses and computes."""
         cameras = {
-            one.full_id for one in self._settings.config.all_sensors() if one.type == "camera"
+            sensor.full_id
+            for sensor in self._settings.config.all_sensors()
+            if sensor.type == "camera"
         }
         if cameras & set(document.sensors):
             require(principal, Role.PILOT, Scope.SENSE)
@@ -237,9 +240,9 @@ class FlightOrders:
         """Raise RefusedError for a document that moves what the tenant may not."""
         may = self._settings.actuators.get(tenant, frozenset())
         asked = {
-            f"{one.robot}/{name}"
-            for one in document.navigation
-            for waypoint in one.waypoints
+            f"{entry.robot}/{name}"
+            for entry in document.navigation
+            for waypoint in entry.waypoints
             for name, _ in waypoint.actuate
         }
         if refused := sorted(asked - may):
@@ -257,9 +260,9 @@ class FlightOrders:
             name: charge for name in mission.robots if (charge := states[name].battery) is not None
         }
         others = [
-            OtherLease(id=one.id, area=list(one.area))
-            for one in self._leases.granted()
-            if one.area is not None and one.id != mission.lease
+            OtherLease(id=lease.id, area=list(lease.area))
+            for lease in self._leases.granted()
+            if lease.area is not None and lease.id != mission.lease
         ]
         own = self._leases.lease(mission.lease) if mission.lease is not None else None
         return order.model_copy(
@@ -318,7 +321,7 @@ class FlightOrders:
 
 def robots_of(document: MissionDocument) -> list[str]:
     """Robots that a document navigates, in the order in which it names them."""
-    return list(dict.fromkeys(one.robot for one in document.navigation))
+    return list(dict.fromkeys(entry.robot for entry in document.navigation))
 
 
 def _require_known(kind: str, wanted: list[str], known: set[str]) -> None:
