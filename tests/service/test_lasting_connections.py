@@ -416,7 +416,12 @@ def test_who_may_only_look_is_refused_before_the_body_is_sent(
 
 @pytest.mark.parametrize(
     ("path", "length"),
-    [("missions", 5 << 20), ("missions/x/navigation", 2 << 20), ("leases", 100_000)],
+    [
+        ("missions", 5 << 20),
+        ("missions/x/navigation", 2 << 20),
+        ("models/x", 65 << 20),
+        ("leases", 100_000),
+    ],
 )
 def test_a_body_is_as_large_as_what_it_is_for(service: Service, path: str, length: int) -> None:
     """And no larger, by its length alone."""

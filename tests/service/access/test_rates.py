@@ -100,5 +100,6 @@ def test_many_peers_are_limited_together_and_forgotten() -> None:
     assert pauses[:100] == [0] * 100
     assert min(pauses[101:]) >= 1
     assert told == ["remote control: 100 wrong tokens from several addresses"]
+    assert len(wrong._peers) == 1024
     now[0] = 61.0
     assert wrong.count("10.0.0.1") == 0
