@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import ray
 
-from aerodaas.actors.cluster.dead_man import exit_soon, leave
+from aerodaas.actors.cluster.dead_man import exit_actor, exit_soon
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
@@ -180,7 +180,7 @@ class NodeActor:
             if isinstance(runner.node, CameraNode) and runner.node.name == camera:
                 runner.node.ends = ends
 
-    def learn(self, application: Application) -> None:
+    def add_definitions(self, application: Application) -> None:
         """Receive the definitions that the application has added since the session was made."""
         del application  # unpickling it is enough
 
@@ -253,12 +253,12 @@ class NodeActor:
             publisher.close()
         return report
 
-    def meet(self) -> None:
+    def resolve_address(self) -> None:
         """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
-    def leave(self) -> None:
+    def exit(self) -> None:
         """End the process; called after `stop`."""
-        leave()
+        exit_actor()
 
     @property
     def scope(self) -> str:
@@ -330,7 +330,7 @@ class NodeActor:
                 again = self.alerts.outlet.measure(plain, message.header, host_time_ns())
                 self.publish(again)
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_application_alert(self, kind: str, text: str) -> None:
         """Publish an alert of the application's process, so that it is recorded."""
         self.alert(kind, text)
 

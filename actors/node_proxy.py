@@ -17,7 +17,7 @@ from aerodaas.actors.base import NodeMaker
 from aerodaas.actors.cluster.ray_cluster import options_for
 from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables
-from aerodaas.actors.run.member import ask
+from aerodaas.actors.run.actor_state import ask
 from aerodaas.clock import Clock, SimulatedClock
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.messages.envelope import Message

@@ -28,7 +28,7 @@ _HUNG = 5.0
 
 
 class RunnerActor(Protocol):
-    """What a runner needs of its actor."""
+    """Interface of the actor that a runner steps nodes for."""
 
     session: Session
     clock: Clock
@@ -145,11 +145,11 @@ class NodeRunner(Host):
         try:
             self.publish(self.node.start(self._actor.clock))
             while not self._actor.stopping:
-                self.turn()
+                self.run_once()
         except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
             self._actor.fail(error)
 
-    def turn(self) -> None:
+    def run_once(self) -> None:
         """Wait for messages, or for the node's own time, and step it."""
         messages = self.receive()
         # A step without messages is a wake-up, or harmless.

@@ -18,7 +18,7 @@ from pathlib import Path
 
 __all__ = [
     "SWITCH",
-    "Slack",
+    "IdleGarbageCollector",
     "be_nice",
     "lock_memory",
     "lockable_memory",
@@ -122,7 +122,7 @@ def lockable_memory() -> str:
     return f"memory is locked up to {limit // 1024} KiB only"
 
 
-class Slack:
+class IdleGarbageCollector:
     """Garbage collection in a loop's slack, between two cycles and never within one."""
 
     def __init__(self) -> None:

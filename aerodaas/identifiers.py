@@ -82,7 +82,7 @@ def short(name: str) -> str:
 
 
 def told(of: str, table: Mapping[str, V]) -> V | None:
-    """What `table` holds under the scoped name `of`, or else under its short one."""
+    """Value that `table` holds under the scoped name `of`, or else under its short one."""
     return table[of] if of in table else table.get(short(of))
 
 

@@ -107,7 +107,7 @@ class _Flight:
     def _turn(self, now: int) -> None:
         began = time.thread_time()
         self._vehicle.advance_to(now)
-        setpoint = self._loop.turn(now)
+        setpoint = self._loop.step(now)
         items = {"state": self._loop.state, "setpoints": setpoint, "status": self._mission.status}
         self._parts["drone"] += time.thread_time() - began
         for kind, item in items.items():

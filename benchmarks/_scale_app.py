@@ -36,10 +36,10 @@ def main() -> None:
             hover(env, f"drone{number}")
         run = env.launch()
         time.sleep(_WARM_UP)
-        before = dict(run.look().reports["dispatcher"].values["outcomes"])
+        before = dict(run.poll().reports["dispatcher"].values["outcomes"])
         time.sleep(told["seconds"])
         time.sleep(1.0)  # reports are gathered twice a second
-        after = dict(run.look().reports["dispatcher"].values["outcomes"])
+        after = dict(run.poll().reports["dispatcher"].values["outcomes"])
     print(json.dumps({key: count - before.get(key, 0) for key, count in after.items()}))
 
 

@@ -89,7 +89,7 @@ def measure_way(
         run = env.launch()
         time.sleep(_WARM_UP + seconds)
         wanted = max(1, int(seconds * _RATE))
-        return list(run.look(newest=wanted).robots["drone0"].latencies)
+        return list(run.poll(newest=wanted).robots["drone0"].latencies)
 
 
 def _add(report: Report, case: str, latencies: list[float], link: float, work: float) -> None:

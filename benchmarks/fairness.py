@@ -19,7 +19,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.lab import LabResult, Workload, run_lab
-from aerodaas.schedulers.lab.workload import Arrival
+from aerodaas.schedulers.lab.workload import TaskArrival
 
 UNITS = {
     "first": "%",
@@ -102,14 +102,14 @@ def workload(case: Case, duration: int, seed: int) -> Workload:
         for tenant, demand in tenants.items()
         for model in demand.models
     }
-    arrivals: list[Arrival] = []
+    arrivals: list[TaskArrival] = []
     for tenant, demand in tenants.items():
         for drone in range(demand.drones):
             phase = draw.randrange(NANOSECONDS)
             for second in range(duration):
                 for model in draw.sample(demand.models, len(demand.models)):
                     at, name = second * NANOSECONDS + phase, f"{tenant}.{model}"
-                    arrivals.append(Arrival(at, name, f"{tenant}{drone}"))
+                    arrivals.append(TaskArrival(at, name, f"{tenant}{drone}"))
     lasting = duration * NANOSECONDS
     return Workload("two tenants", models, duration=lasting, arrivals=tuple(arrivals))
 

@@ -5,7 +5,7 @@ wall clock, and `SyntheticAnalytics` take the published models' times on the edg
 cloud. What this machine takes on the way to an executor and back is measured first and taken off
 the synthetic times, as the table's times include it. The lab then simulates the recorded flight:
 each task arrives when it did, and takes the time that was observed where it ran, or what it
-would have taken there at that time (`aerodaas.cli.flown_workload`). So both see the same
+would have taken there at that time (`aerodaas.cli.recorded_workload`). So both see the same
 machine, busy as it may be.
 """
 
@@ -24,7 +24,7 @@ from rich.progress import track
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
+from aerodaas.cli.recorded_workload import RecordedWorkload, flown_trace, flown_workload
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace
@@ -120,7 +120,7 @@ def fly(
     return folder / "run" / "flight.mcap"
 
 
-def beyond(flown: Flown, place: TaskPlace) -> list[float]:
+def beyond(flown: RecordedWorkload, place: TaskPlace) -> list[float]:
     """Milliseconds beyond its nominal time that each execution took."""
     found = []
     for task in flown.tasks:
@@ -131,7 +131,7 @@ def beyond(flown: Flown, place: TaskPlace) -> list[float]:
     return found
 
 
-def compared(flown: Flown, scheduler: str) -> tuple[Score, Score]:
+def compared(flown: RecordedWorkload, scheduler: str) -> tuple[Score, Score]:
     """The flight's score and the lab's, of the tasks whose end the flight has seen."""
     sample = SamplePath.draw(flown_workload(flown), 0, 0, ExecutionTimes(), Network())
     live = flown_trace(flown, sample.tasks)
@@ -177,7 +177,9 @@ def main(
     with tempfile.TemporaryDirectory() as name:
         folder = keep or Path(name)
         folder.mkdir(exist_ok=True)
-        before = Flown.read(fly("ec_edf", drones, profiles, 15.0, {}, folder / "calibration"))
+        before = RecordedWorkload.read(
+            fly("ec_edf", drones, profiles, 15.0, {}, folder / "calibration")
+        )
         overhead = {
             place.value: float(np.median(measured))
             for place in (TaskPlace.EDGE, TaskPlace.CLOUD)
@@ -187,7 +189,7 @@ def main(
         report.note(f"median way to an executor and back, taken off the synthetic times: {taken}")
         for scheduler in track(schedulers.split(","), description="flying live"):
             path = fly(scheduler, drones, profiles, seconds, overhead, folder / scheduler)
-            seen = Flown.read(path)
+            seen = RecordedWorkload.read(path)
             flown, studied = compared(seen, scheduler)
             length = (seen.tasks[-1].arrival - _TAIL - seen.tasks[0].arrival) / NANOSECONDS
             report.row(f"{scheduler}, live", _figures(flown, length, beyond(seen, TaskPlace.EDGE)))

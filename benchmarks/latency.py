@@ -112,7 +112,7 @@ def measure_ours(
     # The application's process watches the flight here as it does in `start_mission`.
     newest: Any = None
     while time.monotonic() < began + seconds:
-        newest = env.run.look(newest=int(seconds * RATE))
+        newest = env.run.poll(newest=int(seconds * RATE))
         time.sleep(0.2)
     used = (_cpu_seconds(system) - cpu) / (time.monotonic() - began)
     drone.end_mission()

@@ -163,7 +163,7 @@ def _fly(port: int, tap: socket.socket, tap_port: int, seconds: float) -> dict[s
         if flying and measured_from is None:
             measured_from = now + _WARM_UP
             before = vehicle.spent + _thread_time(wire)
-        loop.turn(clock.now())
+        loop.step(clock.now())
     spent = vehicle.spent + _thread_time(wire) - before
     stopping.set()
     listener.join()

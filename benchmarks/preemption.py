@@ -113,7 +113,7 @@ def _collect(env: Environment, events: int) -> Delays:
             if cause is not None and cause.id not in found:
                 found[cause.id] = (record.stamp - cause.stamp) / 1e6
                 progress.advance(task)
-    arrived = env.run.look(newest=events).robots["drone"].latencies
+    arrived = env.run.poll(newest=events).robots["drone"].latencies
     return Delays(np.array(list(found.values())[1:]), np.array(arrived))
 
 

@@ -122,7 +122,7 @@ def _flown(
     while mission.status.visits < len(stops):
         time.sleep(max(0.0, due - time.monotonic()))
         due = max(due + _PERIOD, time.monotonic())
-        loop.turn(clock.now())
+        loop.step(clock.now())
         state, status = loop.state, mission.status
         assert state is not None  # noqa: S101 - the loop has turned
         if mission.finished or time.monotonic() - began > _LONGEST:

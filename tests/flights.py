@@ -201,7 +201,7 @@ class Flight:
 
     def turn(self) -> SetpointRecord:
         """One period of the loop."""
-        record = self.loop.turn(self.now)
+        record = self.loop.step(self.now)
         if not self.states or self.states[-1] is not self.mission.state:
             self.states.append(self.mission.state)
         self.records.append(record)

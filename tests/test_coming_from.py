@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from flying import Flyer
 
-from aerodaas.config.beginning import VEHICLES, Beginning
+from aerodaas.config.environment_choices import VEHICLES, EnvironmentChoices
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 
@@ -23,7 +23,7 @@ def fly(section: str, flyer: Flyer, monkeypatch: pytest.MonkeyPatch) -> RobotFli
     """Fly our block of a section with the environment that `aerodaas init` writes."""
     (code,) = re.findall(r"```python\n(.*?)```", SECTIONS[section], re.DOTALL)
     home = {"latitude": 13.0166, "longitude": 77.5695, "altitude": 920.0}
-    environment = Beginning("simulated").document("environment.schema.json", flyer.folder)
+    environment = EnvironmentChoices("simulated").document("environment.schema.json", flyer.folder)
     flyer.write({**environment, "home": home})
     monkeypatch.chdir(flyer.folder)
     with flyer.options():
@@ -78,7 +78,7 @@ def test_the_environment_is_what_init_writes_for_each_vehicle() -> None:
     """Sensors, drone and edge have the names that the blocks use."""
     for vehicle in VEHICLES:
         cameras = None if vehicle in {"simulated", "tello"} else ["rtsp://127.0.0.1/a"]
-        document = Beginning(vehicle, cameras=cameras).document("s", Path())
+        document = EnvironmentChoices(vehicle, cameras=cameras).document("s", Path())
         (robot,) = document["robots"]
         assert {one["id"] for one in robot["sensors"]} == {"camera", "odometry", "battery"}
         assert (robot["id"], document["compute"][0]["id"]) == ("drone", "edge")

@@ -12,7 +12,7 @@ import threading
 import ray
 import ray.actor
 
-__all__ = ["LAST_SECONDS", "exit_soon", "leave"]
+__all__ = ["LAST_SECONDS", "exit_actor", "exit_soon"]
 
 LAST_SECONDS = 30.0
 """Wall seconds from the stop command until the process ends: longer than a head needs to end it,
@@ -27,7 +27,7 @@ def exit_soon(seconds: float = LAST_SECONDS) -> None:
         timer.start()
 
 
-def leave() -> None:
+def exit_actor() -> None:
     """End this actor through Ray, so that it is not restarted; to be called in an actor's method.
 
     This may need the cluster's head, so the process also ends by its own timer.

@@ -19,7 +19,7 @@ from typing import Any
 
 import ray
 
-from aerodaas.actors.cluster.dead_man import exit_soon, leave
+from aerodaas.actors.cluster.dead_man import exit_actor, exit_soon
 from aerodaas.actors.cluster.run_lock import RunLock
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.shutdown import end_actors, may_fly
@@ -37,7 +37,7 @@ _LOOK_INTERVAL = 1.0
 
 @dataclass(frozen=True)
 class Watched:
-    """What a reaper watches and what it ends, its own actor excepted."""
+    """The processes and actors that a reaper watches and ends, its own actor excepted."""
 
     application: ApplicationProcess
     drones: Sequence[Any]
@@ -76,16 +76,16 @@ class ReaperHost:
 class OrphanReaperActor(ReaperHost):
     """Actor for the reaper alone, of a run that is not recorded."""
 
-    def meet(self) -> None:
+    def resolve_address(self) -> None:
         """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
     def stop(self) -> None:
         """Prepare to end: the process ends soon afterwards, at the latest by its own timer."""
         exit_soon()
 
-    def leave(self) -> None:
+    def exit(self) -> None:
         """End the process; called after `stop`."""
-        leave()
+        exit_actor()
 
 
 class _OrphanReaper:
@@ -113,7 +113,7 @@ class _OrphanReaper:
         )
         for actor in (*itertools.chain(*self._ended[0]), *helpers):
             # An actor's address is resolved once, by the cluster's head, which may be lost later.
-            actor.meet.remote()
+            actor.resolve_address.remote()
 
     def _watch(self) -> None:
         while not self._gone() or any(map(may_fly, self._drones)):

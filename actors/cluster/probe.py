@@ -73,7 +73,7 @@ class Probe:
         """Host time of this node, nanoseconds since the epoch."""
         return host_time_ns()
 
-    def take(self, data: bytes) -> int:
+    def receive(self, data: bytes) -> int:
         """Receive a transfer and return its size."""
         return len(data)
 
@@ -93,7 +93,7 @@ class Probe:
         rtt = statistics.median(back - sent for sent, _, back in readings) / 1e9
         data = self.give(_BYTES)
         up = max(
-            self._rate(rtt, lambda: other.take.remote(ray.put(data))) for _ in range(_TRANSFERS)
+            self._rate(rtt, lambda: other.receive.remote(ray.put(data))) for _ in range(_TRANSFERS)
         )
         down = max(self._rate(rtt, lambda: other.give.remote(_BYTES)) for _ in range(_TRANSFERS))
         return LinkMeasurement(rtt, offset, uncertainty, up, down)

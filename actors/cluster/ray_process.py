@@ -76,7 +76,7 @@ def main(application: int, streams: str, words: list[str]) -> None:
     try:
         _supervise(client, streams, words)
     except Exception as error:
-        client.tell(error=f"{type(error).__name__}: {error}")
+        client.send(error=f"{type(error).__name__}: {error}")
         raise
 
 
@@ -103,16 +103,16 @@ def _keep(client: _Client, folder: Path, words: list[str]) -> None:
     """Start Ray and return when it is to be ended."""
     address, reason = _start(client, folder, words)
     if not address:
-        client.tell(error=reason)
+        client.send(error=reason)
         return
-    client.tell(address=address, folder=str(folder))
+    client.send(address=address, folder=str(folder))
     while not client.gone(1.0):
         _reap()
     until = time.monotonic() + _GRACE_SECONDS
     while _under_way(folder) and time.monotonic() < until:
         time.sleep(_LOOK_SECONDS)
     if _under_way(folder):
-        client.tell(flying=True)
+        client.send(flying=True)
     while _under_way(folder):
         _reap()
         time.sleep(_LOOK_SECONDS)
@@ -134,7 +134,7 @@ class _Client:
         """Wait up to `timeout` seconds; return whether it has ended or closed the pipe."""
         return bool(self._poll.poll(timeout * 1000.0))
 
-    def tell(self, **words: object) -> None:
+    def send(self, **words: object) -> None:
         """Send a message, ignored if the application has ended."""
         with contextlib.suppress(OSError):
             print(json.dumps(words), flush=True)  # noqa: T201 - this is the pipe

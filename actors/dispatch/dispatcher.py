@@ -146,7 +146,7 @@ class LiveDispatcher(Dispatcher):
         if managed is not None:
             self._edge_answered(managed, message, now)
             return
-        self._references.note(message)
+        self._references.add(message)
         for one in self.managed:
             if message.stream in one.inputs:
                 self._frame_arrived(one, message, now)

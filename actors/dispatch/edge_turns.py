@@ -96,7 +96,7 @@ class EdgeTurns:
                 made.close()
                 return False
             self._socket = made
-        threading.Thread(target=self._hear, args=(made,), name="turns", daemon=True).start()
+        threading.Thread(target=self._receive, args=(made,), name="turns", daemon=True).start()
         return True
 
     def _say(self, word: bytes) -> None:
@@ -104,7 +104,7 @@ class EdgeTurns:
             if self._socket is not None:
                 self._socket.sendall(word)
 
-    def _hear(self, connection: socket.socket) -> None:
+    def _receive(self, connection: socket.socket) -> None:
         with contextlib.suppress(OSError):
             while connection.recv(1):
                 self._asked, self._granted = False, True

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import ray
 
-from aerodaas.actors.cluster.dead_man import leave
+from aerodaas.actors.cluster.dead_man import exit_actor
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
@@ -82,12 +82,12 @@ class CloudExecutor:
         """Whether it is prepared; False after a restart by Ray."""
         return bool(self._analyses)
 
-    def meet(self) -> None:
+    def resolve_address(self) -> None:
         """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
-    def leave(self) -> None:
+    def exit(self) -> None:
         """End the process."""
-        leave()
+        exit_actor()
 
     def ping(self, data: bytes) -> int:
         """Answer at once, to measure the link; returns the number of bytes."""

@@ -15,7 +15,7 @@ from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.actors.drone.planner import planner_for
 from aerodaas.actors.node_runner import NodeRunner
-from aerodaas.actors.priority import Slack, punctual, raise_niceness
+from aerodaas.actors.priority import IdleGarbageCollector, punctual, raise_niceness
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.losses import ALONE
 from aerodaas.config.file_lock import actor_lock, exclusive
@@ -164,7 +164,7 @@ class DroneActor(NodeActor):
         """Replace the robots' reports; in the loop's thread only."""
         self._reports = self._node.reports()
         notable = [report.notable for report in self._reports.values()]
-        self._changes.note((self.alerts.outlet.sent, *notable))
+        self._changes.update((self.alerts.outlet.sent, *notable))
 
     def _wake(self) -> None:
         for runner in self.runners:
@@ -187,7 +187,7 @@ class DroneActor(NodeActor):
 
     def _loop(self) -> None:
         (runner,) = self.runners
-        node, slack = self._node, Slack()
+        node, slack = self._node, IdleGarbageCollector()
         while not (self.stopping or node.over):
             messages = runner.receive()
             self._calls.serve()

@@ -20,7 +20,7 @@ class ChangeSignal:
         self._value: object = None
         self._over = False
 
-    def note(self, value: object) -> None:
+    def update(self, value: object) -> None:
         """Count a change if `value` differs from the last one."""
         if value != self._value:
             self._value = value

@@ -27,6 +27,7 @@ from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.recorder import RecorderActor, RecorderSpec
+from aerodaas.actors.run.actor_state import ActorState, ask, require_clock, routes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.environment_options import environment_options
@@ -37,7 +38,6 @@ from aerodaas.actors.run.losses import (
     actor_silent,
     drone_lost,
 )
-from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 from aerodaas.clock import host_time_ns
 from aerodaas.config.options import LiveViews
@@ -93,7 +93,7 @@ class Flight:
         # The recorder on a cluster node does not share our working directory.
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
-        self._members: dict[str, Member] = {}
+        self._members: dict[str, ActorState] = {}
         """By name; replaced and never changed, because other threads iterate over it."""
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
@@ -165,9 +165,9 @@ class Flight:
         self._pulse.beat()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
-        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self.note)
+        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self.publish_alert)
 
-    def _start(self, members: list[Member]) -> None:
+    def _start(self, members: list[ActorState]) -> None:
         # Pure readers start first, so that no message is published without its readers.
         for member in reversed(members):
             member.handle.start.remote(self._origin)
@@ -256,7 +256,7 @@ class Flight:
         self._answers[name] = time.monotonic(), robots
         return robots
 
-    def _drone_lost(self, member: Member) -> MissionError:
+    def _drone_lost(self, member: ActorState) -> MissionError:
         """Error for a lost drone actor, which a suspended application may have caused itself."""
         frozen = self._pulse.frozen
         if frozen:
@@ -274,12 +274,14 @@ class Flight:
         """False after this process has left the cluster of the actors."""
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
 
-    def learn(self, application: Application) -> None:
+    def add_definitions(self, application: Application) -> None:
         """Send the application's current definitions to every actor."""
         application = self.plan.session.application.and_later(application)
         session = replace(self.plan.session, application=application)
         self.plan = replace(self.plan, session=session)
-        for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
+        for reference in [
+            one.handle.add_definitions.remote(application) for one in self._members.values()
+        ]:
             # An actor that has died receives it when it is set up again.
             with contextlib.suppress(AeroDaaSError):
                 ask(reference)
@@ -428,7 +430,7 @@ class Flight:
         if path is not None and Path(path) not in self._recordings:
             self._recordings.append(Path(path))
 
-    def leave(self) -> None:
+    def detach(self) -> None:
         """Leave the drones and all other actors to the orphan reaper."""
         self._watch_no_longer()
 
@@ -480,7 +482,10 @@ class Flight:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members = {**self._members, name: Member(name, made.remote(*args), setup, restarts)}
+        self._members = {
+            **self._members,
+            name: ActorState(name, made.remote(*args), setup, restarts),
+        }
 
     def _options(self, name: str, place: Placement, *, restarts: int) -> dict[str, Any]:
         """Ray options of an actor; a detached one, to outlive the application, needs a name."""
@@ -540,7 +545,7 @@ class Flight:
         self._opening.append(executor.prepare())
         return executor
 
-    def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
+    def _prepare(self, members: list[ActorState], progress: Callable[[str], None]) -> None:
         # Before the calls: on a busy machine the first is done before the last is made.
         began = host_time_ns()
         if self._origin:
@@ -564,7 +569,7 @@ class Flight:
         for reference in [self._connect(member) for member in self._members.values()]:
             ask(reference)
 
-    def _connect(self, member: Member) -> Any:  # noqa: ANN401 - Ray's reference
+    def _connect(self, member: ActorState) -> Any:  # noqa: ANN401 - Ray's reference
         """Send a publisher its readers on other nodes, or without shared memory."""
         return member.handle.connect.remote(routes(member, self._members.values()))
 
@@ -591,7 +596,7 @@ class Flight:
                 reason = MissionError(f"no report from {member.name}: {error.cause}")
                 member.report = replace(member.report, error=reason)
 
-    def _report_silence(self, member: Member) -> None:
+    def _report_silence(self, member: ActorState) -> None:
         """Raise an alert, once, for an actor that lives and has not answered for too long."""
         silence = time.monotonic() - member.answered_at
         expected = member.report.phase == "running" and not self._changing
@@ -601,13 +606,13 @@ class Flight:
         if ray.wait([member.pending], timeout=_LOOK_TIMEOUT / 2)[0]:
             return
         member.silent = True
-        self.note("actor_silent", str(actor_silent(member.name, member.report, silence)))
+        self.publish_alert("actor_silent", str(actor_silent(member.name, member.report, silence)))
 
-    def _note_answer(self, member: Member) -> None:
+    def _note_answer(self, member: ActorState) -> None:
         if member.silent:
             member.silent = False
             absence = time.monotonic() - member.answered_at
-            self.note("actor_back", f"{member.name} answers again after {absence:.1f} s")
+            self.publish_alert("actor_back", f"{member.name} answers again after {absence:.1f} s")
         member.answered_at = time.monotonic()
         self._note_file(member.report)
 
@@ -633,22 +638,22 @@ class Flight:
             self._lost(member)
             threading.Thread(target=self._revive, args=(member,), daemon=True).start()
 
-    def _lost(self, member: Member) -> None:
+    def _lost(self, member: ActorState) -> None:
         error = MissionError(f"the actor {member.name} died")
         if member.lost_at is None:
             member.lost_at = time.monotonic()
-            self.note("actor_lost", str(error))
+            self.publish_alert("actor_lost", str(error))
         member.report = ActorReport("failed", error)
 
-    def _back(self, member: Member) -> None:
+    def _back(self, member: ActorState) -> None:
         if member.lost_at is not None:
             absence = time.monotonic() - member.lost_at
             member.lost_at, member.silent = None, False
             member.answered_at = time.monotonic()
             member.report = ActorReport("running")
-            self.note("actor_back", f"{member.name} is back after {absence:.1f} s")
+            self.publish_alert("actor_back", f"{member.name} is back after {absence:.1f} s")
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert of the application's process; in any thread.
 
         It is told here at once, and recorded by way of the drones' actors, which may hang.
@@ -662,9 +667,9 @@ class Flight:
         header = Header(len(self._notes), max([clock.now(), *stamps]), "application")
         self._notes.append(Alert(header, kind, text))
         for name in self._ids():
-            self._members[name].handle.note.remote(kind, text)
+            self._members[name].handle.publish_application_alert.remote(kind, text)
 
-    def _revive(self, member: Member) -> None:
+    def _revive(self, member: ActorState) -> None:
         """Set an actor up again, in a thread, as soon as Ray has restarted it."""
         actor, lost_at = member.handle, member.lost_at
         while member.lost_at == lost_at and not self._stopped:
@@ -673,7 +678,7 @@ class Flight:
                     if actor == self._reaper:
                         # It knows what was there at the start.
                         self._inform_reaper()
-                    ray.get(actor.learn.remote(self.plan.session.application))
+                    ray.get(actor.add_definitions.remote(self.plan.session.application))
                     ray.get(actor.set_origin.remote(self._origin))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:
@@ -685,7 +690,9 @@ class Flight:
             except ActorUnavailableError:
                 pass  # it has not restarted yet, or died again
             except RayTaskError as error:
-                self.note("actor_failed", f"{member.name} cannot start again: {error.cause}")
+                self.publish_alert(
+                    "actor_failed", f"{member.name} cannot start again: {error.cause}"
+                )
                 return
             except RayActorError:
                 if actor == self._reaper:

@@ -71,6 +71,6 @@ def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
 
 
 def _behaviour(report: ActorReport) -> str:
-    """What vehicles do without their actor."""
+    """Text of how vehicles behave without their actor."""
     alone = report.values.get(ALONE, {})
     return "; ".join(dict.fromkeys(alone.values())) or "its own failsafe is what remains"

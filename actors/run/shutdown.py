@@ -49,6 +49,6 @@ def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[
     for actor in killed:
         with contextlib.suppress(RayError):
             # A kill needs the cluster's head, which may be lost; `leave` does not.
-            actor.leave.remote()
+            actor.exit.remote()
             ray.kill(actor)
     return reports

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from aerodaas.actors.streams.codec import Encoded
 from aerodaas.actors.streams.completion import Publication
-from aerodaas.actors.streams.rendezvous import Arrival, Arrivals
+from aerodaas.actors.streams.rendezvous import NewSubscriber, SubscriberListener
 from aerodaas.actors.streams.slots import Slot, SlotPool
 from aerodaas.actors.streams.wire import (
     IN_SLOT,
@@ -48,7 +48,7 @@ _ROOM = 4096
 """Bytes before the array in a lent slot, for the rest of its message."""
 
 
-class _Lent(NamedTuple):
+class _ReservedSlot(NamedTuple):
     """A slot that the publisher's owner fills before it sends the message."""
 
     slot: Slot
@@ -58,7 +58,7 @@ class _Lent(NamedTuple):
 class _ReaderLink:
     """Connection to one reader."""
 
-    def __init__(self, arrival: Arrival, stream: str, publication: Publication) -> None:
+    def __init__(self, arrival: NewSubscriber, stream: str, publication: Publication) -> None:
         """Make a queue and send its far end, and where it is told what is complete.
 
         Raises OSError if the reader is gone or no descriptors are left.
@@ -114,7 +114,7 @@ class _ReaderLink:
         slot.users -= 1
         return None if slot.users else slot
 
-    def leave(self) -> None:
+    def close_queue(self) -> None:
         """Queue nothing more; the reader may still hold slots."""
         self.leaving = True
         self._close_queue()
@@ -176,13 +176,13 @@ class LocalPublisher:
     def __init__(self, scope: str, stream: str) -> None:
         """Open `stream` of `scope` for writing. Raises AeroDaaSError as `streams_folder` does."""
         self._stream = stream
-        self._arrivals = Arrivals(scope, stream)
+        self._arrivals = SubscriberListener(scope, stream)
         self._readers: dict[int, _ReaderLink] = {}
         """By the descriptor of their control connections."""
         self._news = select.epoll()
         self._news.register(self._arrivals.bell, select.EPOLLIN)
         self._pool: SlotPool | None = None
-        self._lent: _Lent | None = None
+        self._lent: _ReservedSlot | None = None
         self._publication: Publication | None = None
         self._number = 0
         """Messages queued so far."""
@@ -195,14 +195,14 @@ class LocalPublisher:
         with self._lock:
             if self._news.closed:
                 return
-            self._hear()
+            self._receive_releases()
             if self._arrivals.waiting:
                 for arrival in self._arrivals.new():
                     self._admit(arrival)
             if self._readers:
                 self._send(encode())
 
-    def lend(self, size: int) -> NDArray[np.uint8] | None:
+    def reserve(self, size: int) -> NDArray[np.uint8] | None:
         """Return `size` bytes of a slot for the first large array of the next message.
 
         None if nobody reads the stream, or no memory is left.
@@ -210,14 +210,16 @@ class LocalPublisher:
         with self._lock:
             if not self._readers:
                 return None
-            self._hear()  # now rather than when the message is in a hurry
+            self._receive_releases()  # now rather than when the message is in a hurry
             if self._lent is not None:
                 self._put_back([self._lent.slot])
                 self._lent = None
-            slot = self._take(_ROOM + 2 * size)  # room for its depth; unwritten pages cost nothing
+            slot = self._acquire_slot(
+                _ROOM + 2 * size
+            )  # room for its depth; unwritten pages cost nothing
             if slot is None:
                 return None
-            self._lent = _Lent(slot, np.frombuffer(slot.memory, np.uint8, size, _ROOM))
+            self._lent = _ReservedSlot(slot, np.frombuffer(slot.memory, np.uint8, size, _ROOM))
             return self._lent.array
 
     def close(self) -> None:
@@ -259,17 +261,17 @@ class LocalPublisher:
             if size is not None and size <= len(lent.slot.memory):
                 encoded.write_into(lent.slot.memory, _ROOM)
                 return lent.slot, size
-        slot = self._take(encoded.size)
+        slot = self._acquire_slot(encoded.size)
         if slot is not None:
             encoded.write_into(slot.memory)
         if lent is not None:  # not before: what was written may be a part of it
             self._put_back([lent.slot])
         return slot, encoded.size
 
-    def _take(self, size: int) -> Slot | None:
+    def _acquire_slot(self, size: int) -> Slot | None:
         try:
             self._pool = self._pool or SlotPool()
-            return self._pool.take(size)
+            return self._pool.acquire(size)
         except OSError:
             return None
 
@@ -284,7 +286,7 @@ class LocalPublisher:
         if self._publication is not None:
             self._publication.complete(self._number)
 
-    def _admit(self, arrival: Arrival) -> None:
+    def _admit(self, arrival: NewSubscriber) -> None:
         try:
             self._publication = self._publication or Publication()
             reader = _ReaderLink(arrival, self._stream, self._publication)
@@ -295,7 +297,7 @@ class LocalPublisher:
         self._readers[reader.control.fileno()] = reader
         self._news.register(reader.control, select.EPOLLIN)
 
-    def _hear(self) -> None:
+    def _receive_releases(self) -> None:
         """Hear who has gone, and which slots are given back."""
         while news := self._news.poll(0):
             for descriptor, _ in news:
@@ -311,7 +313,7 @@ class LocalPublisher:
                     continue
                 (offset,) = RELEASE.unpack(data)
                 if offset == LEAVING:
-                    reader.leave()
+                    reader.close_queue()
                 elif slot := reader.release(offset):
                     self._put_back([slot])
 

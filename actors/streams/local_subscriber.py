@@ -170,7 +170,7 @@ class LocalSubscriber:
         Returns early when woken. Whatever was complete before any of them is among them.
         """
         until = time.monotonic() + timeout if timeout > 0 else 0.0
-        self._hear(select.EPOLLIN)
+        self._set_events(select.EPOLLIN)
         found: dict[_PublisherLink, deque[memoryview]] = {}
         woken, count = False, 0
         while count < _MOST_AT_ONCE:
@@ -185,7 +185,9 @@ class LocalSubscriber:
                     self._introduce(self._unnamed.pop(descriptor))
                 elif descriptor == self._listener.socket.fileno():
                     self._accept()
-            taken = sum(self._take(link, found) for link in [*self._links.values()] if link.behind)
+            taken = sum(
+                self._read_link(link, found) for link in [*self._links.values()] if link.behind
+            )
             if not ready and not taken:
                 break
             count += taken
@@ -231,7 +233,9 @@ class LocalSubscriber:
         time.sleep(max(0.0, until - time.monotonic()))
         return self._poll.poll(0)
 
-    def _take(self, link: _PublisherLink, found: dict[_PublisherLink, deque[memoryview]]) -> int:
+    def _read_link(
+        self, link: _PublisherLink, found: dict[_PublisherLink, deque[memoryview]]
+    ) -> int:
         """Take what is complete of a link; returns how many messages that are."""
         count = 0
         while link.behind:
@@ -257,7 +261,7 @@ class LocalSubscriber:
         self._poll.unregister(link.completion.bell)
         link.close()
 
-    def _hear(self, events: int) -> None:
+    def _set_events(self, events: int) -> None:
         """Wait for these events of the listening socket."""
         if events != self._heard:
             self._heard = events
@@ -269,7 +273,7 @@ class LocalSubscriber:
         except BlockingIOError:
             return
         except OSError:  # no descriptor left: try again at the next call
-            self._hear(0)
+            self._set_events(0)
             return
         if control is not None:
             self._unnamed[control.fileno()] = control

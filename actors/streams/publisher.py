@@ -78,7 +78,7 @@ class Publisher:
         A `PictureMemory` of cameras: height x width x 3. It must not be written to once the message
         is published.
         """
-        lent = None if self._local is None else self._local.lend(height * width * 3)
+        lent = None if self._local is None else self._local.reserve(height * width * 3)
         return own_memory(height, width) if lent is None else lent.reshape(height, width, 3)
 
     def close(self) -> None:

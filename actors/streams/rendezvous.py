@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from aerodaas.actors.private_folder import private_folder
 
-__all__ = ["Arrival", "Arrivals", "Listener", "streams_folder"]
+__all__ = ["Listener", "NewSubscriber", "SubscriberListener", "streams_folder"]
 
 _BACKLOG = 4096
 _BELL = ".bell"
@@ -92,10 +92,10 @@ class Listener:
         """Stop listening, and remove the links."""
         self.socket.close()
         for path in (*self._links, self._folder / self._id):
-            _leave(path)
+            _delete(path)
 
 
-class Arrival(NamedTuple):
+class NewSubscriber(NamedTuple):
     """A subscriber that has come."""
 
     connection: socket.socket
@@ -104,7 +104,7 @@ class Arrival(NamedTuple):
     name: str
 
 
-class Arrivals:
+class SubscriberListener:
     """The subscribers of one stream, as its publisher finds them."""
 
     def __init__(self, scope: str, stream: str) -> None:
@@ -125,7 +125,7 @@ class Arrivals:
             while True:
                 self.bell.recv(1)
 
-    def new(self) -> Iterator[Arrival]:
+    def new(self) -> Iterator[NewSubscriber]:
         """Connect to the subscribers that have come since the last call."""
         self.waiting = False
         try:
@@ -137,12 +137,12 @@ class Arrivals:
         for name in sorted(names - self._known):
             connection = self._connect(self._folder / name)
             if connection is not None:
-                yield Arrival(connection, int(Path(name).suffix[1:]), name)
+                yield NewSubscriber(connection, int(Path(name).suffix[1:]), name)
 
     def close(self) -> None:
         """Look no more."""
         self.bell.close()
-        _leave(self._path)
+        _delete(self._path)
 
     def gone(self, name: str) -> None:
         """Connect again to a subscriber whose connection has ended, should it still listen."""
@@ -194,7 +194,7 @@ def _make_in(folder: Path, make: Callable[[], None]) -> None:
             return
 
 
-def _leave(path: Path) -> None:
+def _delete(path: Path) -> None:
     """Remove something, and its folder after the last."""
     path.unlink(missing_ok=True)
     with contextlib.suppress(OSError):

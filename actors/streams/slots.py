@@ -46,7 +46,7 @@ class SlotPool:
         self._free: list[Slot] = []
         self._end = 0
 
-    def take(self, size: int) -> Slot | None:
+    def acquire(self, size: int) -> Slot | None:
         """Return a slot of at least `size` bytes for writing; None if the pool has no more.
 
         Raises OSError if the system grants no more memory.

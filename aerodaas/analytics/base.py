@@ -328,7 +328,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
 
     @property
     def given_triggers(self) -> tuple[Trigger, ...]:
-        """What `trigger` was called with."""
+        """Triggers that `trigger` has added, in order."""
         return self._triggers
 
     def _require_idle(self, what: str) -> None:

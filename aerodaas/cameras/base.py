@@ -20,7 +20,7 @@ __all__ = [
     "Picture",
     "PictureMemory",
     "PlacingCamera",
-    "ToldCamera",
+    "VehicleAddressedCamera",
     "ZoomingCamera",
     "most_memory",
     "own_memory",
@@ -123,7 +123,7 @@ class PlacingCamera(Camera, Protocol):
 
 
 @runtime_checkable
-class ToldCamera(Camera, Protocol):
+class VehicleAddressedCamera(Camera, Protocol):
     """A camera whose video's address the vehicle may tell."""
 
     def follow_video(self, address: str) -> None:

@@ -63,7 +63,7 @@ class FrameAssembler:
         self.dropped = 0
         """Number of packets outside a frame: from before the first start code, or invalid."""
 
-    def take(self, packet: bytes, now: int) -> list[WholeFrame]:
+    def add_packet(self, packet: bytes, now: int) -> list[WholeFrame]:
         """Add a packet received at `now` (host nanoseconds); returns the frames it completes."""
         done: list[WholeFrame] = []
         starts = packet.startswith(_START_CODE)
@@ -125,7 +125,7 @@ class _Bits:
 
 @dataclass(frozen=True)
 class _Sequence:
-    """What a sequence's parameters say of frame numbers."""
+    """Frame numbering of an H.264 sequence, by its parameters."""
 
     number_bits: int
     has_planes: bool

@@ -97,7 +97,7 @@ class SimulatedCamera:
         if self._gimbal is not None or self._most_zoom > 1.0:
             model = zoomed(self._mounted, self._zoom)
             self._model = model if self._gimbal is None else levelled(model, self._gimbal, pose)
-            self._renderer.turn(self._model)
+            self._renderer.orient(self._model)
         memory = self._memory(self._model.height, self._model.width)
         image = self._renderer.render(seconds(stamp), pose, memory)
         return Picture(image, stamp, depth=self._renderer.depth())

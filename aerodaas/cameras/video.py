@@ -7,7 +7,7 @@ import re
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
-from aerodaas.cameras.told_video import TOLD, ToldSource
+from aerodaas.cameras.vehicle_addressed import TOLD, VehicleAddressedSource
 from aerodaas.cameras.video_file import VideoFile
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
@@ -35,9 +35,9 @@ class VideoCamera:
         self._settings = camera_settings(sensor)
         path = SecretUrl(required_path(sensor, self._settings, "video file, URL or device"))
         self._label = str(path)
-        self._source: VideoFile | LiveSource | ToldSource
+        self._source: VideoFile | LiveSource | VehicleAddressedSource
         if path.get_secret_value() == TOLD and environment.camera_driver(sensor) == "mavlink":
-            self._source = ToldSource(sensor.full_id)
+            self._source = VehicleAddressedSource(sensor.full_id)
         elif _LIVE.match(path.get_secret_value()):
             self._source = LiveSource(path)
         else:
@@ -69,7 +69,7 @@ class VideoCamera:
 
     def follow_video(self, address: str) -> None:
         """Take the address that the vehicle tells, where the settings say so."""
-        if isinstance(self._source, ToldSource):
+        if isinstance(self._source, VehicleAddressedSource):
             self._source.follow(address)
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:

@@ -56,7 +56,7 @@ def import_bag(
     from aerodaas.config.model import RecordingConfig  # noqa: PLC0415
     from aerodaas.environment.mission_run import recording_folder  # noqa: PLC0415
     from aerodaas.recording.ros.bag import RosBag  # noqa: PLC0415
-    from aerodaas.recording.ros.beginning import BagTopics  # noqa: PLC0415
+    from aerodaas.recording.ros.bag_preview import BagTopics  # noqa: PLC0415
     from aerodaas.recording.ros.importing import import_bag as write  # noqa: PLC0415
 
     taken = BagTopics(
@@ -89,7 +89,7 @@ def _named(given: list[str] | None, usual: str) -> dict[str, str]:
 
 
 def _topics(bag: RosBag) -> list[str]:
-    from aerodaas.recording.ros.beginning import use_of  # noqa: PLC0415 - slow to load
+    from aerodaas.recording.ros.bag_preview import use_of  # noqa: PLC0415 - slow to load
 
     lines = []
     for topic in sorted(bag.topics.values(), key=lambda one: one.name):

@@ -14,7 +14,7 @@ import typer
 from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
-    from aerodaas.config.beginning import Beginning
+    from aerodaas.config.environment_choices import EnvironmentChoices
 
 __all__ = ["init"]
 
@@ -84,7 +84,7 @@ def init(
         aerodaas init --vehicle px4 --camera rtsp://127.0.0.1:8554/front
         aerodaas init --discover
     """
-    from aerodaas.config.beginning import Beginning  # noqa: PLC0415 - slow to load
+    from aerodaas.config.environment_choices import EnvironmentChoices  # noqa: PLC0415 - slow to load
 
     _require_free(output, force=force)
     if not discover and ask_tello is not None:
@@ -96,7 +96,7 @@ def init(
             raise ConfigError("say whose it is, too: --vehicle simulated, px4, ardupilot or tello")
         beginning = _asked()
     else:
-        beginning = Beginning(vehicle, url, cameras=camera)
+        beginning = EnvironmentChoices(vehicle, url, cameras=camera)
     _write(beginning, _compute(address), output, force=force)
 
 
@@ -106,11 +106,11 @@ def _require_free(output: Path, *, force: bool) -> None:
         raise ConfigError(f"{output} is there already: --force writes over it, --output elsewhere")
 
 
-def _asked() -> Beginning:
+def _asked() -> EnvironmentChoices:
     from aerodaas.cameras.devices import video_devices  # noqa: PLC0415 - only where it is asked
-    from aerodaas.config.beginning import (  # noqa: PLC0415 - slow to load
+    from aerodaas.config.environment_choices import (  # noqa: PLC0415 - slow to load
         VEHICLES,
-        Beginning,
+        EnvironmentChoices,
         camera_words,
         default_address,
     )
@@ -132,7 +132,7 @@ def _asked() -> Beginning:
         raise ConfigError(
             "nobody answers: say --vehicle simulated, px4, ardupilot or tello, or --discover"
         ) from None
-    return Beginning(vehicle, address, cameras=cameras)
+    return EnvironmentChoices(vehicle, address, cameras=cameras)
 
 
 def _discovered(
@@ -141,10 +141,10 @@ def _discovered(
     cameras: list[str] | None,
     ask_tello: str | None,
     seconds: float,
-) -> Beginning:
-    """What was found, told, as far as options do not say otherwise."""
+) -> EnvironmentChoices:
+    """Choices by options first, then by discovery, which is printed."""
     from aerodaas.cameras.devices import video_devices  # noqa: PLC0415 - only where it is asked
-    from aerodaas.config.beginning import Beginning, camera_words  # noqa: PLC0415 - slow to load
+    from aerodaas.config.environment_choices import EnvironmentChoices, camera_words  # noqa: PLC0415 - slow to load
     from aerodaas.drivers.mavlink.discovery import hear_vehicles  # noqa: PLC0415 - slow to load
     from aerodaas.drivers.tello.discovery import find_tello  # noqa: PLC0415 - slow to load
 
@@ -154,10 +154,10 @@ def _discovered(
         heard = hear_vehicles(seconds)
         tello = tello_found.result()
     devices, notes = video_devices()
-    found = [Beginning(one.family, one.url, one.system) for one in heard.vehicles]
+    found = [EnvironmentChoices(one.family, one.url, one.system) for one in heard.vehicles]
     told = [one.text for one in heard.vehicles]
     if tello.address is not None:
-        found.append(Beginning(_TELLO, tello.address))
+        found.append(EnvironmentChoices(_TELLO, tello.address))
         told.append(f"tello at {tello.address}")
     for line in [*told, *(f"camera {one.path}: {one.name}" for one in devices)]:
         typer.echo(f"  found: {line}")
@@ -169,13 +169,13 @@ def _discovered(
             "no vehicle was found: switch it on and try again, or say --vehicle simulated, px4, "
             "ardupilot or tello"
         )
-    chosen = fitting[0] if fitting else Beginning(vehicle or "")
+    chosen = fitting[0] if fitting else EnvironmentChoices(vehicle or "")
     if len(fitting) > 1:
         typer.echo("  written is the first; another one by --vehicle and --url")
     alone = [one.address for one in found].count(chosen.address) == 1
     if cameras is None:
         cameras = [*camera_words(chosen.vehicle), *(one.path for one in devices)] or None
-    return Beginning(
+    return EnvironmentChoices(
         chosen.vehicle, url or chosen.address, None if alone or url else chosen.system, cameras
     )
 
@@ -194,7 +194,11 @@ def _compute(address: str | None) -> list[dict[str, str]] | None:
 
 
 def _write(
-    beginning: Beginning, compute: list[dict[str, str]] | None, output: Path, *, force: bool
+    beginning: EnvironmentChoices,
+    compute: list[dict[str, str]] | None,
+    output: Path,
+    *,
+    force: bool,
 ) -> None:
     from aerodaas.config.model import validated  # noqa: PLC0415 - slow to load
     from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load

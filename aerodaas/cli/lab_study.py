@@ -166,7 +166,7 @@ def workload_of(name: str, duration: float | None, edges: int | None) -> Workloa
 def spread_of(
     address: str | None, names: list[str]
 ) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
-    """What shares the seeds over a cluster, if there is one, and the schedulers to send there."""
+    """Executor that shares the seeds over a cluster, if there is one, and the schedulers for it."""
     if address is None:
         return None, names
     from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
@@ -182,13 +182,13 @@ def _loads(
         wanted = SIX if names == "six" else names.split(",")
         return [workload_of(name.strip(), duration, edges) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
-    from aerodaas.cli.flown_workload import (  # noqa: PLC0415
-        Flown,
+    from aerodaas.cli.recorded_workload import (  # noqa: PLC0415
+        RecordedWorkload,
         flown_trace,
         flown_workload,
     )
 
-    flight = Flown.read(flown)
+    flight = RecordedWorkload.read(flown)
     workload = flown_workload(flight)
     if edges is not None:
         workload = workload.on_edges(edges)

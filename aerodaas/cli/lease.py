@@ -86,7 +86,7 @@ def ask(
     found = client.request_lease(checked(LeaseIn, wanted, "the lease"))
     if wait:
         found = _granted(client, found)
-    _tell(found, as_json=as_json)
+    _print_lease(found, as_json=as_json)
 
 
 @app.command("list")
@@ -126,7 +126,7 @@ def extend(
 
     aerodaas lease extend 33b5a1c07d2e 10
     """
-    _tell(client_at(at).extend_lease(lease, minutes), as_json=as_json)
+    _print_lease(client_at(at).extend_lease(lease, minutes), as_json=as_json)
 
 
 @app.command("give-back")
@@ -135,7 +135,7 @@ def give_back(lease: LeaseId, at: At = None, as_json: Json = False) -> None:  # 
 
     aerodaas lease give-back 33b5a1c07d2e
     """
-    _tell(client_at(at).end_lease(lease), as_json=as_json)
+    _print_lease(client_at(at).end_lease(lease), as_json=as_json)
 
 
 def _granted(client: ProviderClient, lease: LeaseOut) -> LeaseOut:
@@ -148,7 +148,7 @@ def _granted(client: ProviderClient, lease: LeaseOut) -> LeaseOut:
     return lease
 
 
-def _tell(lease: LeaseOut, *, as_json: bool) -> None:
+def _print_lease(lease: LeaseOut, *, as_json: bool) -> None:
     if as_json:
         print_json(lease)
         return

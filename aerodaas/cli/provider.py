@@ -305,7 +305,7 @@ def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # 
     client = client_at(at)
     found = client.mission(mission)
     with ProvidedView(shown=not as_json) as view:
-        follower = MissionFollower(client, found, view.note)
+        follower = MissionFollower(client, found, view.show_message)
         follower.start()
         seen = -1
         while True:

@@ -170,7 +170,7 @@ def _oidc(
     roles: Iterable[str],
     unknown: str,
 ) -> OidcSettings | None:
-    """What an issuer is trusted with; raises ConfigError for options that do not fit."""
+    """Trust in an OpenID issuer; raises ConfigError for options that do not fit."""
     from aerodaas.protocol.schemas import Role  # noqa: PLC0415 - slow to load
     from aerodaas.service.access.oidc import OidcSettings  # noqa: PLC0415 - as above
 

@@ -147,7 +147,7 @@ def _simulate(family: Family, options: dict[str, object], run: Path | None, robo
     signal.signal(signal.SIGTERM, _interrupt)
     code = 0
     with contextlib.suppress(KeyboardInterrupt), simulator:
-        _tell(simulator, robot)
+        _print_instructions(simulator, robot)
         if run is None:
             simulator.wait()
         else:
@@ -155,7 +155,7 @@ def _simulate(family: Family, options: dict[str, object], run: Path | None, robo
     raise typer.Exit(code)
 
 
-def _tell(simulator: SitlProcess, robot: str) -> None:
+def _print_instructions(simulator: SitlProcess, robot: str) -> None:
     typer.echo(f"{simulator.program.command[0]} flies; what it prints is in {simulator.log}")
     typer.echo(f"Its vehicle is {simulator.url}. In another terminal:\n")
     typer.echo(f"  aerodaas run my_app.py {' '.join(_settings(simulator, robot))}\n")

@@ -48,7 +48,7 @@ class EndpointConfig(Strict):
 
 
 class RuntimeEnvConfig(Strict):
-    """What one analysis has for itself: packages, environment variables, or a container."""
+    """Runtime environment of one analysis: packages, environment variables, or a container."""
 
     packages: list[str] = Field(default_factory=list)
     """Requirements such as `torch==2.4.1`, or paths of wheels, laid over the node's own."""

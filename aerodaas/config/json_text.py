@@ -24,7 +24,7 @@ _SHOWN = 60
 
 
 class _OddityError(Exception):
-    """What a text may not hold, found while it is read."""
+    """Content that JSON does not permit, found while it is read."""
 
 
 def read_json(path: str | Path, what: str) -> Any:  # noqa: ANN401 - any JSON
@@ -83,7 +83,7 @@ def parse_json(text: str, place: str) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _remedy(text: str, at: int) -> str:
-    """What is to be done about what other dialects of JSON permit; empty for anything else."""
+    """Remedy for content that other dialects of JSON permit; empty for anything else."""
     if text[at : at + 1] == "#" or text[at : at + 2] in {"//", "/*"}:
         return "; JSON has no comments: delete it"
     # Where it stops, at a comma, at the bracket behind it or between, depends on the Python.

@@ -73,7 +73,7 @@ __all__ = [
 
 
 class TaskConfig(Strict):
-    """What a scheduler is told of one analysis, by its name; times in milliseconds.
+    """Task of one analysis for an analytics scheduler; times in milliseconds.
 
     Benefit and costs are in one unit of the user's choice.
     """
@@ -129,7 +129,7 @@ class SchedulersConfig(Strict):
 
 
 class RecordingConfig(Strict):
-    """What is written to the MCAP file."""
+    """Settings of the MCAP recording."""
 
     enabled: bool = True
     path: str | None = None

@@ -22,7 +22,7 @@ Speed: TypeAlias = "float | Literal['max']"
 
 @dataclass(frozen=True)
 class ProviderOptions:
-    """What the command line asks of a provider; None keeps the service's own default."""
+    """Options of a submission to a provider; None keeps the service's own default."""
 
     url: str | None = None
     """Provider's service instead of the application's environment."""
@@ -45,7 +45,7 @@ class ProviderOptions:
 
 @dataclass(frozen=True)
 class LiveViews:
-    """Who looks on at what is recorded."""
+    """Live viewers of the recorded streams."""
 
     foxglove: str | None = None
     """Address (`host:port`) of Foxglove's WebSocket; None for none."""

@@ -33,7 +33,7 @@ class OperatorPlaceConfig(Strict):
 
 
 class RemoteIdConfig(Strict):
-    """What Remote ID tells of operator and aircraft (ASTM F3411-22a, EN 4709-002).
+    """Remote ID data of operator and aircraft (ASTM F3411-22a, EN 4709-002).
 
     It is personal: no recording, log or catalogue has it.
     """

@@ -59,7 +59,7 @@ class GeofenceConfig(Strict):
 
 
 class LimitsConfig(Strict):
-    """What the drone's node clamps to, and how long it waits before it protects the drone."""
+    """Limits that the drone's node enforces, and the delays of its watchdogs."""
 
     cruise_speed: Positive = 1.0
     max_speed: Positive = 5.0
@@ -167,7 +167,7 @@ class SensorConfig(Strict):
         return self.id if self._robot is None else f"{self._robot}/{self.id}"
 
     def carried_by(self, robot: str) -> SensorConfig:
-        """The same sensor on board of `robot`."""
+        """Copy of the sensor that is on board of `robot`."""
         sensor = self.model_copy()
         sensor._robot = robot  # noqa: SLF001 - of this class
         return sensor

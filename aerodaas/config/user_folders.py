@@ -9,17 +9,17 @@ __all__ = ["cache_folder", "config_folder", "state_folder"]
 
 
 def cache_folder() -> Path:
-    """What can be fetched again."""
+    """Folder of files that can be fetched again."""
     return _folder("XDG_CACHE_HOME", ".cache")
 
 
 def config_folder() -> Path:
-    """What the user has set."""
+    """Folder of the user's settings."""
     return _folder("XDG_CONFIG_HOME", ".config")
 
 
 def state_folder() -> Path:
-    """What must outlive a process."""
+    """Folder of state that outlives a process."""
     return _folder("XDG_STATE_HOME", ".local/state")
 
 

@@ -16,7 +16,7 @@ _UNREAD = ("<!DOCTYPE", "<!ENTITY", "\0")
 
 
 class XmlError(ConfigError):
-    """What a text may not be, as a sentence without its subject: `is no XML`."""
+    """Fault of an XML text, as a sentence without its subject: `is no XML`."""
 
     def __init__(self, problem: str, line: int | None = None) -> None:
         """Keep the line of the text, where the `problem` has one."""

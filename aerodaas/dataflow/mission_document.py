@@ -127,7 +127,7 @@ class SchedulerEntry(_Entry):
 
 
 class TriggerEntry(_Entry):
-    """What an analysis does when a result meets a condition."""
+    """Trigger of an analysis: a condition on its results, and the target that it commands."""
 
     target: ScopedWord
     """Id of the analysis that is woken, or of the robot that is commanded."""

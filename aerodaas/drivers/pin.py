@@ -53,7 +53,7 @@ class Pin:
         return False
 
     def reports(self, now: float) -> list[str]:
-        """What the operator must know at `now`, one sentence each."""
+        """Reports for the operator at `now`, one sentence each."""
         said = []
         if now - self._refused_at <= _TOLD and self._refused is not None:
             host, port = self._refused

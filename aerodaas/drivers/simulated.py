@@ -110,7 +110,7 @@ class SimulatedVehicle:
 
     @property
     def actuators(self) -> SimulatedActuators:
-        """What the environment file names."""
+        """Actuators that the environment file names."""
         return self._actuators
 
     def _open_parachute(self) -> None:
@@ -199,7 +199,7 @@ class SimulatedVehicle:
         return faults
 
     def health(self) -> HealthReadings:
-        """What the simulation has of it; raises VehicleError if not connected."""
+        """Health of the simulated vehicle; raises VehicleError if not connected."""
         self._require_connection()
         cells = self._airframe.cells
         return HealthReadings(

@@ -17,7 +17,7 @@ from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISenso
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.environment.actuators import require_actuators
 from aerodaas.environment.mission_run import MissionRun
-from aerodaas.environment.offering import Unflown, note_built, offer
+from aerodaas.environment.offering import BuildOnlyMission, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
@@ -103,9 +103,9 @@ class Environment(PaperNames, IEnvironment):
         return self._flights > 0 or self.unflown is not None
 
     @property
-    def unflown(self) -> Unflown | None:
-        """What stands in for the flight of an application that was only built."""
-        return self._mission if isinstance(self._mission, Unflown) else None
+    def unflown(self) -> BuildOnlyMission | None:
+        """Mission of an application that is only built; None in a flight."""
+        return self._mission if isinstance(self._mission, BuildOnlyMission) else None
 
     @property
     def has_hooks(self) -> bool:

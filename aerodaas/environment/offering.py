@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuildEndedError",
-    "Unflown",
+    "BuildOnlyMission",
     "note_built",
     "offer",
     "offered",
@@ -103,13 +103,13 @@ def _tell_unstarted(found: Sequence[Environment]) -> None:
         print(f"error: {text}", file=sys.stderr)  # noqa: T201 - a script has no other voice
 
 
-def offer(environment: Environment) -> Unflown | None:
+def offer(environment: Environment) -> BuildOnlyMission | None:
     """Offer an environment that is ready; None if it is to fly."""
     found = _offered.get()
     if found is None:
         return None
     found.append(environment)
-    return Unflown()
+    return BuildOnlyMission()
 
 
 def require_no_more(environment: Environment) -> None:
@@ -118,7 +118,7 @@ def require_no_more(environment: Environment) -> None:
         environment.unflown.refuse()
 
 
-class Unflown(MissionRun):
+class BuildOnlyMission(MissionRun):
     """Stands in for the mission of an application that is only built: it never flies."""
 
     def __init__(self) -> None:

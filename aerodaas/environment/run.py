@@ -166,7 +166,7 @@ class Run:
             return reader
 
         for text in self.graph.unused:
-            flight.note("unused", text)
+            flight.publish_alert("unused", text)
         self.graph.reader = read
         self.graph.on_growth = self.grow
         for callback in self.graph.on_launch:
@@ -291,7 +291,7 @@ class Run:
     def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert of this process; nothing once the run is over."""
         if self._flight is not None and not self._finished.is_set():
-            self._flight.note(kind, text)
+            self._flight.publish_alert(kind, text)
 
     def command(self, robot: str, command: Command) -> Answer:
         """Send a robot's mission a command; raises MissionError once the run is over."""
@@ -313,7 +313,7 @@ class Run:
         flight = self._flying("nothing can be added")
         self._change_models()
         self._listen_for_remote()
-        flight.learn(self._application())
+        flight.add_definitions(self._application())
         flight.grow(
             make_plan(
                 flight.plan.session,
@@ -328,7 +328,7 @@ class Run:
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
         """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
         flight = self._flying("no scheduler can be set")
-        flight.learn(self._application(scheduler))
+        flight.add_definitions(self._application(scheduler))
         flight.use_scheduler(scheduler)
 
     def _flying(self, hence: str) -> Flight | InlineFlight:
@@ -336,7 +336,7 @@ class Run:
             raise MissionError(f"the mission is over: {hence}")
         return self._flight
 
-    def look(self, newest: int = 200) -> FlightState:
+    def poll(self, newest: int = 200) -> FlightState:
         """Return the present state, with the `newest` latencies of each robot."""
         assert self._flight is not None  # noqa: S101 - launched
         with self._polling:
@@ -354,7 +354,7 @@ class Run:
             if time.monotonic() - self._looked < _BEAT_AGE:
                 continue
             try:
-                self.look()
+                self.poll()
             except AeroDaaSError as error:
                 # A thread that waits for the run meets the same error and raises it.
                 if not self._awaited and str(error) != said:
@@ -510,7 +510,7 @@ class Run:
         assert self._flight is not None  # noqa: S101 - launched
         with self._view as watching:
             while time.monotonic() < until:
-                state = self.look()
+                state = self.poll()
                 watching.update(state)
                 if state.over:
                     return
@@ -543,7 +543,7 @@ class Run:
         flown = time.monotonic() - self._launched
         with self._polling:
             if self._flight.flying:
-                self._flight.leave()
+                self._flight.detach()
                 show_left(self._flight.recordings)
                 return
             reports = self._flight.stop()

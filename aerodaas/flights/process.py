@@ -172,11 +172,11 @@ class FlightProcess:
         """What a look has found last."""
         return None if self._run is None else self._run.state
 
-    def look(self, newest: int = 200) -> FlightState:
+    def poll(self, newest: int = 200) -> FlightState:
         """Look at the drones, and bring them home once their lease has ended."""
         if self._run is None:
             raise MissionError("the flight has not begun")
-        state = self._run.look(newest)
+        state = self._run.poll(newest)
         if self._lease.reason:
             self._come_home(self._lease.reason)
         if self._order.rehearsal and self.served.meter.time > 60.0 * self._order.minutes:

@@ -183,10 +183,10 @@ class Clearance:
         """Highest safe speed along the line of sight `towards`, m/s; infinite if it is free."""
         points = self._points
         if self._at is not None and now is not None:
-            east_north = self._at.position[:2] + points @ _turn(self._at.yaw).T
-            points = (east_north - now.position[:2]) @ _turn(now.yaw)
+            east_north = self._at.position[:2] + points @ _rotation(self._at.yaw).T
+            points = (east_north - now.position[:2]) @ _rotation(now.yaw)
         points = points[np.linalg.norm(points - towards.offset, axis=1) > _BODY]
-        along, aside = (points @ _turn(towards.bearing)).T
+        along, aside = (points @ _rotation(towards.bearing)).T
         ahead = along[(along > 0.0) & (along < towards.distance) & (np.abs(aside) < _HALF_WIDTH)]
         if not ahead.size:
             return math.inf
@@ -194,7 +194,7 @@ class Clearance:
         return braking_speed(float(ahead.min()) - self._before, self._limits.braking, reaction_time)
 
 
-def _turn(angle: float) -> NDArray[np.float64]:
+def _rotation(angle: float) -> NDArray[np.float64]:
     """Rotation matrix (2, 2), counter-clockwise."""
     return rotation_from_rpy(0.0, 0.0, angle)[:2, :2]
 

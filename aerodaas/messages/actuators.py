@@ -20,7 +20,7 @@ __all__ = ["ActuatedVehicle", "Actuators", "MoveResult"]
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class MoveResult:
-    """What became of one command to an actuator."""
+    """Result of one command to an actuator."""
 
     number: int
     """That of `Actuators.move`, or of `Actuators.release_parachute`."""
@@ -57,7 +57,7 @@ class Actuators(Protocol):
         ...
 
     def results(self) -> list[MoveResult]:
-        """What became of commands since the last call."""
+        """Results of commands since the last call."""
         ...
 
     @property

@@ -26,7 +26,7 @@ OWN_CHECKS = "vehicle"
 
 @dataclass(frozen=True, slots=True)
 class HealthReadings:
-    """What a driver knows beyond the vehicle's state; None is not known, which is not good."""
+    """Health readings beyond the vehicle's state; None is not known, which is not good."""
 
     cells: tuple[float, ...] | None = None
     """Volts of each cell of the battery."""
@@ -69,7 +69,7 @@ class MeasuredVehicle(Vehicle, Protocol):
 
 
 class Verdict(str, enum.Enum):
-    """What an item means for a take-off."""
+    """Verdict of an item on a take-off."""
 
     GOOD = "good"
     WARNING = "warning"
@@ -113,7 +113,7 @@ class HealthReport:
 
 
 def gravest(items: Iterable[HealthItem]) -> Verdict:
-    """What the items mean together: `REFUSED`, `WARNING`, or else `GOOD`."""
+    """Gravest verdict of the items: `REFUSED`, `WARNING`, or else `GOOD`."""
     found = {one.verdict for one in items}
     grave = (one for one in (Verdict.REFUSED, Verdict.WARNING) if one in found)
     return next(grave, Verdict.GOOD)

@@ -48,7 +48,7 @@ class MissionModePhase(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class PlanProgress:
-    """What the vehicle says of its plan."""
+    """Progress of the vehicle's own plan."""
 
     phase: MissionModePhase = MissionModePhase.NONE
     fault: str = ""
@@ -76,7 +76,7 @@ class MissionMode(Protocol):
         """Fly the plan that is READY; raises VehicleError if none is, or if somebody else flies."""
         ...
 
-    def leave(self) -> None:
+    def clear(self) -> None:
         """Forget the plan; what flies the vehicle next is the caller's next order to it."""
         ...
 

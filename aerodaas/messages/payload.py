@@ -51,7 +51,7 @@ class GimbalTarget:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class LensTarget:
-    """What a camera's lens is to be set to; percent of its range."""
+    """Zoom and focus for a camera's lens; percent of its range."""
 
     zoom: float | None = None
     """0 sees most, 100 least; None leaves it."""
@@ -125,7 +125,7 @@ class PhotoFailure:
 
 @dataclass(frozen=True, slots=True)
 class CameraStatus:
-    """What a camera says that it is and does; what is not told is None."""
+    """Model and activity of a camera; None is not known."""
 
     name: str
     """By which people know it, such as `camera (component 100)`."""

@@ -51,7 +51,7 @@ class WaypointType(str, enum.Enum):
 
 
 class HeightReference(str, enum.Enum):
-    """What a waypoint's z is counted from, whatever its x and y are."""
+    """Reference of a waypoint's z, whatever its x and y are."""
 
     HOME = "home"
     """The environment's home."""
@@ -63,7 +63,7 @@ class HeightReference(str, enum.Enum):
 
 @dataclass(frozen=True)
 class HeightDatum:
-    """What is known of sea and ground where a drone flies."""
+    """Heights of sea and ground where a drone flies, as far as they are known."""
 
     sea_level: float | None = None
     """Metres of the local frame's zero above mean sea level; None if it is not known."""
@@ -299,7 +299,7 @@ class Waypoint:
     def resolve(
         self, takeoff: Vector, origin: GeodeticOrigin | None, datum: HeightDatum = _NO_DATUM
     ) -> Waypoint:
-        """The same waypoint in the local ENU frame of the environment.
+        """Convert the waypoint to the local ENU frame of the environment.
 
         `takeoff` is where this robot took off, ENU metres; `datum` is for heights above sea and
         ground. Raises InvalidWaypointError if a global waypoint meets an environment without a
@@ -365,7 +365,7 @@ class Waypoint:
 
     @property
     def lens(self) -> LensTarget | None:
-        """What the camera's lens is set to; None to leave it as it is."""
+        """Zoom and focus for the camera; None to leave them as they are."""
         if self.zoom is None and self.focus is None:
             return None
         return LensTarget(self.zoom, self.focus)

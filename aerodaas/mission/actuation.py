@@ -37,7 +37,7 @@ of the setpoint loop."""
 
 @dataclass(slots=True)
 class _Task:
-    """What is to be done at one stop."""
+    """Actuator commands of one stop."""
 
     stop: QueuedWaypoint
     left: list[tuple[str, str]]
@@ -76,7 +76,7 @@ class Actuation:
     _home: bool = False
 
     def take_failure(self) -> str:
-        """What has failed, where the flight is not to go on after it; told once."""
+        """Failure after which the flight is not to go on; returned once, otherwise empty."""
         failure, self._failure = self._failure, ""
         return failure
 
@@ -107,7 +107,7 @@ class Actuation:
         self._release = _Release(command.parachute, number)
         return Answer(accepted=True)
 
-    def look(self, now: int) -> None:
+    def poll(self, now: int) -> None:
         """Take note of what became of commands, and withdraw those of a stop that was left.
 
         `now` is the mission clock, nanoseconds.
@@ -115,14 +115,14 @@ class Actuation:
         try:
             actuators = None if self.vehicle is None else self.vehicle.actuators
             for result in () if actuators is None else actuators.results():
-                self._note(result, now)
+                self._on_result(result, now)
             for task in self._tasks.values():
                 if actuators is not None and now - task.attended > _INTERRUPTED:
                     self._withdraw(task, actuators)
         except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight
             self.log.alert(now, _KIND, f"the actuators: {failure_line(error)}")
 
-    def turn(self, now: int, *, home: bool) -> None:
+    def step(self, now: int, *, home: bool) -> None:
         """Give its rest to all that has one, if the drone flies by no plan from now on.
 
         That is what `home` says: it comes home, lands, or the mission is over.
@@ -152,7 +152,7 @@ class Actuation:
             actuators.withdraw(task.number)
             task.number = task.since = None
 
-    def _note(self, result: MoveResult, now: int) -> None:
+    def _on_result(self, result: MoveResult, now: int) -> None:
         release, asked = self._release, self._asked.pop(result.number, None)
         if release is not None and release.number == result.number:
             self._release = None

@@ -35,7 +35,7 @@ class ManualControl:
     """The controls of one drone: one operator has them, as long as they are heard of."""
 
     def __init__(self) -> None:
-        """Nobody has the controls."""
+        """Start without an operator."""
         self._session = 0
         self._operator = ""
         self._velocity: VelocityCommand | None = None
@@ -43,7 +43,7 @@ class ManualControl:
         """Mission clock after which the holder counts as silent, nanoseconds."""
 
     def operator(self, now: int) -> str:
-        """Who has the controls at `now`, mission clock in nanoseconds; empty for nobody."""
+        """Name of who has the controls at `now` (mission clock, ns); empty for nobody."""
         return self._operator if now < self._expires else ""
 
     def handle(self, command: TakeControls | Steer | ReleaseControls, now: int) -> str:
@@ -52,17 +52,17 @@ class ManualControl:
         match command:
             case TakeControls() if own or not holder:
                 self._session, self._operator = command.session, command.operator
-                self._hear(None, MANUAL_SECONDS, now)
+                self._update(None, MANUAL_SECONDS, now)
             case Steer() if own:
                 velocity = command.velocity
-                self._hear(velocity, min(velocity.valid_for, MANUAL_SECONDS), now)
+                self._update(velocity, min(velocity.valid_for, MANUAL_SECONDS), now)
             case ReleaseControls() if own:
                 self._session, self._velocity, self._expires = 0, None, 0
             case _:
                 return f"{holder} has the controls" if holder else "take the controls first"
         return ""
 
-    def _hear(self, velocity: VelocityCommand | None, seconds: float, now: int) -> None:
+    def _update(self, velocity: VelocityCommand | None, seconds: float, now: int) -> None:
         self._velocity, self._expires = velocity, now + round(seconds * NANOSECONDS)
 
     def velocity(self, now: int) -> VelocityCommand | None:
@@ -73,7 +73,7 @@ class ManualControl:
         return moves if moves.yaw_rate or moves.velocity.any() else None
 
     def reason(self, now: int) -> str:
-        """What to say of the pause at `now`; empty if nobody has flown by hand."""
+        """Reason of the pause at `now`; empty if nobody has flown by hand."""
         if not self._operator:
             return ""
         if self.operator(now):
@@ -136,7 +136,7 @@ class CommandHandler:
             if command.navigation.stream is None and not len(command.navigation):
                 return DONE
         by_hand = OpenStream("", index=command.index, deadline=command.deadline)
-        return self._take(command.navigation, by_hand, now, command.cause)
+        return self._navigate(command.navigation, by_hand, now, command.cause)
 
     def rearrange(self, command: RearrangeNavigation) -> Answer:
         """Change the order of queued waypoints and remove others, unless the drone is there."""
@@ -182,9 +182,9 @@ class CommandHandler:
             item = AeroNavigation(kind, item, scheduling, priority=stream.priority)
         if message.index is not None:
             stream = replace(stream, index=message.index)
-        return self._take(item, stream, now, message.cause, replaces=message.replaces)
+        return self._navigate(item, stream, now, message.cause, replaces=message.replaces)
 
-    def _take(
+    def _navigate(
         self,
         navigation: AeroNavigation,
         stream: OpenStream,

@@ -23,7 +23,7 @@ _KIND = "video"
 
 @dataclass(slots=True)
 class _Order:
-    """What the camera was told last."""
+    """Last order to the camera."""
 
     on: bool
     where: str
@@ -65,8 +65,8 @@ class Filming:
             if not stop.arrived:
                 return True
             self._served[stop.id] = stop
-            self._tell(_Order(on, f"at {stop.id}", now), now)
-            self.look(now)
+            self._order_camera(_Order(on, f"at {stop.id}", now), now)
+            self.poll(now)
         order = self._order
         return order is not None and not (order.acknowledged or order.over)
 
@@ -74,9 +74,9 @@ class Filming:
         """End a recording that the mission has begun."""
         if self._ours:
             self._ours = False
-            self._tell(_Order(on=False, where="at the end of the mission", since=now), now)
+            self._order_camera(_Order(on=False, where="at the end of the mission", since=now), now)
 
-    def look(self, now: int) -> None:
+    def poll(self, now: int) -> None:
         """Take note of what the camera says, at `now` (mission clock, ns)."""
         order = self._order
         if order is None or order.over:
@@ -106,7 +106,7 @@ class Filming:
         elif seconds(now - order.since) > self._timeout:
             self._fail(order, f"the camera did not acknowledge it within {self._timeout:g} s", now)
 
-    def _tell(self, order: _Order, now: int) -> None:
+    def _order_camera(self, order: _Order, now: int) -> None:
         before, self._order = self._order, order
         if before is not None and not (before.acknowledged or before.over):
             self._fail(before, "the camera was told otherwise before it acknowledged it", now)

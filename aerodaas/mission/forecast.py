@@ -60,7 +60,7 @@ class BatteryForecast:
         position, speed = state.odometry.position, self._limits.cruise_speed
         route = [self._as_flown(stop) for stop in stops]
         needed = self._meter.route(position, route, self._home, speed)
-        self._outlook = self._look(state, needed)
+        self._outlook = self._compare(state, needed)
         available = state.battery.fraction - self._limits.battery_land
         if not (route and needed > max(0.0, available) * _MARGIN):
             self._fault, self._short_since = "", None
@@ -89,7 +89,7 @@ class BatteryForecast:
         # The next one may be late, but has not been left out.
         return now <= self._due + _PERIOD
 
-    def _look(self, state: VehicleState, needed: float) -> BatteryOutlook | None:
+    def _compare(self, state: VehicleState, needed: float) -> BatteryOutlook | None:
         """Compare the charge with that at which the supervisor has the drone return."""
         charge, limits = state.battery.fraction, self._limits
         if not math.isfinite(charge):

@@ -60,7 +60,7 @@ class MissionLog:
         return len(self._reached), len(self._reached) + len(set(ahead) - self._reached)
 
     def completion(self) -> str:
-        """What became of all waypoints, once none is left to fly to."""
+        """Summary of all waypoints, once none is left to fly to."""
         if not self.given_up:
             return "all waypoints are visited" if self.visits else "no waypoint is left to fly to"
         count = len(self._reached)

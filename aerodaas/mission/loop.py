@@ -69,7 +69,7 @@ class SetpointLoop:
         self._last_action: type[Action] | None = None
         self._asked_at = 0
 
-    def turn(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
+    def step(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
         """Take one turn at mission time `now` (ns); returns the setpoints requested and sent.
 
         `neighbours` are the other drones to keep away from. Raises VehicleError only if the vehicle

@@ -258,9 +258,9 @@ class Mission:
             case Resume():
                 return self._resume()
             case ReturnHome():
-                return self._leave(MissionState.RETURNING, command.reason)
+                return self._abandon(MissionState.RETURNING, command.reason)
             case End():
-                return self._leave(MissionState.LANDING, command.reason)
+                return self._abandon(MissionState.LANDING, command.reason)
             case _:
                 raise TypeError(f"{type(command).__name__} is no command")
         return DONE
@@ -314,7 +314,7 @@ class Mission:
             self._to(MissionState.HOLDING, "resumed")
         return DONE
 
-    def _leave(self, state: MissionState, reason: str) -> Answer:
+    def _abandon(self, state: MissionState, reason: str) -> Answer:
         if self.state in _ON_GROUND:
             self._to(MissionState.ABORTED, f"{reason} before take-off")
         elif self.state is MissionState.LANDING:
@@ -374,8 +374,8 @@ class Mission:
     def _observe(self, state: VehicleState, now: int) -> None:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
-        self.photographer.look(now)
-        self.actuation.look(now)
+        self.photographer.poll(now)
+        self.actuation.poll(now)
         if self.actuation.released and not self.finished:
             self._to(MissionState.ABORTED, f"the parachute {self.actuation.released} was released")
             self._log.alert(now, "parachute", self._machine.reason)
@@ -434,7 +434,7 @@ class Mission:
 
     def _protect(self, state: VehicleState) -> None:
         before, self._assessment = self._assessment, self._supervisor.assess(state, self._now)
-        demand, reason = self._assessment.demand, self._assessment.gravest.text
+        demand, reason = self._assessment.action, self._assessment.gravest.text
         for fault in self._assessment.news(before):
             self._log.alert(self._now, fault.kind, fault.text, fault.about)
         if self._supervisor.taken_over(self._now) is not None:
@@ -477,7 +477,7 @@ class Mission:
             return self._stay(state)
         # An autopilot that flies the plan by itself flies on through a short loss of the link.
         unheard = self.handover.flies and self._assessment.gravest.kind == "link_lost"
-        if self._assessment.demand is FailsafeAction.HOLD and not unheard:
+        if self._assessment.action is FailsafeAction.HOLD and not unheard:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
         if not self.handover.active:
@@ -485,7 +485,7 @@ class Mission:
         self._forecast_battery(state)
         served = self._navigator.served(self._now)
         if isinstance(served, QueuedWaypoint):
-            if self.handover.turn(list(self._navigator.queue), state, self._now):
+            if self.handover.step(list(self._navigator.queue), state, self._now):
                 return self._supervise(state)
             return self._serve(served, state)
         self.take_back("what is to be flown has changed")
@@ -499,7 +499,7 @@ class Mission:
         self._to(MissionState.PAUSED, self._manual.reason(self._now))
         self._forecast_battery(state)
         velocity = self._manual.velocity(self._now)
-        if velocity is None or self._assessment.demand is FailsafeAction.HOLD:
+        if velocity is None or self._assessment.action is FailsafeAction.HOLD:
             return self._hover(state)
         self._leg = self._anchor = None
         return Fly(velocity_setpoint(velocity, state))
@@ -548,7 +548,7 @@ class Mission:
         return Fly(flown, stop.cause)
 
     def _after_failure(self, failure: str, state: VehicleState) -> Action:
-        """What follows where an actuator has failed, and the flight is not to go on."""
+        """Action after the failure of an actuator, where the flight is not to go on."""
         if self._options.on_actuator_failure == "pause":
             self._paused = True
             return self._stay(state)
@@ -606,7 +606,7 @@ class Mission:
     def _return(self, state: VehicleState) -> Action:
         self._leg = None
         lost = state.mode is VehicleMode.LOST or not has_position(state)
-        if lost and self._assessment.demand in {FailsafeAction.HOLD, FailsafeAction.RETURN}:
+        if lost and self._assessment.action in {FailsafeAction.HOLD, FailsafeAction.RETURN}:
             return Return()
         position = state.odometry.position
         way = (above := self._route.above_home(position)) - position
@@ -642,7 +642,7 @@ class Mission:
         if state in _LEAVING and self.state not in _LEAVING and not commanded:
             self._note_unfinished(reason)
         self._machine.to(state, self._now, reason)
-        self.actuation.turn(self._now, home=self.finished or state in _LEAVING)
+        self.actuation.step(self._now, home=self.finished or state in _LEAVING)
         if self.finished:
             self.photographer.end(self._now)
 

@@ -202,9 +202,9 @@ class Navigator:
                 self._unanswered = request
                 self._planner.submit(request)
         plan = self._planner.poll()
-        return None if plan is None else self._take(plan)
+        return None if plan is None else self._adopt(plan)
 
-    def _take(self, plan: Plan) -> list[str]:
+    def _adopt(self, plan: Plan) -> list[str]:
         request = plan.request
         if request is self._unanswered:
             self._unanswered = None

@@ -27,12 +27,12 @@ from aerodaas.messages.payload import (
 )
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.filming import Filming
-from aerodaas.mission.gaze import Gaze, fresh, near
 from aerodaas.mission.log import MissionLog, words
 from aerodaas.mission.photo_trigger import PhotoTrigger
+from aerodaas.mission.point_of_interest import PointOfInterest, fresh, near
 from aerodaas.mission.queue import QueuedWaypoint
 
-__all__ = ["NO_CAMERA", "PhotoRequest", "Photographer", "Shutter"]
+__all__ = ["NO_CAMERA", "PhotoCapture", "PhotoRequest", "Photographer"]
 
 NO_CAMERA = "the vehicle has no camera for pictures, or none that answers"
 _BUSY = "the camera was still busy with the one before"
@@ -55,7 +55,7 @@ class PhotoRequest:
     """Why nothing was."""
 
 
-class Shutter:
+class PhotoCapture:
     """The camera of a vehicle; raises nothing but what `take` says."""
 
     def __init__(self, vehicle: PayloadVehicle | None, log: MissionLog, timeout: float) -> None:
@@ -82,7 +82,7 @@ class Shutter:
         """Whether a picture is awaited."""
         return bool(self._awaited)
 
-    def take(self, label: str, now: int, *, on_the_way: bool = False) -> PhotoRequest:
+    def request(self, label: str, now: int, *, on_the_way: bool = False) -> PhotoRequest:
         """Ask for a picture, for which a waypoint waits or, `on_the_way`, nobody.
 
         Raises VehicleError and what cameras do.
@@ -102,18 +102,18 @@ class Shutter:
             self._miss(label, 1, _BUSY, now)
             return
         try:
-            self.take(label, now, on_the_way=True)
+            self.request(label, now, on_the_way=True)
         except VehicleError as error:
             self._miss(label, 1, str(error), now)
         except Exception as error:  # noqa: BLE001 - a driver's camera must not end a flight
             self._miss(label, 1, failure_line(error), now)
 
-    def look(self, now: int) -> None:
+    def poll(self, now: int) -> None:
         """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
         try:
             camera = self.camera
             for outcome in () if camera is None else camera.outcomes():
-                self._note(outcome, now)
+                self._on_outcome(outcome, now)
         except Exception as error:  # noqa: BLE001 - a driver's camera must not end a flight
             self._log.alert(now, "photo", f"the camera: {failure_line(error)}")
         for number, request in list(self._awaited.items()):
@@ -126,7 +126,7 @@ class Shutter:
         self.lost += 1
         self._log.alert(now, "photo", f"{label}: no picture: {reason}")
 
-    def _note(self, outcome: PhotoOutcome, now: int) -> None:
+    def _on_outcome(self, outcome: PhotoOutcome, now: int) -> None:
         number = outcome.number
         request = None if number is None else self._awaited.get(number)
         if isinstance(outcome, Photo):
@@ -158,7 +158,7 @@ _AGAIN = 2 * NANOSECONDS
 
 @dataclass(slots=True)
 class _Task:
-    """What is to be done on the way to one stop, and there."""
+    """Pictures on the way to one stop, and at it."""
 
     stop: QueuedWaypoint
     aim: GimbalTarget | None
@@ -184,9 +184,9 @@ class Photographer:
         self._vehicle = vehicle if isinstance(vehicle, PayloadVehicle) else None
         self._log = log
         self._timeout = timeout
-        self._shutter = Shutter(self._vehicle, log, timeout)
+        self._shutter = PhotoCapture(self._vehicle, log, timeout)
         self._filming = Filming(self._vehicle, log, timeout)
-        self._gaze = Gaze()
+        self._gaze = PointOfInterest()
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
         self._served: _Task | None = None
@@ -238,10 +238,10 @@ class Photographer:
         task = self._tasks.get(stop.id)
         return task.trigger if task is not None and task.stop is stop else None
 
-    def look(self, now: int) -> None:
+    def poll(self, now: int) -> None:
         """Take note of pictures and video that were taken, and of what failed, at `now` (ns)."""
-        self._shutter.look(now)
-        self._filming.look(now)
+        self._shutter.poll(now)
+        self._filming.poll(now)
 
     def end(self, now: int) -> None:
         """End what goes on after the mission, at `now` (ns)."""
@@ -300,7 +300,7 @@ class Photographer:
         if self._gaze.place is None:
             return
         try:
-            self._gaze.turn(self._gimbal(), odometry, now, task.stop.waypoint.yaw)
+            self._gaze.aim(self._gimbal(), odometry, now, task.stop.waypoint.yaw)
         except Exception as error:  # noqa: BLE001 - a driver's gimbal must not end a flight
             self._log.alert(now, "photo", f"the gimbal: {failure_line(error)}")
 
@@ -337,7 +337,7 @@ class Photographer:
         if not (there and lens) or self._shutter.busy:
             return
         if task.stop.waypoint.photo:
-            task.request = self._shutter.take(task.stop.id, now)
+            task.request = self._shutter.request(task.stop.id, now)
         else:
             task.over = True
 
@@ -382,7 +382,7 @@ class Photographer:
         return camera.adjusted
 
     def _lateness(self, gimbal: Gimbal | None, now: int, *, lens: bool) -> str:
-        """What was missing when time was up."""
+        """Text of what was missing when time was up."""
         if self._shutter.busy:
             return f"the camera was busy for {self._timeout:g} s"
         if not lens:

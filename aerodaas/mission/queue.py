@@ -105,7 +105,7 @@ class WaypointQueue:
                 place = min(index + offset.get(waypoint.priority, 0), len(level))
                 offset[waypoint.priority] = offset.get(waypoint.priority, 0) + 1
                 level.insert(place, stop)
-                self._leave(level[1:])
+                self._withdraw(level[1:])
             self._levels[waypoint.priority] = level
 
     def _check(self, arriving: list[Waypoint], index: int | None, source: str) -> None:
@@ -175,7 +175,7 @@ class WaypointQueue:
 
     def leave_place(self) -> None:
         """Mark that the drone has left its stop; remaining hover times are kept."""
-        self._leave(self)
+        self._withdraw(self)
 
     def movable(self) -> list[QueuedWaypoint]:
         """Stops of the list being served that a plan may reorder."""
@@ -247,6 +247,6 @@ class WaypointQueue:
         return [self._levels[priority] for priority in sorted(self._levels)]
 
     @staticmethod
-    def _leave(stops: Iterable[QueuedWaypoint]) -> None:
+    def _withdraw(stops: Iterable[QueuedWaypoint]) -> None:
         for stop in stops:
             stop.arrived = False

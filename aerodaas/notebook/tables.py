@@ -37,7 +37,7 @@ Row = dict[str, Any]
 def live_table(
     stream: AeroStreamData[Any], *, items: int | None = None, seconds: float = 5.0
 ) -> DataFrame:
-    """What a stream brings from now on, in flight.
+    """Table of a stream's items from now on, in flight.
 
     Numbers, texts and states become columns, vectors three of them (`position_east`, …), detections
     a row each; a frame's pixels are left out.
@@ -76,7 +76,7 @@ def live_table(
 
 
 def recorded_table(recording: str | Path, what: str | AeroStreamData[Any]) -> DataFrame:
-    """What was recorded of a stream, or on a channel.
+    """Table of a recorded stream, or of a channel.
 
     Detections are a row each, as in flight. Of other messages nested fields are joined by dots, and
     lists are JSON.

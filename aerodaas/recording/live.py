@@ -39,7 +39,7 @@ _BACKLOG = 256
 """Messages queued for a slow client; older ones are dropped for this client only."""
 
 
-class WebGate:
+class LoopbackProxy:
     """Passes connections on to a local server once their request names this machine.
 
     A web page of a stranger's, or one whose name has been made to resolve to this machine, is
@@ -173,7 +173,7 @@ class LiveServer(ServerListener):
                 message_backlog_size=_BACKLOG,
             )
             try:
-                self._gate = WebGate(host.strip("[]"), int(port), (inner, self._server.port))
+                self._gate = LoopbackProxy(host.strip("[]"), int(port), (inner, self._server.port))
             except BaseException:
                 self._server.stop()
                 raise

@@ -184,7 +184,7 @@ class Drops:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Labels:
-    """What a recorded message says beside its own fields."""
+    """Labels of a recorded message beside its own fields."""
 
     robot: str = ""
     ahead: Int64 = 0

@@ -122,14 +122,14 @@ def _row(name: str, photo: Photo) -> list[object]:
             *(("", "") if place.altitude is None else (f"{place.altitude:.3f}", place.datum)),
         ]
     )
-    heading, pitch, roll = _look(photo)
+    heading, pitch, roll = _camera_attitude(photo)
     row += [_degrees(heading), _degrees(pitch), _degrees(roll)]
     row += [f"{seconds(photo.stamp):.3f}", photo.label]
     row += ["", "", ""] if odometry is None else [f"{axis:.3f}" for axis in odometry.position]
     return row
 
 
-def _look(photo: Photo) -> tuple[float | None, float | None, float | None]:
+def _camera_attitude(photo: Photo) -> tuple[float | None, float | None, float | None]:
     """Heading, pitch and roll of the camera, radians, where they are known."""
     if photo.odometry is None:
         return None, None, None
@@ -151,7 +151,7 @@ def _exif(photo: Photo) -> Image.Exif:
     if photo.place is not None:
         tags = exif.get_ifd(IFD.GPSInfo)
         tags.update(_gps_tags(photo.place))
-        heading, _, _ = _look(photo)
+        heading, _, _ = _camera_attitude(photo)
         if heading is not None:
             tags[GPS.GPSImgDirectionRef] = "T"
             tags[GPS.GPSImgDirection] = math.degrees(heading) % 360.0

@@ -38,7 +38,7 @@ __all__ = [
     "CALIBRATION_SCHEMA",
     "DETECTIONS_SCHEMA",
     "MOUNT_SCHEMA",
-    "Shot",
+    "RecordedImage",
     "camera_of",
     "decoded_ahead",
     "detections",
@@ -149,7 +149,7 @@ class _VideoFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class RecordedImage:
     """An image of a recording, not decoded yet."""
 
     header: Header
@@ -242,7 +242,7 @@ def shots(
     since: int | None = None,
     *,
     as_written: bool = False,
-) -> Iterator[Shot]:
+) -> Iterator[RecordedImage]:
     """Iterate over images in the order of recording, without decoding them.
 
     Recordings of other software have no frame numbers; there a header has the message's
@@ -279,24 +279,24 @@ def shots(
         head = next((heads[name] for name in _heads(record.topic) if name in heads), None)
         if head is None or head.captured != record.captured:
             header = Header(record.sequence, record.captured, _frame_id(record.value))
-            yield Shot(header, None, record, video)
+            yield RecordedImage(header, None, record, video)
         else:
             about: FrameInfo = head.value
             size = about.width, about.height
             depth = depths.get(_depth_of(record.topic))
             if depth is not None and depth.captured != record.captured:
                 depth = None
-            yield Shot(about.header, about.odometry, record, video, size, measured=depth)
+            yield RecordedImage(about.header, about.odometry, record, video, size, measured=depth)
 
 
-def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
+def decoded_ahead(found: Iterator[RecordedImage]) -> Iterator[RecordedImage]:
     """Iterate over `found`, with the next few images being decoded by background threads."""
     first = next(found, None)
     if first is None:
         return
     # The frames of a video depend on each other, still images do not.
     threads = 1 if first.video is not None else 2
-    waiting: deque[Shot] = deque()
+    waiting: deque[RecordedImage] = deque()
     pool = ThreadPoolExecutor(threads, "decoder")
     try:
         for shot in chain([first], found):

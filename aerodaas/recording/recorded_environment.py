@@ -198,7 +198,7 @@ def allowed_content(content: object) -> dict[str, Any]:
 
 
 def left_out(content: object) -> list[str]:
-    """What a replay would have used of a recorded environment and does not read, sorted.
+    """Parts of a recorded environment that a replay does not read, sorted.
 
     Args:
         content: The recorded environment, from `recorded_content`.

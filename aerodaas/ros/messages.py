@@ -340,7 +340,7 @@ class BatteryState(IdlStruct, typename="sensor_msgs::msg::dds_::BatteryState_"):
 
 @dataclass
 class ObjectHypothesis(IdlStruct, typename="vision_msgs::msg::dds_::ObjectHypothesis_"):
-    """What an object may be, and how surely, 0 to 1."""
+    """Class of an object and its probability, 0 to 1."""
 
     class_id: str = ""
     score: float64 = 0.0

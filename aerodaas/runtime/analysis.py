@@ -128,7 +128,7 @@ class AnalysisNode(Node):
         return self._session.next_due(self.spec.stream, self.spec.work.rate, after)
 
     def _receive(self, message: Message[Any]) -> None:
-        self._frames.note(message)
+        self._frames.add(message)
         if message.stream == self.spec.state:
             self._vehicle = message.item or self._vehicle
         elif isinstance(message.item, Wake):

@@ -14,7 +14,7 @@ from aerodaas.cameras.base import (
     Picture,
     PictureMemory,
     PlacingCamera,
-    ToldCamera,
+    VehicleAddressedCamera,
     ZoomingCamera,
 )
 from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
@@ -68,7 +68,7 @@ class CameraNode(Node):
         super().open(host)
         self._opened = True
         self.camera.open()
-        self._told_camera = self.camera if isinstance(self.camera, ToldCamera) else None
+        self._told_camera = self.camera if isinstance(self.camera, VehicleAddressedCamera) else None
         self._gimballed = self.camera if isinstance(self.camera, GimballedCamera) else None
         self._zooming = self.camera if isinstance(self.camera, ZoomingCamera) else None
 

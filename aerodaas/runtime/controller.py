@@ -227,14 +227,14 @@ class VehicleController:
         elif message.stream in self.spec.commands:
             self.mission.handle(message.item, now)
 
-    def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
+    def step(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """Execute one cycle of the setpoint loop and publish setpoint and status.
 
         A cycle that raises, because of an application's data, empties the queue and lets the
         drone hover; the error is raised only after a second of such cycles.
         """
         try:
-            record = self.loop.turn(now, neighbours)
+            record = self.loop.step(now, neighbours)
             self._failures = 0
         except Exception as error:
             self._failures += 1

@@ -153,10 +153,10 @@ class DroneNode(Node):
 
     def _steer(self, controller: VehicleController, now: int) -> None:
         separation = controller.mission.limits.separation
-        controller.turn(now, self._whereabouts.around(controller.id, now, separation))
+        controller.step(now, self._whereabouts.around(controller.id, now, separation))
         state = controller.loop.state
         if state is not None:
-            self._whereabouts.hear(controller.id, Whereabouts.of(state))
+            self._whereabouts.update(controller.id, Whereabouts.of(state))
         source = f"drone/{controller.id}"
         for alert in controller.new_alerts():
             self.host.alert(alert.kind, alert.text, now, alert.values, source)
@@ -191,7 +191,7 @@ class DroneNode(Node):
     def _receive(self, message: Message[Any], now: int) -> None:
         if message.stream in self._neighbours:
             for name, where in (message.item or {}).items():
-                self._whereabouts.hear(name, where)
+                self._whereabouts.update(name, where)
             return
         for controller in self._controllers.values():
             controller.receive(message, now)
@@ -269,7 +269,7 @@ class DroneNode(Node):
         return self._controllers[robot].latencies.newest(newest)
 
     def behaviours_alone(self) -> dict[str, str]:
-        """What each vehicle does without its process, by robot."""
+        """Behaviour of each vehicle without its process, by robot."""
         return {
             name: controller.vehicle.capabilities.alone
             for name, controller in self._controllers.items()

@@ -289,7 +289,7 @@ class InlineFlight:
         except LoopOverError as over:
             return Answer(accepted=False, text=f"{over}: {self._robots[robot].status.state.value}")
 
-    def note(self, kind: str, text: str) -> None:
+    def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert of the application; in any thread."""
         header = Header(len(self._notes), self._executor.clock.now(), "application")
         self._notes.append(Alert(header, kind, text))
@@ -297,7 +297,7 @@ class InlineFlight:
             # By the drone's stream of alerts, which is recorded.
             self._executor.parts[self._drone.name].alert(kind, text)
 
-    def learn(self, application: object) -> None:
+    def add_definitions(self, application: object) -> None:
         """Do nothing: every definition of the application is in this process."""
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
@@ -375,11 +375,13 @@ class InlineFlight:
         """Say what has not returned, and close the recording without it."""
         part = self._executor.part_at_work
         names = ", ".join(node.name for node in part.nodes) if part is not None else "a node"
-        self.note("analysis_hung", f"{names} did not return within {_STOP_TIMEOUT:g} s: it is left")
+        self.publish_alert(
+            "analysis_hung", f"{names} did not return within {_STOP_TIMEOUT:g} s: it is left"
+        )
         if self._recorder is not None:
             self._recorder.close()
 
-    def leave(self) -> None:
+    def detach(self) -> None:
         """End with the application: a simulated drone does not outlive it."""
         self.stop()
 

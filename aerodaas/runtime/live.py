@@ -45,7 +45,7 @@ class LiveReader:
         until = time.monotonic() + (float("inf") if timeout is None else timeout)
         while not self._waiting:
             over = self._over()
-            self._take(min(0.2, max(0.0, until - time.monotonic())))
+            self._read(min(0.2, max(0.0, until - time.monotonic())))
             late = time.monotonic() >= until
             # Whether a mission that has just ended is known to be over must not decide.
             if not self._waiting and (over or (late and self._over())):
@@ -57,7 +57,7 @@ class LiveReader:
     def latest_message(self, timeout: float | None) -> Message[Any]:
         """Return the newest message that has not been returned; raises as `next_message` does."""
         message = self.next_message(timeout)
-        self._take(0.0)
+        self._read(0.0)
         if self._waiting:
             message = self._waiting[-1]
             self._waiting.clear()
@@ -65,13 +65,13 @@ class LiveReader:
 
     def newest(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
         """Return the newest item, again if there is none newer; raises like `next` without one."""
-        self._take(0.0)
+        self._read(0.0)
         if self._newest is None:
             self.next(timeout)
         self._waiting.clear()
         return self._newest
 
-    def _take(self, timeout: float) -> None:
+    def _read(self, timeout: float) -> None:
         for message in self._source.receive(timeout):
             if message.item is not None:
                 self._waiting.append(message)

@@ -55,7 +55,7 @@ class RobotReport:
 
     @property
     def notable(self) -> tuple[object, ...]:
-        """What the application is told at once, rather than at its next look."""
+        """Values whose change the application is told at once, rather than at its next poll."""
         status = self.status
         return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
 

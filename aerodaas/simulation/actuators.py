@@ -58,7 +58,7 @@ class SimulatedActuators:
         self._moves = [one for one in self._moves if one.number != number]
 
     def results(self) -> list[MoveResult]:
-        """What was done since the last call."""
+        """Results of moves since the last call."""
         results, self._results = self._results, []
         return results
 

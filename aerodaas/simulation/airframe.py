@@ -27,7 +27,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class RangefinderSettings(BaseModel):
-    """What a rangefinder that looks down can measure; by default as small lidars do."""
+    """Range and noise of a rangefinder that looks down; by default those of small lidars."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -148,7 +148,7 @@ class Autopilot:
         """Advance by one step of the flight dynamics."""
         rotor = self._rotor
         if self.armed and self.battery.fraction > 0.0:
-            demand, yaw_rate = self._demand()
+            demand, yaw_rate = self._velocity_setpoint()
             rotor.step(demand, yaw_rate)
         else:
             rotor.step(None, 0.0)
@@ -168,7 +168,7 @@ class Autopilot:
     def _believed_yaw(self) -> float:
         return self._rotor.yaw + self._noise.yaw_drift
 
-    def _demand(self) -> tuple[Triple | None, float]:
+    def _velocity_setpoint(self) -> tuple[Triple | None, float]:
         """Velocity and yaw rate for the next step."""
         if self._spooling > 0.0:
             self._spooling -= STEP

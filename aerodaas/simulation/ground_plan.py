@@ -50,7 +50,7 @@ class Shape:
 
 
 def ground_plan(world: World) -> list[Shape]:
-    """What stands still in a world, in the scenario's order."""
+    """Shapes of a world that stand still, in the scenario's order."""
     return [shape for thing in world.things if (shape := _shape(thing)) is not None]
 
 

@@ -42,7 +42,7 @@ from aerodaas.geometry.depth import METRE
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.scene.light import HAZE
-from aerodaas.simulation.scene.scene import Looks, Scene
+from aerodaas.simulation.scene.scene import ObjectAppearance, Scene
 from aerodaas.simulation.world import World
 
 __all__ = ["DepthRenderer", "Renderer", "renderer_for"]
@@ -69,7 +69,9 @@ class Renderer:
     Raises SourceError if the software renderer is not available.
     """
 
-    def __init__(self, world: World, camera: CameraModel, looks: Looks | None = None) -> None:
+    def __init__(
+        self, world: World, camera: CameraModel, looks: ObjectAppearance | None = None
+    ) -> None:
         """Build the scene and an offscreen buffer of the camera's size."""
         load_prc_file_data("aerodaas", _SETTINGS)
         # OpenCV has two small things to do for a picture. Its other threads, which wait for more by
@@ -116,7 +118,7 @@ class Renderer:
         buffer.make_display_region().set_camera(eye)
         return pixels
 
-    def turn(self, camera: CameraModel) -> None:
+    def orient(self, camera: CameraModel) -> None:
         """Turn the camera as `camera` is mounted, and zoom to its focal length."""
         if camera.fx != self._camera.fx:
             self._eye.node().get_lens().set_focal_length(camera.fx)

@@ -66,7 +66,7 @@ class ProvidedView:
         if self._view is not None:
             self._view.__exit__(None, None, None)
 
-    def note(self, text: str) -> None:
+    def show_message(self, text: str) -> None:
         """Tell of something on this side, in any thread."""
         with self._lock:
             self._notes.append(text)

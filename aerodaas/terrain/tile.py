@@ -48,7 +48,7 @@ class Grid:
         return self.west + (self.columns - 1) * self.longitude_step
 
     def around(self, longitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same longitudes, by whole turns as near to the grid's middle as they may be."""
+        """Shift longitudes by whole turns as near to the grid's middle as they may be."""
         middle = 0.5 * (self.west + self.east)
         return longitudes - _TURN * np.round((longitudes - middle) / _TURN)
 

@@ -62,7 +62,7 @@ class Channel:
             self._count += 1
             heapq.heappush(self._waiting, (due, self._count, content, peer))
 
-    def turn(self, now: float) -> None:
+    def deliver(self, now: float) -> None:
         """Deliver the packets due at `now` seconds."""
         while self._waiting and self._waiting[0][0] <= now:
             _, _, content, peer = heapq.heappop(self._waiting)

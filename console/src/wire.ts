@@ -5,7 +5,7 @@
  */
 export type Scope = "fly" | "sense" | "compute";
 /**
- * What an item means for a take-off.
+ * Verdict of an item on a take-off.
  */
 export type Verdict = "good" | "warning" | "refused" | "unknown";
 /**
@@ -30,7 +30,7 @@ export type MissionPhase =
  */
 export type StreamKind = "pictures" | "detections" | "navigation";
 /**
- * What a waypoint's z is counted from, whatever its x and y are.
+ * Reference of a waypoint's z, whatever its x and y are.
  */
 export type HeightReference = "home" | "sea" | "ground";
 /**
@@ -660,7 +660,7 @@ export interface RobotConfig {
   start: [number, number, number];
 }
 /**
- * What the drone's node clamps to, and how long it waits before it protects the drone.
+ * Limits that the drone's node enforces, and the delays of its watchdogs.
  */
 export interface LimitsConfig {
   arrival_radius: number;

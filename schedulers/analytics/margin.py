@@ -49,7 +49,7 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.estimates import TimeEstimates
 from aerodaas.schedulers.analytics.forecast import LATENESS, Forecast
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
-from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 from aerodaas.schedulers.analytics.quality import QualityWatch
 
 __all__ = ["Margin"]
@@ -97,7 +97,7 @@ class Margin(AnalyticsScheduler):
         self._wakes: list[int] = []
         """Timers asked for that have not come yet, a heap."""
         self._free_at = 0.0
-        self._steps: list[tuple[float, Lane, Job]] = []
+        self._steps: list[tuple[float, JobQueue, Job]] = []
         self._planned: set[Task] = set()
         self._awaited: dict[tuple[str, str], Job] = {}
         """Jobs of the plan that are forecast, by model and source."""
@@ -318,7 +318,7 @@ class Margin(AnalyticsScheduler):
                 self._awaited[job.what] = job
         self._stale = False
 
-    def _lane(self, model: _Model, begin: float, now: int) -> Lane:
+    def _lane(self, model: _Model, begin: float, now: int) -> JobQueue:
         profile = model.profile
         bonus = model.quality.worth()
         benefit = profile.benefit + bonus
@@ -332,14 +332,14 @@ class Margin(AnalyticsScheduler):
                 cost = profile.edge_cost + elsewhere
                 jobs.append(Job(task, begin, float(task.deadline), benefit, cost))
                 if len(jobs) == _LOOK:
-                    return Lane(belief, jobs)
+                    return JobQueue(belief, jobs)
         cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, bonus)
         for at, source in model.forecast.due(now, int(begin + HORIZON)):
             what = (profile.model, source)
             jobs.append(Job(what, float(at), float(at + profile.deadline), benefit, cost))
             if len(jobs) == _LOOK:
                 break
-        return Lane(belief, jobs)
+        return JobQueue(belief, jobs)
 
     def _price(self, now: int) -> float:
         """Value of edge time, per nanosecond: the gain of the best mix of models on it.

@@ -10,7 +10,7 @@ from typing import Any
 
 from aerodaas.schedulers.analytics.estimates import CERTAIN, SQRT_HALF, TimeEstimate
 
-__all__ = ["Job", "Lane", "plan"]
+__all__ = ["Job", "JobQueue", "plan"]
 
 
 @dataclass(slots=True)
@@ -31,14 +31,14 @@ class Job:
 
 
 @dataclass(slots=True)
-class Lane:
+class JobQueue:
     """Jobs of one model in order of release; one is only taken after those before it."""
 
     time: TimeEstimate
     jobs: list[Job]
 
 
-_Step = tuple[float, Lane, Job]
+_Step = tuple[float, JobQueue, Job]
 """When a job starts, and its lane."""
 _State = tuple[float, float, int, "_State | None", _Step | None]
 """Merit, time when the executor is free, the lanes' positions; the state before, the step from it.
@@ -46,7 +46,7 @@ _State = tuple[float, float, int, "_State | None", _Step | None]
 A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
 keys are much cheaper to make and to compare than tuples, and they are made most of the time.
 """
-_Place = tuple[int, int, Lane, list[Job], float, float]
+_Place = tuple[int, int, JobQueue, list[Job], float, float]
 """Place in bits of a lane's digit, 1 in that place, its jobs, mean and deviation of their time."""
 
 _merit = itemgetter(0)
@@ -57,7 +57,7 @@ _NEVER = Job(None, inf, inf, 0.0, 0.0)
 
 
 def plan(
-    lanes: Sequence[Lane], start: float, until: float, price: float, *, width: int, gap: float
+    lanes: Sequence[JobQueue], start: float, until: float, price: float, *, width: int, gap: float
 ) -> list[_Step]:
     """Choose jobs and their starts from `start` to about `until`, by beam search.
 
@@ -82,7 +82,7 @@ def plan(
 
 
 class _Search:
-    """What all states have in common, and the plans that have come to their end."""
+    """State that all branches of a search share, and the plans that are complete."""
 
     def __init__(
         self, places: list[_Place], mask: int, until: float, price: float, gap: float

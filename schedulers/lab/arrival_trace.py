@@ -20,7 +20,7 @@ from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import Profile
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PUBLISHED
 from aerodaas.schedulers.lab.trace_errors import bad_line
-from aerodaas.schedulers.lab.workload import Arrival, Segments, Workload
+from aerodaas.schedulers.lab.workload import Segments, TaskArrival, Workload
 
 __all__ = ["TRACE", "read_arrivals"]
 
@@ -86,7 +86,7 @@ def _times(
     duration: int | None,
     models: Mapping[str, Profile],
 ) -> Workload:
-    arrivals: list[Arrival] = []
+    arrivals: list[TaskArrival] = []
     segments: list[Segments] = []
     before = last_edge = 0
     for number, cells in rows:
@@ -104,7 +104,7 @@ def _times(
         if "model" not in row:
             segments.append(Segments(at, source=row.get("source", ""), edge=edge))
         elif row["model"] in models:
-            arrivals.append(Arrival(at, row["model"], row.get("source", ""), edge))
+            arrivals.append(TaskArrival(at, row["model"], row.get("source", ""), edge))
         else:
             raise bad_line(path, number, f"no model {row['model'][:40]!r}: {', '.join(models)}")
         _few_enough(path, len(segments) + len(arrivals))

@@ -111,7 +111,7 @@ FULL = Extent(seeds=30, seconds=300)
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class Rank:
     """A scheduler's place, with the shares that earned it (0 to 1)."""
 
     rank: int
@@ -138,7 +138,7 @@ class Leaderboard:
     """Standings, best utility first, and what they rest on."""
 
     extent: Extent
-    standings: tuple[Standing, ...]
+    standings: tuple[Rank, ...]
 
     def rows(self) -> list[dict[str, Any]]:
         """Tidy: a row for each scheduler and case, and one (`case` is `all`) for its standing."""
@@ -220,7 +220,7 @@ def _told(
         progress(before + done, total)
 
 
-def _standings(names: Sequence[str], results: dict[str, LabResult]) -> tuple[Standing, ...]:
+def _standings(names: Sequence[str], results: dict[str, LabResult]) -> tuple[Rank, ...]:
     values = {name: [one.values(name) for one in results.values()] for name in names}
     utility = {name: _over_cases(values[name], "of bound") for name in names}
     completion = {name: _over_cases(values[name], "completion") for name in names}
@@ -233,7 +233,7 @@ def _standings(names: Sequence[str], results: dict[str, LabResult]) -> tuple[Sta
     ]
     corrected = dict(zip(order[1:], holm(p_values), strict=True))
     return tuple(
-        Standing(
+        Rank(
             _rank(utility, name),
             name,
             mean_of(utility[name]),

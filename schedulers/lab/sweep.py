@@ -222,7 +222,7 @@ def _check(parameters: Mapping[str, Sequence[Any]], schedulers: Sequence[Wanted]
 def _prepared(
     base: Workload, case: Mapping[str, Any]
 ) -> tuple[Workload, Network, ExecutionTimes, Resources]:
-    """What `run_lab` is given for one case."""
+    """Arguments of `run_lab` for one case."""
     changes: Row = {name: case[name] for name in ("drones", "edges") if name in case}
     if base.is_listed and (changes or "models" in case):
         raise SchedulerError(f"{base.name} lists its tasks: drones, edges and models are its own")

@@ -31,7 +31,7 @@ from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal, Task
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 
-__all__ = ["SIX", "Arrival", "Segments", "Workload", "load_workload"]
+__all__ = ["SIX", "Segments", "TaskArrival", "Workload", "load_workload"]
 
 SIX: tuple[str, ...] = ("2D-P", "3D-P", "4D-P", "2D-A", "3D-A", "4D-A")
 """The published workloads: drones on one edge, with four (P) or six (A) models."""
@@ -40,7 +40,7 @@ _NAME = re.compile(r"(\d+)D-([PA])(?:/(\d+))?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival:
+class TaskArrival:
     """One task of a workload that lists them, such as one taken from a recorded flight."""
 
     at: int
@@ -92,7 +92,7 @@ class Workload:
     edges: int = 1
     duration: int = 300 * NANOSECONDS
     period: int = NANOSECONDS
-    arrivals: tuple[Arrival, ...] = field(default=())
+    arrivals: tuple[TaskArrival, ...] = field(default=())
     segments: tuple[Segments, ...] = field(default=())
 
     def __post_init__(self) -> None:
@@ -122,7 +122,7 @@ class Workload:
         )
 
     def on_edges(self, edges: int) -> Workload:
-        """The same on so many edges, each with as many drones as an edge has here.
+        """Copy of the workload on so many edges, each with as many drones as an edge has here.
 
         Raises SchedulerError for a workload that lists its tasks, which are its edges' own.
         """
@@ -137,7 +137,7 @@ class Workload:
         return bool(self.arrivals or self.segments)
 
     def lasting(self, duration: int) -> Workload:
-        """The same for another duration."""
+        """Copy of the workload with another duration."""
         return replace(self, duration=duration)
 
     def tasks(self, edge: int, draw: random.Random) -> list[Task]:
@@ -178,7 +178,7 @@ class Workload:
         )
 
     def _traced(self, edge: int, draw: random.Random) -> list[tuple[int, str, int]]:
-        """The same of a trace."""
+        """Arrivals of a trace."""
         times = sorted(
             (at, one.source)
             for one in self.segments
@@ -189,7 +189,7 @@ class Workload:
         numbers = defaultdict[str, Iterator[int]](count)
         return [(at, source, next(numbers[source])) for at, source in times]
 
-    def arrivals_at(self, edge: int) -> list[Arrival]:
+    def arrivals_at(self, edge: int) -> list[TaskArrival]:
         """The listed tasks of one edge, in the order in which `tasks` numbers them."""
         return sorted((a for a in self.arrivals if a.edge == edge), key=lambda a: a.at)
 
@@ -278,7 +278,7 @@ def load_workload(path: str | Path) -> Workload:
         round(found.duration_s * NANOSECONDS),
         round(found.period_s * NANOSECONDS),
         tuple(
-            Arrival(
+            TaskArrival(
                 round(task.at_s * NANOSECONDS),
                 task.model,
                 task.source,

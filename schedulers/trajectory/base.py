@@ -155,7 +155,7 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
         if on is not None:
             navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, on)
             self._enter(NavigationEntry(navigation, clear_first=True, robot=named, line=line))
-        elif not self._tell(
+        elif not self._record_entry(
             NavigationEntry(AeroNavigation(), clear_first=True, robot=named, line=line)
         ):
             kept = [entry for entry in self.entries if named not in {None, entry.robot}]
@@ -163,10 +163,10 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
             self._cleared.add(named)
 
     def _enter(self, entry: NavigationEntry) -> None:
-        if not self._tell(entry):
+        if not self._record_entry(entry):
             self.entries.append(entry)
 
-    def _tell(self, entry: NavigationEntry) -> bool:
+    def _record_entry(self, entry: NavigationEntry) -> bool:
         sink: object = self._environment
         return isinstance(sink, NavigationSink) and sink.navigation_added(entry)
 

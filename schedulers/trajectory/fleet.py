@@ -83,7 +83,7 @@ def _problem(waypoints: Sequence[Waypoint], drones: list[PlanningContext]) -> Ro
 def _one_after_the_other(
     waypoints: Sequence[Waypoint], drones: list[PlanningContext], problem: RoutingProblem
 ) -> list[list[int]]:
-    """What simple rules give each drone of what those before it left."""
+    """Routes by simple rules, drone after drone, each of what those before it left."""
     left = list(range(len(waypoints)))
     routes: list[list[int]] = []
     for drone, tour in zip(drones, problem.tours, strict=True):

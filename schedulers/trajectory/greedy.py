@@ -51,7 +51,7 @@ def greedy_route(
 def route_value(
     route: Sequence[int], travel: TravelCosts, costs: Matrix, prizes: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """What a route is worth: its prizes first, then how little it costs."""
+    """Value of a route: its prizes first, then how little it costs."""
     return float(prizes[list(route)].sum()), -travel.cost(route, costs)
 
 

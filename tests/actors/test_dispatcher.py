@@ -67,7 +67,7 @@ def _build(scheduler: Any, edge_ms: float, cloud_ms: float = 0.0) -> Callable[[E
 
 def _values(env: Environment) -> dict[str, Any]:
     run = env.launch()
-    run.look()
+    run.poll()
     return run.reports()["dispatcher"].values
 
 

@@ -125,11 +125,11 @@ def test_a_change_is_told_to_a_call_that_waits() -> None:
 def test_a_call_that_waits_for_a_change_returns_without_one() -> None:
     """The same value is no change, and one that was missed answers at once."""
     signal = ChangeSignal()
-    signal.note("here")
+    signal.update("here")
     assert signal.wait(0, 60.0) == 1
-    signal.note("here")
+    signal.update("here")
     assert signal.wait(1, 0.01) == 1
-    signal.note("there")
+    signal.update("there")
     assert signal.wait(1, 60.0) == 2
     signal.end()
     assert signal.wait(2, 60.0) == 3

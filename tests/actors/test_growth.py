@@ -40,11 +40,11 @@ def test_a_graph_grows_in_flight(flyer: Flyer) -> None:
             deadline = time.monotonic() + 60.0
             while not holds():
                 assert time.monotonic() < deadline, "it never happened"
-                assert not env.launch().look().over, "the mission is over"
+                assert not env.launch().poll().over, "the mission is over"
                 time.sleep(0.02)
 
         def is_in(state: MissionState) -> bool:
-            return env.launch().look().robots["drone"].status.state is state
+            return env.launch().poll().robots["drone"].status.state is state
 
         until(lambda: is_in(MissionState.LOITERING))
         assert Jitter().analyse(odometry).get_data(timeout=10.0) > 1.0

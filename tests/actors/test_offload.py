@@ -132,7 +132,7 @@ def build(on: str) -> Callable[[Environment], None]:
 def values(env: Environment) -> dict[str, Any]:
     """The dispatcher's figures."""
     run = env.launch()
-    run.look()
+    run.poll()
     return run.reports()["dispatcher"].values
 
 

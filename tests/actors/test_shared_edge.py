@@ -95,5 +95,5 @@ def test_a_flight_works_in_its_turns(flyer: Flyer) -> None:
 def done(env: Environment) -> int:
     """Tasks of the flight that have ended on the edge."""
     run = env.launch()
-    run.look()
+    run.poll()
     return int(run.reports()["dispatcher"].values["places"].get("edge", 0))

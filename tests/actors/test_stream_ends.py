@@ -494,7 +494,7 @@ def test_nonsense_on_a_subscribers_socket() -> None:
     ]
     callers[-1].connect(path)
     small = SlotPool()
-    small.take(100)
+    small.acquire(100)
     beyond = SLOT.pack(1 << 20, 1 << 20, 1 << 20), SLOT.pack(0, 1 << 20, 100), SLOT.pack(0, 0, 0)
     for data in (b"\1", *(slot + TRAILER.pack(1, IN_SLOT) for slot in beyond)):
         near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -562,7 +562,7 @@ def test_another_user_is_refused_at_either_end(
     monkeypatch.setattr(rendezvous, "streams_folder", lambda: open_folder)
     listener = rendezvous.Listener("scope")
     listener.announce("s", 4)
-    arrivals = rendezvous.Arrivals("scope", "s")
+    arrivals = rendezvous.SubscriberListener("scope", "s")
     for path in [path for path in open_folder.rglob("*") if path.exists()]:
         path.chmod(0o777)
     foreign = os.fork()

@@ -58,7 +58,7 @@ def _play(stream: list[bytes], *, only_whole: bool = True) -> tuple[list[int], F
     assembler, decoder = FrameAssembler(), FrameDecoder(only_whole=only_whole)
     shown = []
     for index, packet in enumerate(stream):
-        for whole in assembler.take(packet, index):
+        for whole in assembler.add_packet(packet, index):
             for picture in decoder.decode(Packet(whole.content)):
                 shown.append(round(float(picture.to_ndarray()[4:12, 4:12].mean()) / 255))  # noqa: PERF401
     return shown, decoder
@@ -72,7 +72,7 @@ def test_every_frame_comes_with_its_own_last_packet() -> None:
     """No frame waits for the next one: after each frame's packets its picture is there."""
     assembler, decoder = FrameAssembler(), FrameDecoder()
     for frame in FRAMES:
-        done = [whole for packet in packets(frame) for whole in assembler.take(packet, 7)]
+        done = [whole for packet in packets(frame) for whole in assembler.add_packet(packet, 7)]
         assert len(done) == 1
         assert done[0].arrived == 7
         assert len(decoder.decode(Packet(done[0].content))) == 1
@@ -128,7 +128,7 @@ def test_any_loss_order_and_garbage_is_survived(draw: random.Random, share: floa
 def test_the_assembler_takes_any_bytes(stream: list[bytes]) -> None:
     """Nothing is invented: what comes out went in, in order."""
     assembler = FrameAssembler()
-    out = b"".join(w.content for packet in stream for w in assembler.take(packet, 0))
+    out = b"".join(w.content for packet in stream for w in assembler.add_packet(packet, 0))
     assert len(out) <= sum(map(len, stream))
 
 
@@ -245,7 +245,7 @@ def test_a_picture_larger_than_any_tellos_is_not_decoded(
     """A stream may claim any size, and takes no memory for it."""
     camera = _camera(_free_port())
     for packet in packets(_one(width, height, "yuv420p")):
-        camera.take(packet, 0)
+        camera.on_packet(packet, 0)
     assert (camera.capture(10**10, None) is not None) is shown
     assert (camera.counts.waiting > 0) is not shown
 
@@ -254,7 +254,7 @@ def test_a_picture_of_an_odd_size_is_a_picture() -> None:
     """No Tello sends one; its camera goes on."""
     camera = _camera(_free_port())
     for packet in packets(_one(33, 31, "gray")):
-        camera.take(packet, 0)
+        camera.on_packet(packet, 0)
     picture = camera.capture(10**10, None)
     assert picture is not None
     assert picture.image.shape == (31, 33, 3)

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import pytest
 
-from aerodaas.cameras.base import ToldCamera, most_memory
+from aerodaas.cameras.base import VehicleAddressedCamera, most_memory
 from aerodaas.cameras.live import LiveSource
-from aerodaas.cameras.told_video import ToldSource
+from aerodaas.cameras.vehicle_addressed import VehicleAddressedSource
 from aerodaas.cameras.video import VideoCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.config.secrets import SecretUrl
@@ -47,7 +47,7 @@ def serve(content: bytes) -> int:
     return int(server.getsockname()[1])
 
 
-def frames(source: LiveSource | ToldSource, duration: float) -> int:
+def frames(source: LiveSource | VehicleAddressedSource, duration: float) -> int:
     """How many frames came within that time."""
     end, count = time.monotonic() + duration, 0
     while time.monotonic() < end and not count:
@@ -68,7 +68,7 @@ def test_the_first_address_is_read_and_no_other(film: Path) -> None:
     """A vehicle does not send its watcher from one address to the next."""
     port = serve(film.read_bytes())
     told = camera("mavlink")
-    assert isinstance(told, ToldCamera)
+    assert isinstance(told, VehicleAddressedCamera)
     assert most_memory(told) == LiveSource.most_memory
     told.open()
     assert told.model is None
@@ -77,7 +77,7 @@ def test_the_first_address_is_read_and_no_other(film: Path) -> None:
     told.follow_video(f"tcp://127.0.0.1:{port}")
     told.follow_video("tcp://127.0.0.1:1")
     source = told._source
-    assert isinstance(source, ToldSource)
+    assert isinstance(source, VehicleAddressedSource)
     assert frames(source, 8.0)
     told.close()
 
@@ -101,7 +101,7 @@ def test_a_stream_does_not_lead_to_a_file(film: Path) -> None:
     free.start()
     assert frames(free, 8.0)
     free.close()
-    told = ToldSource("drone/cam")
+    told = VehicleAddressedSource("drone/cam")
     told.follow(address)
     assert not frames(told, 1.5)
     told.close()

@@ -18,7 +18,7 @@ import pytest
 from aerodaas.cameras import devices
 from aerodaas.cameras.devices import VideoDevice, capability, video_devices
 from aerodaas.cli.app import main
-from aerodaas.config.beginning import VEHICLES, Beginning
+from aerodaas.config.environment_choices import VEHICLES, EnvironmentChoices
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink import discovery as mavlink_discovery
 from aerodaas.drivers.mavlink.discovery import HeardVehicle, MavlinkDiscovery, hear_vehicles
@@ -327,7 +327,9 @@ def test_only_nodes_that_capture_are_cameras(tmp_path: Path) -> None:
 
 def test_addresses_and_systems_reach_the_file(tmp_path: Path) -> None:
     """As options or discovery gave them."""
-    document = Beginning("px4", "serial:/dev/ttyACM0:57600", 7).document("s.json", tmp_path)
+    document = EnvironmentChoices("px4", "serial:/dev/ttyACM0:57600", 7).document(
+        "s.json", tmp_path
+    )
     (robot,) = document["robots"]
     assert robot["settings"] == {"url": "serial:/dev/ttyACM0:57600", "system": 7}
     assert document["$schema"] == "s.json"

@@ -87,16 +87,16 @@ class Watched:
 
     def now(self) -> float:
         """Mission seconds."""
-        return self.run.look().robots["drone"].status.stamp / 1e9
+        return self.run.poll().robots["drone"].status.stamp / 1e9
 
     def height(self) -> float:
         """Metres up."""
-        state = self.run.look().robots["drone"].state
+        state = self.run.poll().robots["drone"].state
         return float(state.odometry.position[2]) if state is not None else 0.0
 
     def outcomes(self) -> dict[str, int]:
         """What became of the tasks so far, by the dispatcher's own count."""
-        report = self.run.look().reports["dispatcher"]
+        report = self.run.poll().reports["dispatcher"]
         return dict(report.values.get("outcomes", {}))
 
     def done(self) -> int:

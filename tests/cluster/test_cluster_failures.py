@@ -162,8 +162,8 @@ def test_an_analysis_is_killed(watched: Watched) -> None:
     with watched.flying():
         watched.broke()
         watched.process("analytics/drone/glance").kill()
-        eventually(lambda: watched.run.look().reports["analytics/drone/glance"].phase == "failed")
-        eventually(lambda: watched.run.look().reports["analytics/drone/glance"].phase == "running")
+        eventually(lambda: watched.run.poll().reports["analytics/drone/glance"].phase == "failed")
+        eventually(lambda: watched.run.poll().reports["analytics/drone/glance"].phase == "running")
         watched.goes_on()
     told = Told.of(watched)
     report("analysis killed", told, watched)
@@ -193,8 +193,8 @@ def test_the_dispatcher_is_killed(watched: Watched) -> None:
     with watched.flying():
         watched.broke()
         watched.process("dispatcher").kill()
-        eventually(lambda: watched.run.look().reports["dispatcher"].phase == "failed")
-        eventually(lambda: watched.run.look().reports["dispatcher"].phase == "running")
+        eventually(lambda: watched.run.poll().reports["dispatcher"].phase == "failed")
+        eventually(lambda: watched.run.poll().reports["dispatcher"].phase == "running")
         watched.goes_on()
     told = Told.of(watched)
     report("dispatcher killed", told, watched)
@@ -212,8 +212,8 @@ def test_the_recorder_is_killed(watched: Watched) -> None:
     with watched.flying():
         watched.broke()
         watched.process("edge").kill()
-        eventually(lambda: watched.run.look().reports["edge"].phase == "failed")
-        eventually(lambda: watched.run.look().reports["edge"].phase == "running")
+        eventually(lambda: watched.run.poll().reports["edge"].phase == "failed")
+        eventually(lambda: watched.run.poll().reports["edge"].phase == "running")
         watched.goes_on()
     first = Told.of(watched)
     assert watched.run.recording is not None
@@ -282,7 +282,7 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
 
 def _fly_until_full(watched: Watched) -> None:
     with watched.flying(settle=0.0):
-        eventually(lambda: bool(watched.run.look().reports["edge"].values["failure"]))
+        eventually(lambda: bool(watched.run.poll().reports["edge"].values["failure"]))
         watched.goes_on()
 
 

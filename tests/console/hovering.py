@@ -48,7 +48,7 @@ class Run:
         """Mission seconds."""
         self.mission_state = MissionState.ENROUTE
 
-    def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
+    def poll(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """Enroute to a waypoint."""
         del newest
         target = Waypoint("wp1", 3, 4, 2, waypoint_type="local")

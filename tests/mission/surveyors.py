@@ -180,7 +180,7 @@ def simulated(*waypoints: Waypoint, noise: float, wind: float) -> Mission:
     mission.handle(Start(), 0)
     now = 0
     while not mission.finished and now < 300 * NANOSECONDS:
-        loop.turn(now)
+        loop.step(now)
         now += PERIOD
         vehicle.advance_to(now)
     return mission

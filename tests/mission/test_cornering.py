@@ -320,7 +320,7 @@ def circled(stops: Sequence[Waypoint], limits: LimitsConfig) -> tuple[Mission, l
     mission.handle(Start(), 0)
     now, speeds = 0, list[float]()
     while mission.status.visits < len(stops) and now < 300 * NANOSECONDS:
-        loop.turn(now)
+        loop.step(now)
         now += PERIOD
         vehicle.advance_to(now)
         if 1 < mission.status.visits < len(stops) - 1:

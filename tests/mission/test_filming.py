@@ -311,7 +311,7 @@ def test_a_simulated_camera_records_between_its_waypoints() -> None:
     mission.handle(Start(), 0)
     now, seen = 0, [(camera.filming, 0)]
     while not mission.finished and now < 300 * NANOSECONDS:
-        loop.turn(now)
+        loop.step(now)
         if camera.filming is not seen[-1][0]:
             seen.append((camera.filming, len(mission.status.visited)))
         now += PERIOD

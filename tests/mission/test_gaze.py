@@ -19,7 +19,7 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import GimbalTarget
 from aerodaas.messages.vehicle import PositionSetpoint
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.gaze import Gaze, direction_to
+from aerodaas.mission.point_of_interest import PointOfInterest, direction_to
 
 coordinate = st.floats(-500.0, 500.0)
 place = st.tuples(coordinate, coordinate, coordinate)
@@ -63,13 +63,13 @@ def test_no_target_is_anything_but_finite(numbers: list[float], yaw: float | Non
             told.append(target)
             return target
 
-    gaze = Gaze()
+    gaze = PointOfInterest()
     gaze.at(np.array(numbers[:3]))
     for gimbal in (Deaf(), None):
         seen = Odometry(np.array(numbers[3:6]), np.zeros(3), numbers[6])
         if math.isinf(numbers[6]):
             return
-        gaze.turn(gimbal, seen, 0, yaw)
+        gaze.aim(gimbal, seen, 0, yaw)
         assert gaze.heading is None or math.isfinite(gaze.heading)
     assert all(math.isfinite(one.pitch) and math.isfinite(one.yaw) for one in told)
 

@@ -21,7 +21,7 @@ from aerodaas.messages.payload import Photo
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.photo_trigger import PhotoTrigger
-from aerodaas.mission.photographer import Shutter
+from aerodaas.mission.photographer import PhotoCapture
 
 TURN = NANOSECONDS // 20
 
@@ -150,9 +150,9 @@ def test_no_picture_is_taken_beside_the_line() -> None:
 def test_places_that_were_passed_unseen_are_counted() -> None:
     """One picture is taken, of the newest; the others are lost and told."""
     log = MissionLog("drone/mission")
-    shutter = Shutter(Surveyor(), log, 4.0)
+    shutter = PhotoCapture(Surveyor(), log, 4.0)
     shutter.trigger("line", 3, 0)
-    shutter.look(0)
+    shutter.poll(0)
     assert (len(shutter.photos), shutter.lost) == (1, 2)
     (alert,) = log.alerts
     assert alert.text.startswith("on the way to line: a picture is missed")

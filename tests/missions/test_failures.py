@@ -133,11 +133,11 @@ def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
         env = Environment(flyer.write(environment()))
         env.get_robot_by_id("drone").navigate(hop((300, 0)))
         run = env.launch()
-        assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
+        assert wait_for(lambda: bool(run.poll().reports["drone/drone"].values), 20.0)
         with run._polling:
             time.sleep(pause)
         time.sleep(1.0)
-        run.look()
+        run.poll()
         os.kill(flight_of(run).infos()["drone/drone"].pid, signal.SIGKILL)
         with pytest.raises(
             MissionError, match="the actor of drone died: a simulated drone ends with its process"
@@ -163,7 +163,7 @@ def test_a_drone_that_hangs_is_told_though_nobody_waits(
         env.start_mission(wait=False)
         run = env.run
         assert run is not None
-        assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
+        assert wait_for(lambda: bool(run.poll().reports["drone/drone"].values), 20.0)
         pid = flight_of(run).infos()["drone/drone"].pid
         os.kill(pid, signal.SIGSTOP)
         try:
@@ -186,7 +186,7 @@ def test_a_recorder_that_is_killed_and_then_hangs(flyer: Flyer) -> None:
         drone.navigate(hop((300, 0)))
         run = env.launch()
         flight = flight_of(run)
-        assert wait_for(lambda: bool(run.look().reports["edge"].values), 20.0)
+        assert wait_for(lambda: bool(run.poll().reports["edge"].values), 20.0)
         os.kill(first := flight.infos()["edge"].pid, signal.SIGKILL)
         assert wait_for(lambda: flight.infos()["edge"].pid != first, 60.0)
         assert wait_for(lambda: told(run, "edge is back after"), 20.0)
@@ -206,7 +206,7 @@ def test_a_recorder_that_is_killed_and_then_hangs(flyer: Flyer) -> None:
 
 def told(run: Run, words: str) -> bool:
     """Whether an alert of the flight has these words by now."""
-    return any(words in alert.text for alert in run.look().alerts)
+    return any(words in alert.text for alert in run.poll().alerts)
 
 
 @pytest.mark.slow
@@ -219,7 +219,7 @@ def test_a_drone_whose_actor_died_keeps_no_other_in_the_air(flyer: Flyer) -> Non
         for drone in env.get_env_robots():
             drone.navigate(hop((300, 0)))
         run = env.launch()
-        assert wait_for(lambda: bool(run.look().reports["drone/first"].values), 20.0)
+        assert wait_for(lambda: bool(run.poll().reports["drone/first"].values), 20.0)
         os.kill(flight_of(run).infos()["drone/first"].pid, signal.SIGKILL)
         with pytest.raises(MissionError, match="the actor of first died"):
             run.wait()

@@ -25,7 +25,7 @@ from required import needs_root
 from aerodaas import AeroNavigation, Environment, NavigationType
 from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
 from aerodaas.actors.run import flight
-from aerodaas.actors.run.member import ask
+from aerodaas.actors.run.actor_state import ask
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.environment.run import Run
 from aerodaas.errors import MissionError
@@ -57,7 +57,7 @@ def until(run: Run, holds: Callable[[], bool], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end, "it never happened"
-        assert not run.look().over, "the mission is over"
+        assert not run.poll().over, "the mission is over"
         time.sleep(0.05)
 
 
@@ -75,7 +75,7 @@ def holders(folder: Path) -> set[int]:
 
 def state_of(run: Run) -> MissionState:
     """The mission's state."""
-    return run.look().robots["drone"].status.state
+    return run.poll().robots["drone"].status.state
 
 
 def alerts(flight: RecordedFlight) -> dict[str, list[str]]:
@@ -182,7 +182,7 @@ def managed(scheduler: str) -> Callable[[Environment], None]:
 
 def done(run: Run) -> int:
     """Tasks that were done in time so far."""
-    outcomes = run.look().reports["dispatcher"].values.get("outcomes", {})
+    outcomes = run.poll().reports["dispatcher"].values.get("outcomes", {})
     return int(outcomes.get("done", 0))
 
 
@@ -195,7 +195,7 @@ def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
         run = env.launch()
         until(run, lambda: done(run) > 5)
         with frozen(process_of(run, "analytics/edge")):
-            until(run, lambda: bool(run.look().reports["dispatcher"].values.get("edge_down")), 20.0)
+            until(run, lambda: bool(run.poll().reports["dispatcher"].values.get("edge_down")), 20.0)
         before = done(run)
         until(run, lambda: done(run) > before + 5)
         env.get_robot_by_id("drone").end_mission()
@@ -228,7 +228,7 @@ def test_an_executor_in_the_cloud_is_frozen(flyer: Flyer) -> None:
         with frozen(cloud_executor()):
             until(
                 run,
-                lambda: run.look().reports["dispatcher"].values.get("cloud_slots") == 0,
+                lambda: run.poll().reports["dispatcher"].values.get("cloud_slots") == 0,
                 20.0,
             )
         before = done(run)

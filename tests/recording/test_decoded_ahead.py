@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from aerodaas.messages.frames import Header
-from aerodaas.recording.pictures import Shot, decoded_ahead
+from aerodaas.recording.pictures import RecordedImage, decoded_ahead
 from aerodaas.recording.reader import Record
 
 
@@ -23,12 +23,12 @@ class Stuck:
         self.free.wait(30)
 
 
-def shots(video: Any, count: int = 50) -> Iterator[Shot]:  # noqa: ANN401 - in the place of a video
+def shots(video: Any, count: int = 50) -> Iterator[RecordedImage]:  # noqa: ANN401 - in the place of a video
     """Pictures of it."""
     for number in range(count):
         value = {"format": "h264", "data": ""}
         record = Record("/cam", "foxglove.CompressedVideo", number, number, number, value)
-        yield Shot(Header(number, number, "cam"), None, record, video)
+        yield RecordedImage(Header(number, number, "cam"), None, record, video)
 
 
 def decoders() -> int:

@@ -17,7 +17,7 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
 from aerodaas.recording.ros import bag as bag_reader
 from aerodaas.recording.ros.bag import RosBag
-from aerodaas.recording.ros.beginning import BagTopics
+from aerodaas.recording.ros.bag_preview import BagTopics
 from aerodaas.recording.ros.importing import ImportedBag, import_bag
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.ros.typestore import DETECTIONS, ODOMETRY, ros_decoder

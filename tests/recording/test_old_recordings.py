@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from aerodaas import Environment
-from aerodaas.cli.flown_workload import Flown
+from aerodaas.cli.recorded_workload import RecordedWorkload
 from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.environment.document.building import build_mission
@@ -123,7 +123,7 @@ def test_an_old_recording_is_exported_and_replayed(tmp_path: Path) -> None:
     assert rows["/drone/status/mission"][0]["robot"] == "drone"
     assert len(read_timetables(FLIGHT)["drone/cam1"]) == 7
     assert replay_environment(FLIGHT).robots[0].driver == "replayed"
-    assert [one.model for one in Flown.read(FLIGHT).tasks] == ["drone/finder"] * 14
+    assert [one.model for one in RecordedWorkload.read(FLIGHT).tasks] == ["drone/finder"] * 14
 
 
 def test_an_old_document_is_built(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,8 +20,8 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.waypoints import FollowedTarget, NavigationType, TargetState, VelocityCommand
-from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
+from aerodaas.recording.playback.frame_index import FrameIndex
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
@@ -78,7 +78,7 @@ def record(path: Path, images: str) -> Path:
 @pytest.fixture(scope="module", params=["jpeg", "png", "h264"])
 def film(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Film]:
+) -> Iterator[FrameIndex]:
     """Of a recording in each format."""
     path = record(tmp_path_factory.mktemp("film") / "flight.mcap", request.param)
     with Recording.open(path) as recording:
@@ -93,7 +93,7 @@ def shown(data: bytes) -> int:
 
 @settings(max_examples=60, deadline=None)
 @given(times=st.lists(st.integers(0, int(CAPTURED[-1]) + 10**9), min_size=1, max_size=8))
-def test_any_time_gives_the_last_picture_captured(film: Film, times: list[int]) -> None:
+def test_any_time_gives_the_last_picture_captured(film: FrameIndex, times: list[int]) -> None:
     """However one jumps; with exactly its own boxes."""
     for time in times:
         number = int(np.searchsorted(CAPTURED, time, side="right")) - 1
@@ -120,7 +120,7 @@ def test_any_time_gives_the_last_picture_captured(film: Film, times: list[int]) 
             assert one["item"]["of"]["header"]["stamp"] == CAPTURED[number]
 
 
-def test_each_picture_is_there_to_the_nanosecond(film: Film) -> None:
+def test_each_picture_is_there_to_the_nanosecond(film: FrameIndex) -> None:
     """At its capture and just before the next one; in order, and from the end."""
     for order in (range(0, COUNT, 7), range(COUNT - 1, -1, -1)):
         for number in order:
@@ -128,7 +128,7 @@ def test_each_picture_is_there_to_the_nanosecond(film: Film) -> None:
                 assert film.at(STREAM, int(time))[-1][0]["captured"] == CAPTURED[number]
 
 
-def test_there_is_no_other_stream(film: Film) -> None:
+def test_there_is_no_other_stream(film: FrameIndex) -> None:
     """Nor a picture of what is none."""
     for name in ("tello/other", FOUND, ""):
         with pytest.raises(KeyError):

@@ -300,7 +300,7 @@ def test_decisions_are_summed_up_as_a_dispatcher_does() -> None:
         outcome(1.6, "drop", "cannot finish in time"),
         outcome(1.7, "dropped", "no room in the cloud in time"),
     ):
-        sums.take(value)
+        sums.add(value)
     last = sums.rows[-1]
     assert (last.time, last.in_time, last.late, last.dropped) == (1.7, 1, 3, 2)
     assert (last.edge, last.cloud, last.qos, last.qoe) == (2, 2, 3.0, 1.0)
@@ -312,7 +312,7 @@ def test_many_decisions_are_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(playback, "_MOST_ROWS", 20)
     sums = DecisionSums()
     for number in range(1000):
-        sums.take(outcome(number, "done", "edge"))
+        sums.add(outcome(number, "done", "edge"))
     rows = sums.rows
     assert len(rows) <= 22
     assert [one.in_time for one in rows] == sorted(one.in_time for one in rows)

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from rewritten import rewritten
 from synthetic_flight import SyntheticFlight, record
 
-from aerodaas.cli.flown_workload import Flown
+from aerodaas.cli.recorded_workload import RecordedWorkload
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.config.preflight import PreflightConfig
@@ -365,7 +365,7 @@ def test_an_environment_of_odd_shape_is_refused_in_words(
     for use in (
         lambda: replay_environment(path),
         lambda: write_gpx_of(path, tmp_path),
-        lambda: Flown.read(path),
+        lambda: RecordedWorkload.read(path),
     ):
         said = refusal_of(use)
         assert not said or str(path) in said

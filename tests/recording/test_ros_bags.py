@@ -27,8 +27,8 @@ from aerodaas.recording.pictures import detections, frames, shots
 from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros.bag import RosBag
+from aerodaas.recording.ros.bag_preview import BagTopics
 from aerodaas.recording.ros.bag_writer import write_bag
-from aerodaas.recording.ros.beginning import BagTopics
 from aerodaas.recording.ros.importing import import_bag
 from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.ros.incoming import odometry_of

@@ -52,7 +52,7 @@ class DirectRun:
     notes: list[str] = field(default_factory=list)
     over: bool = False
 
-    def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
+    def poll(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """The mission's word."""
         del newest
         vehicle = self.flown.vehicle.read()

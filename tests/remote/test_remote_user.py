@@ -234,7 +234,7 @@ def test_stream_ends_with_the_mission(service: Served) -> None:
         follower.join(0.05)
     service.client().command("land")
     service.flown.run()
-    service.run.look()
+    service.run.poll()
     service.flight.close()
     follower.join(10)
     assert (seen[0], seen[-1]) == ("enroute", "landed")

@@ -57,13 +57,13 @@ def until(env: Environment, condition: Callable[[], bool], seconds: float = 30.0
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "it never happened"
-        assert not env.launch().look().over, "the mission is over"
+        assert not env.launch().poll().over, "the mission is over"
         time.sleep(0.02)
 
 
 def pending(env: Environment) -> list[str]:
     """What is still to be visited after the present waypoint, in planned order."""
-    status = env.launch().look().robots["drone"].status
+    status = env.launch().poll().robots["drone"].status
     return [waypoint.id for waypoint in status.pending]
 
 
@@ -74,7 +74,7 @@ def watched_meanwhile(env: Environment) -> Iterator[None]:
 
     def look() -> None:
         while not done.is_set():
-            run.look()
+            run.poll()
             run.reports()
 
     with ThreadPoolExecutor(1) as pool:
@@ -112,7 +112,7 @@ def test_navigation_joins_a_flight(flyer: Flyer) -> None:
     with flyer.flying(stay) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         drone_of(env).navigate(places(Waypoint("urgent", 2.0, 2.0, 2.0, priority=0)))
-        until(env, lambda: "urgent" in env.launch().look().robots["drone"].status.visited)
+        until(env, lambda: "urgent" in env.launch().poll().robots["drone"].status.visited)
         drone_of(env).navigate(Weave().analyse(odometry_of(env)))
         env.trajectory_scheduler().clear_navigation()
         until(env, lambda: state_of(env) is MissionState.FOLLOWING)

@@ -11,8 +11,8 @@ from aerodaas import Analytics, Environment, Frame
 from aerodaas.analytics.base import Context
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.ros.bag import RosBag
+from aerodaas.recording.ros.bag_preview import BagTopics
 from aerodaas.recording.ros.bag_writer import write_bag
-from aerodaas.recording.ros.beginning import BagTopics
 from aerodaas.recording.ros.importing import import_bag
 
 pytestmark = pytest.mark.slow

@@ -31,8 +31,8 @@ def test_what_is_named_is_found(arrivals: list[tuple[str, int]], data: st.DataOb
     for stream, skipped in arrivals:
         numbers[stream] += 1 + skipped
         known.append(_message(stream, numbers[stream]))
-        sender.note(known[-1])
-        reader.note(known[-1])
+        sender.add(known[-1])
+        reader.add(known[-1])
     asked = data.draw(st.sampled_from(known))
     item = sender.item(asked)
     if isinstance(item, FrameReference):
@@ -46,8 +46,8 @@ def test_a_frame_that_was_not_received_is_not_found() -> None:
     """Neither one that was skipped, nor one of a stream that is not read."""
     reader = RecentFrames(["a"])
     for seq in (1, 3):
-        reader.note(_message("a", seq))
-    reader.note(_message("b", 2))
+        reader.add(_message("a", seq))
+    reader.add(_message("b", 2))
     assert reader.find(FrameReference("a", 2)) is None
     assert reader.find(FrameReference("b", 2)) is None
 
@@ -56,8 +56,8 @@ def test_a_publisher_that_starts_anew_is_not_ahead_of_itself() -> None:
     """A restarted camera counts from nought: frames from before travel themselves."""
     sender = FrameReferences()
     old = _message("a", 900)
-    sender.note(old)
-    sender.note(_message("a", 0))
+    sender.add(old)
+    sender.add(_message("a", 0))
     assert sender.item(old) is old.item
 
 

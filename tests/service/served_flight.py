@@ -31,7 +31,7 @@ class Drones:
         self.graph = Graph([])
         self.obey = obey
 
-    def look(self, newest: int = 200) -> FlightState:
+    def poll(self, newest: int = 200) -> FlightState:
         """Nothing to be seen."""
         del newest
         raise MissionError("nothing is to be seen")

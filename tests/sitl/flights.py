@@ -48,14 +48,13 @@ FAR = survey((0, 60))
 
 def newest_log(vehicle: MavlinkVehicle) -> LogEntry:
     """The newest log, once it grows no more: a busy simulator writes on after the landing."""
-    size = -1
-    for _ in range(30):
-        log = vehicle.logs()[-1]
-        if log.size == size:
-            return log
-        size = log.size
+    log, size = vehicle.logs()[-1], -1
+    until = time.monotonic() + 60.0
+    while log.size != size:
+        assert time.monotonic() < until, f"log {log.number} goes on growing"
         time.sleep(2.0)
-    raise AssertionError(f"log {log.number} goes on growing")
+        log, size = vehicle.logs()[-1], log.size
+    return log
 
 
 def robot_at(
@@ -155,7 +154,7 @@ class SitlFlight:
         while time.monotonic() < end:
             time.sleep(max(0.0, due - time.monotonic()))
             due = max(due + _PERIOD, time.monotonic())
-            self.loop.turn(self.clock.now())
+            self.loop.step(self.clock.now())
             state = self.loop.state
             assert state is not None
             if not self.states or self.states[-1] is not self.mission.state:

@@ -100,8 +100,8 @@ class Relay:
             if self._inner in ready:
                 with contextlib.suppress(OSError):
                     self._up.send(self._inner.recv(_LARGEST), self._driver, now)
-            self._up.turn(now)
-            self._down.turn(now)
+            self._up.deliver(now)
+            self._down.deliver(now)
 
     def _hear(self, now: float) -> None:
         assert self._outer is not None

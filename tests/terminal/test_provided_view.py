@@ -14,7 +14,7 @@ def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -
     """State, place and charge, as of a flight of one's own; alerts once."""
     with ProvidedView(shown=True, places={"a": Waypoint("a", 5, 0, 2)}) as view:
         view.update(mission(alerts=["low battery"]))
-        view.note("the connection is lost")
+        view.show_message("the connection is lost")
     captured = capsys.readouterr()
     assert "drone enroute: flying to a, E 1.0  N 0.0  up 2.0 m, battery 90 %" in captured.out
     assert captured.err.count("low battery") == 1

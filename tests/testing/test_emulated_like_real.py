@@ -55,7 +55,7 @@ class Bench:
         telemetry = Telemetry()
         message = self.firmware.message(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
         assert message is not None
-        telemetry.take(message, 0.0)
+        telemetry.on_message(message, 0.0)
         for order in self.dialect.take_off(HEIGHT, telemetry):
             self.give(order)
 

@@ -176,8 +176,8 @@ def test_a_channel_loses_doubles_and_delays_by_its_seed() -> None:
         channel = Channel(bad, "seed", lambda content, _: arrived.append(content))
         for index in range(1000):
             channel.send(str(index).encode(), ("", 0), float(index))
-            channel.turn(float(index))
-        channel.turn(1e9)
+            channel.deliver(float(index))
+        channel.deliver(1e9)
         return arrived
 
     arrived = run()

@@ -122,7 +122,7 @@ class FuzzedFlight:
         if self.by_hand:
             self.mission.handle(TakeControls("somebody", 1), self._now)
             self.mission.handle(Steer(1, _HASTE), self._now)
-        record = self._loop.turn(self._now)
+        record = self._loop.step(self._now)
         state = self._loop.state
         if state is not None:
             _check_state(state)

@@ -178,14 +178,14 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             self._now = now
             self._flown_to = now if self._flown_to is None else self._flown_to
             self._receive(now)
-            self._up.turn(now)
+            self._up.deliver(now)
             steps = int((now - self._flown_to) / STEP + _ROUNDING)
             self._flown_to += steps * STEP
             self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
             for component in self.components.values():
                 component.turn(now)
             self._report(now)
-            self._down.turn(now)
+            self._down.deliver(now)
 
     def _receive(self, now: float) -> None:
         while True:

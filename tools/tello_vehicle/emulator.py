@@ -95,7 +95,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
                 now = time.monotonic()
                 for content, address, port in datagrams(self._socket):
                     self._ears.send(content, (address, port), now)
-                self._ears.turn(now)
+                self._ears.deliver(now)
                 steps = int((now - began) / STEP) - flown
                 flown += steps
                 with self._lock:
@@ -105,7 +105,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
                     state_due = now + _STATE_PERIOD
                     self._report(now)
                 for channel in (self._replies, self._states):
-                    channel.turn(now)
+                    channel.deliver(now)
 
     def _obey(self, content: bytes, client: tuple[str, int]) -> None:
         now = time.monotonic()

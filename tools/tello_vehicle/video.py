@@ -89,7 +89,7 @@ class VideoStream:
                 due = began + index / video.rate
                 while not self._stopping.is_set() and (left := due - time.monotonic()) > 0.0:
                     for _, channel in channels:
-                        channel.turn(time.monotonic())
+                        channel.deliver(time.monotonic())
                     self._stopping.wait(min(left, 0.005))
 
 

@@ -23,7 +23,7 @@ from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
 from aerodaas.messages.odometry import Odometry
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.scene.layers import LABEL
-from aerodaas.simulation.scene.scene import Looks
+from aerodaas.simulation.scene.scene import ObjectAppearance
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import World
 
@@ -57,7 +57,9 @@ class Label:
 class LabellingRenderer(Renderer):
     """Renders the picture and, beside it, the number of the thing that each pixel shows."""
 
-    def __init__(self, world: World, camera: CameraModel, looks: Looks | None = None) -> None:
+    def __init__(
+        self, world: World, camera: CameraModel, looks: ObjectAppearance | None = None
+    ) -> None:
         """Build the scene, and a second buffer that shares its camera."""
         super().__init__(world, camera, looks)
         self._world = world

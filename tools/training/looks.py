@@ -13,7 +13,7 @@ from aerodaas.simulation.scene.buildings import TowerLook
 from aerodaas.simulation.scene.cars import CarShape
 from aerodaas.simulation.scene.people import Outfit
 from aerodaas.simulation.scene.plants import rng_of
-from aerodaas.simulation.scene.scene import Looks
+from aerodaas.simulation.scene.scene import ObjectAppearance
 from aerodaas.simulation.scene.textures import Palette, VestCut
 from aerodaas.simulation.world import Thing, World
 from tools.training.colours import any_colour, cloth, hi_vis
@@ -68,7 +68,7 @@ class _TintedPalette(Palette):
 
 
 @dataclass(frozen=True)
-class VariousLooks(Looks):
+class VariousLooks(ObjectAppearance):
     """Draws each thing's looks from its seed."""
 
     def palette(self, world: World) -> Palette:

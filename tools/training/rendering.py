@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerodaas.simulation.scene.scene import Looks
+from aerodaas.simulation.scene.scene import ObjectAppearance
 from tools.training.backdrops import backdrop, compose
 from tools.training.clutter import add_clutter
 from tools.training.dataset import Sample, save_shard
@@ -40,7 +40,7 @@ _AS_FLOWN = 3
 
 
 def render_world(
-    seed: int, views: int = VIEWS, *, plain: bool = False, looks: Looks | None = None
+    seed: int, views: int = VIEWS, *, plain: bool = False, looks: ObjectAppearance | None = None
 ) -> Iterator[Sample]:
     """Pictures of the world of this seed, 416 pixels wide; `plain` leaves them as rendered."""
     rng = np.random.default_rng([seed, 1])
@@ -66,7 +66,7 @@ def render_world(
 def _world(seed: int) -> Iterator[Sample]:
     if seed % _AS_FLOWN:
         return render_world(seed)
-    return render_world(seed, plain=True, looks=Looks())
+    return render_world(seed, plain=True, looks=ObjectAppearance())
 
 
 def render_shards(folder: Path, first: int, worlds: int, processes: int = 1) -> Iterator[int]:

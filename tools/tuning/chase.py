@@ -142,7 +142,7 @@ class Chase:
                 result = follow.examine(seen, moment)
                 loop.mission.handle(StreamItem(_STREAM, result, seen.header), now)
             if now % _TURN == 0:
-                loop.turn(now)
+                loop.step(now)
                 if loop.state is not None:
                     monitor(seconds(now), loop.state.truth or loop.state.odometry)
             if now % frames == 0:

@@ -39,14 +39,14 @@ _USUAL_FRAMES = ((720, 1280), (720, 960))
 """Height and width of frames for which a network of variable size is warmed up: 16:9 and 4:3."""
 
 
-class _Desk(threading.local):
+class _Buffers(threading.local):
     """Working buffers of one thread, which are not pickled."""
 
     letterbox: Letterbox | None = None
     buffer: NDArray[Any] | None = None
 
-    def __reduce__(self) -> tuple[type[_Desk], tuple[()]]:
-        return _Desk, ()
+    def __reduce__(self) -> tuple[type[_Buffers], tuple[()]]:
+        return _Buffers, ()
 
 
 class OnnxDetector(Analytics[Detections]):
@@ -131,7 +131,7 @@ class OnnxDetector(Analytics[Detections]):
         self._outputs = tuple(
             TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
         )
-        self._desk = _Desk()
+        self._desk = _Buffers()
         self.trial: Trial = try_out(model, self.decoder, self.style)
         """What the model gave for the trial pictures."""
 
@@ -259,7 +259,7 @@ class OnnxDetector(Analytics[Detections]):
         found = self.decoder.decode(outputs, letterbox.network, self.min_score)
         self._count_invalid(found.invalid)
         if self._wanted is not None:
-            found = found.take(np.isin(found.classes, self._wanted))
+            found = found.select(np.isin(found.classes, self._wanted))
         everything = len(found)
         found = strongest(found, _MOST_CANDIDATES)
         self.excess += everything - len(found)

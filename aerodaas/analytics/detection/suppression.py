@@ -27,14 +27,14 @@ def suppress(candidates: Candidates, iou: float) -> Candidates:
         0.0,
         iou,
     )
-    return candidates.take(np.asarray(kept, np.intp).reshape(-1))
+    return candidates.select(np.asarray(kept, np.intp).reshape(-1))
 
 
 def strongest(candidates: Candidates, count: int) -> Candidates:
     """Keep the `count` candidates of highest score, in no particular order."""
     if len(candidates) <= count:
         return candidates
-    return candidates.take(np.argpartition(-candidates.scores, count)[:count])
+    return candidates.select(np.argpartition(-candidates.scores, count)[:count])
 
 
 def one_for_each(items: Sequence[Detection], shared: float) -> list[Detection]:

@@ -24,7 +24,7 @@ from aerodaas.geometry.frames import Box, rotation_from_rpy
 from aerodaas.messages.appearance import unlikeness
 from aerodaas.messages.detections import Detection, Detections
 
-__all__ = ["BoxFilter", "Looks", "Track", "Tracker", "TrackingAnalytics", "touches"]
+__all__ = ["AppearanceHistory", "BoxFilter", "Track", "Tracker", "TrackingAnalytics", "touches"]
 
 Array = NDArray[np.float64]
 _MEASUREMENT = 0.08
@@ -119,7 +119,7 @@ def touches(one: Box, other: Box) -> bool:
     return across > -beside and down > -above
 
 
-class Looks:
+class AppearanceHistory:
     """The newest appearances, oldest first."""
 
     def __init__(self) -> None:
@@ -167,7 +167,7 @@ class Track:
     """Number of its detections."""
     age: float = 0.0
     """Seconds since its last detection."""
-    looks: Looks = field(default_factory=Looks)
+    looks: AppearanceHistory = field(default_factory=AppearanceHistory)
 
 
 class Tracker:

@@ -44,7 +44,7 @@ _STRIPPED = {
 
 @dataclass(frozen=True)
 class Trial:
-    """What a model gave for the trial pictures."""
+    """Output of a model for the trial pictures."""
 
     boxes: int
     """Boxes a picture, before any threshold."""

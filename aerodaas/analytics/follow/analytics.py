@@ -199,7 +199,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
     def _followed(self, detection: Detection | None) -> FollowedTarget:
-        """What this frame's command goes by, whose box is `detection`."""
+        """Target of this frame's command, whose box is `detection`."""
         if self._identity.certainty is Certainty.UNCERTAIN:
             return FollowedTarget(TargetState.UNCERTAIN)
         if detection is None:

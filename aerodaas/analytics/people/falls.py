@@ -140,7 +140,7 @@ class FallDetector:
         # A falling body changes too much for a tracker, so the nearest body is accepted as well.
         body = max(there, key=lambda one: (one is person, one.area))
         top = self._top(body, feet, seen, view)
-        self._look(body, stamp, top)
+        self._update(body, stamp, top)
         self._fell = self._fell or self._sinks(*_SEEN) or top <= _FLAT * self._stature
         return self._fell and top <= _LOW
 
@@ -160,7 +160,7 @@ class FallDetector:
         self._stood = seen.header.stamp
         self._places.append(place)
         self._measure(self._stood, top)
-        self._look(body, self._stood, min(top, self._stature + _TALLER))
+        self._update(body, self._stood, min(top, self._stature + _TALLER))
         return True
 
     def _measure(self, stamp: int, top: float) -> None:
@@ -200,7 +200,7 @@ class FallDetector:
                 return max(top, self._stature)
         return top
 
-    def _look(self, body: Detection, stamp: int, top: float) -> None:
+    def _update(self, body: Detection, stamp: int, top: float) -> None:
         self._looks.append(_Look(stamp, top))
         self.last = body
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from aerodaas.cli.leaderboard.origin import Origin
-from aerodaas.schedulers.lab.leaderboard import CASES, SET, Leaderboard, Standing
+from aerodaas.schedulers.lab.leaderboard import CASES, SET, Leaderboard, Rank
 from aerodaas.schedulers.lab.metrics import Mean
 
 __all__ = ["markdown_page"]
@@ -51,13 +51,13 @@ def markdown_page(board: Leaderboard, ideas: Mapping[str, str], origin: Origin) 
     )
 
 
-def _standing(one: Standing, idea: str) -> str:
+def _standing(one: Rank, idea: str) -> str:
     mark = " †" if one.is_behind else ""
     shown = f"{_percent(one.utility)}{mark} | {_percent(one.completion)}"
     return f"| {one.rank} | `{_cell(one.scheduler)}` | {shown} | {_cell(idea)} |"
 
 
-def _cases(one: Standing) -> str:
+def _cases(one: Rank) -> str:
     shares = " | ".join(f"{100 * utility.value:.1f}" for utility, _ in one.cases.values())
     return f"| `{_cell(one.scheduler)}` | {shares} |"
 

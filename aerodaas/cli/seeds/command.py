@@ -61,7 +61,7 @@ def run_seeds(
         # Also after Ctrl-C, of those that have ended.
         if done:
             done.sort(key=lambda ended: ended.seed)
-            _tell(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
+            _print_runs(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
             typer.echo(f"in {run.options.record}")
     failed = [str(ended.seed) for ended in done if ended.failure]
     if failed:
@@ -84,7 +84,9 @@ def _shared_options(run: ApplicationRun) -> RunOptions:
     )
 
 
-def _tell(runs: list[SeededRun], title: str, json_path: Path | None, csv_path: Path | None) -> None:
+def _print_runs(
+    runs: list[SeededRun], title: str, json_path: Path | None, csv_path: Path | None
+) -> None:
     show(runs, title)
     found = rows(runs)
     try:

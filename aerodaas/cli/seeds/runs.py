@@ -44,7 +44,7 @@ class ApplicationRun:
     options: RunOptions
 
     def with_seed(self, seed: int) -> ApplicationRun:
-        """The same with `seed`, recorded in a folder of its own below that of `options.record`."""
+        """Copy of the run with `seed`, recorded in a folder below `options.record`."""
         assert self.options.record is not None  # noqa: S101 - `fly_seeds` needs it
         folder = self.options.record / f"seed-{seed}"
         return replace(self, options=replace(self.options, seed=seed, record=folder))
@@ -52,7 +52,7 @@ class ApplicationRun:
 
 @dataclass(frozen=True)
 class SeededRun:
-    """What came out of one run."""
+    """Result of one run."""
 
     seed: int
     folder: Path

@@ -100,7 +100,7 @@ class _Aim:
 
 
 class PictureItems:
-    """What a plan's items say of pictures, up to an item."""
+    """Picture commands of a plan's items, up to an item."""
 
     commands: ClassVar[frozenset[int]] = frozenset(
         {
@@ -145,7 +145,7 @@ class PictureItems:
             VIDEO_STOP_CAPTURE: partial(self._film, on=False),
         }
 
-    def take(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
+    def add_item(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
         """Take in an item of `commands`, behind `waypoints`; returns why it is not done, or ""."""
         try:
             return self._does[item.command](item, waypoints)
@@ -280,9 +280,9 @@ class PictureItems:
     def _mount(self, item: PlanItem, _: list[Waypoint]) -> str:
         mode = item.z or 0.0
         if mode == MOUNT_NEUTRAL:
-            return self._turn(item, 0.0, 0.0)
+            return self._aim_gimbal(item, 0.0, 0.0)
         if mode == MOUNT_MAVLINK_TARGETING or (self._ardupilot and not mode):
-            return self._turn(item, item.values[0], item.values[2])
+            return self._aim_gimbal(item, item.values[0], item.values[2])
         return f"of mount modes angles are done, and neutral, not mode {mode:g}"
 
     def _manage(self, item: PlanItem, _: list[Waypoint]) -> str:
@@ -291,7 +291,7 @@ class PictureItems:
             return "angles are done, not rates"
         if int(item.x or 0.0) & _YAW_LOCK and right is not None:
             return "yaw counts from the nose here, not from north"
-        return self._turn(item, pitch, right)
+        return self._aim_gimbal(item, pitch, right)
 
     def _region(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
         """Do what DO_SET_ROI says, which the other commands for regions of interest replace."""
@@ -302,7 +302,7 @@ class PictureItems:
         return why_not(item.command)
 
     def _look_away(self, item: PlanItem, _: list[Waypoint]) -> str:
-        return self._turn(item, 0.0, 0.0) if self._looks else why_not(item.command)
+        return self._aim_gimbal(item, 0.0, 0.0) if self._looks else why_not(item.command)
 
     def _look_at(self, item: PlanItem, _: list[Waypoint]) -> str:
         at = place(item.x, item.y, "it")
@@ -311,7 +311,7 @@ class PictureItems:
         self._looks = True
         return ""
 
-    def _turn(self, item: PlanItem, pitch: float | None, right: float | None) -> str:
+    def _aim_gimbal(self, item: PlanItem, pitch: float | None, right: float | None) -> str:
         """Turn the gimbal to angles in degrees, up and to the right; None leaves one as it was."""
         before = self._angles
         angles = (

@@ -40,7 +40,7 @@ class PictureWriter:
     def before(
         self, waypoint: Waypoint, frame: int, spot: tuple[float, float, float] | None
     ) -> Iterator[PlanItem]:
-        """What begins on the way to `waypoint`; `spot` is what it looks at, in its `frame`."""
+        """Plan items on the way to `waypoint`; `spot` is the place to look at, in its `frame`."""
         yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
         if waypoint.zoom is not None:
             yield _item(SET_CAMERA_ZOOM, OF_RANGE, waypoint.zoom)
@@ -57,7 +57,7 @@ class PictureWriter:
             yield PlanItem(0, DO_SET_ROI_LOCATION, frame, (0.0, 0.0, 0.0, 0.0), *spot)
 
     def behind(self, waypoint: Waypoint) -> Iterator[PlanItem]:
-        """What is done at `waypoint`."""
+        """Plan items at `waypoint`."""
         if waypoint.photo:
             yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
         if waypoint.video is not None:
@@ -66,7 +66,7 @@ class PictureWriter:
                 yield _item(NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
 
     def end(self) -> Iterator[PlanItem]:
-        """What ends with the last waypoint."""
+        """Plan items that end with the last waypoint."""
         yield from self._triggers(None, None)
 
     def _triggers(self, distance: float | None, interval: float | None) -> Iterator[PlanItem]:

@@ -79,7 +79,7 @@ class FenceCircle:
 
 @dataclass(frozen=True)
 class Notice:
-    """What a plan means and a mission here does not do."""
+    """Part of a plan that a mission here does not carry out, with the reason."""
 
     numbers: tuple[int, ...]
     """Items that mean it; none for the plan as a whole."""

@@ -72,7 +72,7 @@ def waypoints_of(
     """
     if home_altitude is None and plan.home is not None:
         home_altitude = plan.home.altitude
-    flown = _Flown(plan, home_altitude, ground, actuators)
+    flown = _ReadWaypoints(plan, home_altitude, ground, actuators)
     for item in plan.items:
         flown.add(item)
     return flown.waypoints, [*plan.notices, *_parts(plan), *flown.notices()]
@@ -88,7 +88,7 @@ def _parts(plan: Plan) -> list[Notice]:
     return parts
 
 
-class _Flown:
+class _ReadWaypoints:
     """Waypoints up to an item, and notices by command and reason."""
 
     def __init__(
@@ -109,7 +109,7 @@ class _Flown:
         self._said: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
 
     def notices(self) -> list[Notice]:
-        """What was left out, in the order of first mention."""
+        """Notices of items that were left out, in the order of first mention."""
         for item, why in self._pictures.left():
             self._say(item, why)
         return [Notice(tuple(items), name, why) for (name, why), items in self._said.items()]
@@ -146,7 +146,7 @@ class _Flown:
         if item.command == DO_CHANGE_SPEED:
             self._change_speed(item)
         elif item.command in PictureItems.commands:
-            if why := self._pictures.take(item, self.waypoints):
+            if why := self._pictures.add_item(item, self.waypoints):
                 self._say(item, why)
         elif item.command in MOVES and self._actuators:
             self._move(item)

@@ -45,7 +45,7 @@ def main(
     try:
         vehicle.connect(timeout)
         time.sleep(_SETTLING)
-        _tell(vehicle)
+        _print_vehicle(vehicle)
         if restore:
             vehicle.connection.fallback.restore()
         # Judged by this role, but never in it: its end would then be a loss of the ground station.
@@ -59,7 +59,7 @@ def main(
         vehicle.close()
 
 
-def _tell(vehicle: MavlinkVehicle) -> None:
+def _print_vehicle(vehicle: MavlinkVehicle) -> None:
     connection, state = vehicle.connection, vehicle.read()
     typer.echo(
         f"{connection.autopilot.name} {vehicle.telemetry.software}, system {connection.target[0]}: "

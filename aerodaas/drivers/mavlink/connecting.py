@@ -18,7 +18,7 @@ from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.fallback import Fallback
 from aerodaas.drivers.mavlink.microservices.fence import upload_fence
-from aerodaas.drivers.mavlink.microservices.journal import Journal
+from aerodaas.drivers.mavlink.microservices.parameter_backup import ParameterBackup
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -106,7 +106,7 @@ def establish(
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
     # Now: its place may be lost again, which changes nothing any more, while the rest is seen to.
     alignment = Alignment(_frame(telemetry, robot, settings, home, pause), telemetry)
-    journal = Journal(_own_name(autopilot, telemetry, settings, link.target[0], pause))
+    journal = ParameterBackup(_own_name(autopilot, telemetry, settings, link.target[0], pause))
     fallback = Fallback(link, autopilot, settings, name=robot.id, journal=journal)
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)

@@ -52,7 +52,7 @@ class HeardVehicle:
 
 @dataclass(frozen=True)
 class MavlinkDiscovery:
-    """What was heard, and why nothing was."""
+    """Vehicles that were heard, and notes on why others were not."""
 
     vehicles: tuple[HeardVehicle, ...] = ()
     notes: tuple[str, ...] = ()
@@ -90,7 +90,7 @@ def hear_vehicles(seconds: float, urls: Sequence[str] = LISTENED) -> MavlinkDisc
             wires = [number for ear in ears if (number := ear.wire.fileno()) >= 0]
             select.select(wires, [], [], min(left, _TICK))
             for ear in ears:
-                ear.hear()
+                ear.receive()
     vehicles = dict.fromkeys(vehicle for ear in ears for vehicle in ear.vehicles())
     return MavlinkDiscovery(
         tuple(vehicles), (*notes, *(note for ear in ears for note in ear.notes()))
@@ -106,7 +106,7 @@ class _Ear:
     framers: dict[Peer, Framer] = field(default_factory=dict)
     finders: dict[tuple[Peer, int], Finder] = field(default_factory=dict)
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Process what has arrived."""
         for content, peer in self.wire.receive():
             if peer not in self.framers:
@@ -118,12 +118,14 @@ class _Ear:
             for message in framer.feed(content):
                 system: int = message.get_srcSystem()  # type: ignore[attr-defined]
                 settings = MavlinkSettings(url=self.url)
-                self.finders.setdefault((peer, system), Finder(settings)).take(message, peer)
+                self.finders.setdefault((peer, system), Finder(settings)).on_heartbeat(
+                    message, peer
+                )
             if peer is not None:
                 framer.flush()
 
     def vehicles(self) -> Iterator[HeardVehicle]:
-        """Those that can be flown, in the order in which they were heard."""
+        """Vehicles that can be flown, in the order in which they were heard."""
         for found in (finder.found for finder in self.finders.values()):
             if found is not None:
                 yield HeardVehicle(

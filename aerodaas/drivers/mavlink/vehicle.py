@@ -139,7 +139,7 @@ class MavlinkVehicle:
         link = MavlinkLink(
             self._name,
             self._settings,
-            on_message=self._take,
+            on_message=self._on_message,
             on_turn=self._turned,
             on_component=self.payload.take_component,
             healthy=self._watchdog.healthy,
@@ -280,7 +280,7 @@ class MavlinkVehicle:
 
     @property
     def actuators(self) -> MavlinkActuators:
-        """What the environment file names."""
+        """Actuators that the environment file names."""
         return self._actuators
 
     @property
@@ -290,7 +290,7 @@ class MavlinkVehicle:
             return None if self._connection is None else self._connection.alignment.sea_level
 
     def health(self) -> HealthReadings:
-        """What it tells about itself; raises VehicleError if not connected."""
+        """Health as the vehicle tells it; raises VehicleError if not connected."""
         with self._lock:
             obstacles = self._connected().fallback.obstacles
             stranded = None if self._settings.fallback == "ignore" else obstacles
@@ -480,31 +480,31 @@ class MavlinkVehicle:
         connection = self._connected()
         return Parameters(connection.link, connection.autopilot)
 
-    def _take(self, message: Message, now: float, peer: Peer) -> None:
+    def _on_message(self, message: Message, now: float, peer: Peer) -> None:
         """Process a message of the vehicle; in the link's thread."""
         kind = message.get_type()
         with self._lock:
             if self._commander is None:
                 if kind == "HEARTBEAT":
-                    self._finder.take(message, peer)
+                    self._finder.on_heartbeat(message, peer)
                 return
             if kind in Airspace.messages:
-                self._airspace.take(message, now)
+                self._airspace.on_message(message, now)
                 return
             reboots = self._telemetry.reboots
-            self._telemetry.take(message, now)
+            self._telemetry.on_message(message, now)
             if self._telemetry.reboots != reboots:
                 self._restarted()
             if kind == "COMMAND_ACK":
-                self._commander.take(message, now)
+                self._commander.on_ack(message, now)
             elif kind == "HEARTBEAT":
                 self._observe(now)
             elif kind in Payload.messages:
-                self.payload.take(message, now)
+                self.payload.on_message(message, now)
             elif kind in MavlinkActuators.messages:
-                self._actuators.take(message)
+                self._actuators.on_message(message)
             elif self.mission_mode is not None and kind in MavlinkMissionMode.messages:
-                self.mission_mode.take(message, now)
+                self.mission_mode.on_message(message, now)
             else:
                 self._moved(kind, now)
 
@@ -560,16 +560,16 @@ class MavlinkVehicle:
         with self._lock:
             if self._commander is None or self._rates is None:
                 return
-            self._commander.turn(now)
-            self._rates.turn(self._telemetry, now)
-            self._touchdown.turn(now)
-            self.payload.turn(now)
-            self._airspace.turn(now)
-            self._actuators.turn(now)
+            self._commander.step(now)
+            self._rates.step(self._telemetry, now)
+            self._touchdown.update(now)
+            self.payload.step(now)
+            self._airspace.step(now)
+            self._actuators.step(now)
             if self.mission_mode is not None:
-                self.mission_mode.turn(now)
+                self.mission_mode.step(now)
             if self._connection is not None:
-                self._connection.departure.turn(now)
+                self._connection.departure.update(now)
                 self._climb_on(self._connection, now)
                 if request := self._telemetry.boot_clock.request(self._connection.target[0]):
                     self._connection.link.send(request)

@@ -84,7 +84,7 @@ class Ros2Camera:
         self.close()
         self._link = link = RosLink(self._domain)
         try:
-            link.subscribe(self._settings.topic, getattr(messages, self._kind), self._take)
+            link.subscribe(self._settings.topic, getattr(messages, self._kind), self._on_image)
             deadline = time.monotonic() + _FIRST_PICTURE
             while not self._first():
                 self._wait(link, deadline)
@@ -154,7 +154,7 @@ class Ros2Camera:
         if link is not None:
             link.close()
 
-    def _take(self, message: Any) -> None:  # noqa: ANN401 - of a type made at import
+    def _on_image(self, message: Any) -> None:  # noqa: ANN401 - of a type made at import
         arrival = host_time_ns()
         with self._lock:
             age = self._clock.age(stamp_of(message), arrival)

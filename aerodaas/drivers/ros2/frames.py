@@ -29,7 +29,7 @@ class Alignment:
         return cls(turn, start - body_to_enu(first.position, turn))
 
     def apply(self, odometry: Odometry) -> Odometry:
-        """The same in home's ENU."""
+        """Convert odometry to home's ENU frame."""
         return replace(
             odometry,
             position=body_to_enu(odometry.position, self.yaw) + self.shift,

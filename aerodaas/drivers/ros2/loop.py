@@ -122,7 +122,7 @@ class VelocityLoop:
         if self.mode is VehicleMode.LANDING:
             self._touchdown.observe(odometry, now)
 
-    def turn(self, odometry: Odometry | None, now: float) -> VelocitySetpoint | None:
+    def step(self, odometry: Odometry | None, now: float) -> VelocitySetpoint | None:
         """The velocity to be told now; None where the drone is told nothing.
 
         `odometry` is None while it is too old to fly by. While setpoints come, their sender tells

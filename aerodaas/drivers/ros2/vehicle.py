@@ -164,7 +164,7 @@ class Ros2Vehicle:
         with self._lock:
             if self._loop.airborne and self._steering is not None:
                 for _ in range(_LAST_WORDS):
-                    self._tell(STANDS_STILL)
+                    self._publish(STANDS_STILL)
                     time.sleep(_PERIOD)
             self._steering = None
         link.close()
@@ -262,10 +262,10 @@ class Ros2Vehicle:
         with self._lock:
             self._require_flight("follow a setpoint")
             if self._stale:
-                self._tell(STANDS_STILL)
+                self._publish(STANDS_STILL)
                 return STANDS_STILL
             clipped, velocity = self._loop.guide(setpoint, self._odometry, time.monotonic())
-            self._tell(velocity)
+            self._publish(velocity)
             return clipped
 
     def hold(self) -> None:
@@ -295,25 +295,25 @@ class Ros2Vehicle:
         while not closing.wait(_PERIOD):
             with self._lock:
                 if not closing.is_set():
-                    self._turn(time.monotonic())
+                    self._step(time.monotonic())
 
-    def _turn(self, now: float) -> None:
+    def _step(self, now: float) -> None:
         odometry = None if self._stale else self._odometry
         if odometry is not None and odometry is not self._seen:
             self._seen = odometry
             self._loop.observe(odometry, now)
         before = self._loop.airborne
-        asked = self._loop.turn(odometry, now)
+        asked = self._loop.step(odometry, now)
         if self._steering is None:
             return
         if asked is not None:
-            self._tell(asked)
+            self._publish(asked)
         if self._loop.mode is VehicleMode.TAKING_OFF:
             self._steering.motors_on(now)
         elif before and not self._loop.airborne:
             self._steering.motors_off()
 
-    def _tell(self, velocity: VelocitySetpoint) -> None:
+    def _publish(self, velocity: VelocitySetpoint) -> None:
         if self._steering is None:
             return
         odometry = self._odometry

@@ -20,7 +20,7 @@ class BatteryGauge:
         """Start without a reading."""
         self._percent: deque[int] = deque(maxlen=_WINDOW)
 
-    def take(self, percent: int) -> None:
+    def add(self, percent: int) -> None:
         """Add the percentage of one packet, 0 to 100."""
         self._percent.append(percent)
 

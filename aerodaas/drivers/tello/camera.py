@@ -156,12 +156,12 @@ class TelloCamera:
                 told = True
                 _log.warning("%s", self._why_quiet())
             for packet in arrived:
-                self.take(packet, now)
+                self.on_packet(packet, now)
 
-    def take(self, packet: bytes, now: int) -> None:
+    def on_packet(self, packet: bytes, now: int) -> None:
         """Process a video packet of the Tello, received at `now` (host nanoseconds)."""
         decoder = self._decoder
-        for whole in self._assembler.take(packet, now):
+        for whole in self._assembler.add_packet(packet, now):
             for picture in decoder.decode(Packet(whole.content)):
                 self._show(picture, whole.arrived)
         counts = self.counts

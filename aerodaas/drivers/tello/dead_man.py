@@ -43,7 +43,7 @@ class DeadMan:
         self._pipe = self._process.stdin
         os.set_blocking(self._pipe.fileno(), False)
 
-    def note(self, *, moving: bool) -> None:
+    def restart(self, *, moving: bool) -> None:
         """Record that the sticks were set."""
         # A watchdog that has died must not end the flight.
         with contextlib.suppress(OSError):

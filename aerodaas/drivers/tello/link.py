@@ -162,7 +162,7 @@ class TelloLink:
             self._sticks = None
             self.flown = STILL
             self._centrings = 0
-        self._guard.note(moving=False)
+        self._guard.restart(moving=False)
 
     def close(self, last: Command | None = None) -> None:
         """Send `last` without waiting for its reply, end the thread and free the ports."""
@@ -186,11 +186,11 @@ class TelloLink:
                 selector.select(max(0.0, min(_TICK, self._turn_due - time.monotonic())))
                 with contextlib.suppress(BlockingIOError):
                     self._bell.recv(4096)
-                self.turn()
+                self.step()
 
-    def turn(self) -> None:
+    def step(self) -> None:
         """Process received packets, and send what is due; called by the link's thread."""
-        self._hear()
+        self._receive()
         now = time.monotonic()
         self._speak(now)
         self._fly(now)
@@ -198,7 +198,7 @@ class TelloLink:
             self._turn_due = now + _TICK
             self._on_turn(now)
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         for content, address, port in datagrams(self._commands):
             if (address, port) == self._peer:
                 self._take_reply(content)
@@ -270,7 +270,7 @@ class TelloLink:
             self.flown = sticks
             self._transmit(sticks.text)
             self.counts.sticks += 1
-        self._guard.note(moving=sticks != STILL)
+        self._guard.restart(moving=sticks != STILL)
 
     def _transmit(self, text: str) -> None:
         try:

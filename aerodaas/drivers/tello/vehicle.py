@@ -144,7 +144,7 @@ class TelloVehicle:
         """
         self.close()
         self._forget()
-        link = TelloLink(self._name, self._settings, self._take, self._turned)
+        link = TelloLink(self._name, self._settings, self._on_state, self._turned)
         link.open()
         self._link = link
         try:
@@ -313,11 +313,11 @@ class TelloVehicle:
         self._landing_seen_at = time.monotonic()
         link.request(LAND, lambda _: None, urgent=True)
 
-    def _take(self, state: TelloState, now: float) -> None:
+    def _on_state(self, state: TelloState, now: float) -> None:
         """Handle a state packet, in the link's thread."""
         with self._lock:
             self._latest, self._heard_at = state, now
-            self._gauge.take(state.battery)
+            self._gauge.add(state.battery)
             self._phase.observe(state, now)
             self._predict(now)
             self._reckoning.correct(state, now, standing=not self._phase.airborne)

@@ -106,7 +106,7 @@ class ValueWriter:
         return found
 
     def _reference(self, value: object, place: str) -> dict[str, Any] | None:
-        """What stands for an object that is known at both ends; None for any other."""
+        """Reference to an object that both ends know; None for any other."""
         if value is self._environment:
             return {"$environment": "handle"}
         if isinstance(value, Analytics):

@@ -368,6 +368,6 @@ class ProvidedRun:
 
         view = self._view
         if view is not None:
-            view.note(text)
+            view.show_message(text)
         else:
             Console(stderr=True, highlight=False, soft_wrap=True).print(text, markup=False)

@@ -215,13 +215,13 @@ class Handover:
         if not self._stops:
             return
         if mode := self._mode():
-            mode.leave()
+            mode.clear()
         what = "the hand-over has ended" if self.flies else "not handed over"
         self.log.alert(now, _KIND, f"{what}: {reason}")
         self._stops = []
         self.flies = self._hovers = False
 
-    def turn(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
+    def step(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
         """Take note of how far it is, with `stops` as they are queued; whether the autopilot flies.
 
         A plan that has changed on the way is taken back.

@@ -216,7 +216,7 @@ class Checklist:
 
 
 def refusals(items: Sequence[HealthItem]) -> list[str]:
-    """What keeps the drone on the ground by the items, one sentence each.
+    """Reasons that keep the drone on the ground by the items, one sentence each.
 
     Without battery and fence, which the mission's supervisor refuses itself.
     """
@@ -225,7 +225,7 @@ def refusals(items: Sequence[HealthItem]) -> list[str]:
 
 
 def concerns(items: Sequence[HealthItem]) -> list[str]:
-    """What people are told, and what keeps the drone from nothing; one sentence each.
+    """Warnings that do not keep the drone on the ground; one sentence each.
 
     Without faults, which the mission tells itself in flight, and the fallback, which a driver tells
     when it connects.

@@ -102,7 +102,7 @@ class GroundClearance:
 
 
 class GroundView:
-    """What the ground around a drone demands at one moment."""
+    """Demands of the ground around a drone at one moment."""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.mission.safety.supervisor import has_position
 
-__all__ = ["MotorWatch", "Motors", "Standstill"]
+__all__ = ["MotorWatch", "Motors", "MotorsOffRule"]
 
 _LIFTED = 0.3
 """Metres above the take-off position from which the drone has left the ground."""
@@ -48,8 +48,8 @@ class Motors(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Standstill:
-    """What follows for the mission of a vehicle whose motors do not run."""
+class MotorsOffRule:
+    """Consequence for the mission of a vehicle whose motors do not run."""
 
     known: bool = True
     """Whether there is nothing to be done for it; False: it may yet start them."""
@@ -102,8 +102,8 @@ class MotorWatch:
 
     def judge(
         self, state: VehicleState, now: int, *, leaving: str | None, obeyed: bool
-    ) -> Standstill | None:
-        """What `state`, read at `now` (ns), means for a mission; None while the motors run.
+    ) -> MotorsOffRule | None:
+        """Consequence of `state`, read at `now` (ns); None while the motors run.
 
         `leaving` is the reason for which it returns or lands, None if it does not. `obeyed` is
         False for a recorded vehicle.
@@ -113,15 +113,15 @@ class MotorWatch:
             return None
         if motors in {Motors.IDLE, Motors.NEVER_LIFTED}:
             if leaving is None or state.mode is not VehicleMode.GROUNDED:
-                return Standstill(known=False)
-            return Standstill(ends=MissionState.ABORTED, reason=f"{leaving} before take-off")
+                return MotorsOffRule(known=False)
+            return MotorsOffRule(ends=MissionState.ABORTED, reason=f"{leaving} before take-off")
         if motors is Motors.SETTLING:
-            return Standstill()
+            return MotorsOffRule()
         if motors is Motors.LANDED and (leaving is not None or not obeyed):
             ends = None if leaving is None else MissionState.LANDED
-            return Standstill(ends=ends, reason=leaving or "")
+            return MotorsOffRule(ends=ends, reason=leaving or "")
         kind, text = self._story(motors, state.faults)
-        return Standstill(ends=MissionState.ABORTED, reason=text, alert=kind)
+        return MotorsOffRule(ends=MissionState.ABORTED, reason=text, alert=kind)
 
     def _story(self, motors: Motors, faults: Sequence[str]) -> tuple[str, str]:
         """Kind and text of the alert about `motors` that stopped without being asked to."""

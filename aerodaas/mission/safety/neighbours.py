@@ -67,13 +67,13 @@ class Neighbours:
         """What is known of each at `_now`, for which distance, and what that makes of it: all
         drones of one node ask at one moment."""
 
-    def hear(self, name: str, where: Whereabouts | None) -> None:
+    def update(self, name: str, where: Whereabouts | None) -> None:
         """Take what the drone `name` tells; None, a place unknown to it, leaves the last."""
         if where is not None:
             self._known[name] = where
 
     def of(self, names: Collection[str]) -> dict[str, Whereabouts]:
-        """What is known of these drones."""
+        """Whereabouts of these drones, as far as they are known."""
         return {name: self._known[name] for name in names if name in self._known}
 
     def around(self, name: str, now: int, separation: float) -> list[Neighbour]:

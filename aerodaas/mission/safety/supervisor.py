@@ -37,7 +37,7 @@ class Assessment:
     findings: tuple[Fault, ...] = ()
 
     @property
-    def demand(self) -> FailsafeAction:
+    def action(self) -> FailsafeAction:
         """The failsafe action demanded now."""
         return self.gravest.demand
 
@@ -48,7 +48,7 @@ class Assessment:
         The reason for a takeover or a lost position already names the faults behind it.
         """
         known = {subject(one.kind, one.text, one.about) for one in before.findings}
-        acts, reason = self.demand is not FailsafeAction.NOTHING, self.gravest.text
+        acts, reason = self.action is not FailsafeAction.NOTHING, self.gravest.text
         return [
             one
             for one in self.findings
@@ -129,7 +129,7 @@ class Supervisor:
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
 
     def taken_over(self, now: int) -> tuple[Fault, bool] | None:
-        """Who has taken the drone over for good, as last assessed; None if nobody has.
+        """Fault of a lasting takeover, as last assessed; None without one.
 
         The second value tells whether the reason is settled at `now` (mission clock, nanoseconds).
         """

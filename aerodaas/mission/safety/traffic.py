@@ -57,7 +57,7 @@ class Encounter:
 
 
 class TrafficWatch:
-    """What the traffic around one drone demands, turn by turn."""
+    """Demands of the traffic around one drone, cycle by cycle."""
 
     def __init__(self, limits: LimitsConfig) -> None:
         """Judge for a drone of these `limits`."""
@@ -92,7 +92,7 @@ class TrafficWatch:
 def encounters(
     state: VehicleState, traffic: Sequence[Traffic], config: TrafficConfig
 ) -> list[Encounter]:
-    """Those of `traffic` that are too near to the vehicle, or will be in the time looked ahead."""
+    """Aircraft that are too near to the vehicle, or will be within the time looked ahead."""
     odometry = state.odometry
     known = is_finite(odometry.position) and is_finite(odometry.velocity)
     if config.action == "ignore" or not known:

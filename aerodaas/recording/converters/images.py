@@ -51,7 +51,7 @@ _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
 @dataclass(frozen=True, slots=True)
 class EncodedFrame:
-    """What a `Frame` is, with its picture encoded."""
+    """A `Frame` with its picture encoded."""
 
     header: Header
     data: bytes

@@ -19,7 +19,7 @@ from aerodaas.errors import RecordingError
 from aerodaas.messages.detections import Detection
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.export.output import file_name, new_file
-from aerodaas.recording.pictures import Shot, detections_by_frame, shots
+from aerodaas.recording.pictures import RecordedImage, detections_by_frame, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.overlay import VISIBLE
 
@@ -110,7 +110,7 @@ def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> 
     return path
 
 
-def _spaced(found: Iterator[Shot], gap: int) -> Iterator[Shot]:
+def _spaced(found: Iterator[RecordedImage], gap: int) -> Iterator[RecordedImage]:
     """Pictures of each camera at least `gap` nanoseconds apart."""
     newest: dict[str, int] = {}
     for shot in found:

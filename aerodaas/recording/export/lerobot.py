@@ -280,7 +280,7 @@ class _Episode:
     cameras: dict[str, _Camera] = field(default_factory=dict)
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """What statistics are made of, by feature; N x values, of cameras the pixels' samples."""
+        """Columns for statistics, by feature: N x values; of cameras, samples of the pixels."""
         count = len(self.stamps)
         index = np.arange(count, dtype=np.int64)[:, None]
         zero = np.zeros((count, 1), np.int64)
@@ -384,7 +384,7 @@ def _episode(recording: Recording, robot: str, cameras: dict[str, list[int]]) ->
 
 
 def _actions(recording: Recording, robot: str, stamps: _Stamps, states: _Floats) -> _Floats:
-    """What was sent and in force at each row, N x 4."""
+    """Setpoints in force at each row, N x 4."""
     sent: dict[int, Setpoint | None] = {}
     for record in recording.records(schemas=("aerodaas.Setpoint",)):
         if record.labels.robot == robot:

@@ -24,7 +24,7 @@ from aerodaas.recording.pictures import (
     MOUNT_SCHEMA,
     picture_topics,
 )
-from aerodaas.recording.playback.film import NAVIGATION_SCHEMA, Captures, Film
+from aerodaas.recording.playback.frame_index import NAVIGATION_SCHEMA, Captures, FrameIndex
 from aerodaas.recording.playback.track import Room, TrackBuilder
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorded_environment import allowed_content, recorded_content
@@ -62,7 +62,7 @@ class DecisionSums:
             return self._rows
         return [*self._rows, *self._row(self._last)]
 
-    def take(self, decision: Decision) -> None:
+    def add(self, decision: Decision) -> None:
         """Take one decision or outcome."""
         now, action = seconds(decision.stamp), decision.action
         if action == "drop":
@@ -92,7 +92,7 @@ class DecisionSums:
 
 def read_flight(
     recording: Recording, tell: Callable[[float], None] = lambda _: None
-) -> tuple[RecordedOut, Film]:
+) -> tuple[RecordedOut, FrameIndex]:
     """Read an open recording, which the film goes on reading.
 
     Args:
@@ -122,7 +122,7 @@ class _Reading:
         self._told = [name for name, one in known.items() if one.schema in _SCHEMAS]
         self._span = [0, 0]
 
-    def flight(self, tell: Callable[[float], None]) -> tuple[RecordedOut, Film]:
+    def flight(self, tell: Callable[[float], None]) -> tuple[RecordedOut, FrameIndex]:
         recording = self._recording
         whole = recording.duration * NANOSECONDS or 1.0
         first: int | None = None
@@ -138,7 +138,7 @@ class _Reading:
             if captures is not None:
                 captures.add(record.captured, record.stamp)
             else:
-                self._take(record)
+                self._on_record(record)
         for captures in self._captures.values():
             captures.sort()
         mounts = {
@@ -146,21 +146,21 @@ class _Reading:
             for name, (calibration, mount) in self._mounts.items()
         }
         pictures, found, flown = map(self._named, (self._pictures, self._found, self._flown))
-        film = Film(recording, pictures, found, flown, mounts)
+        film = FrameIndex(recording, pictures, found, flown, mounts)
         return self._told_of(first or 0, last), film
 
     def _named(self, streams: dict[str, str]) -> dict[str, tuple[str, Captures]]:
         return {name: (topic, self._captures[topic]) for name, topic in streams.items()}
 
-    def _take(self, record: Record) -> None:
+    def _on_record(self, record: Record) -> None:
         message = record.value
         if isinstance(message, Alert):
-            if self._room.take(1):
+            if self._room.reserve(1):
                 time = seconds(message.header.stamp)
                 alert = AlertOut(time=time, kind=message.kind, text=message.text)
                 self._alerts.append(alert)
         elif isinstance(message, Decision):
-            self._sums.take(message)
+            self._sums.add(message)
         elif (robot := self._robot(record.labels.robot)) is not None:
             if isinstance(message, VehicleState):
                 robot.state(message)

@@ -61,7 +61,7 @@ def _range(farthest: float) -> float:
 def packed_picture(
     header: Header, size: int, form: Literal["jpeg", "h264"], *, measured: bool
 ) -> dict[str, Any]:
-    """What a page is told of a picture.
+    """Header of a picture for a page.
 
     Args:
         header: Of its frame.
@@ -81,7 +81,7 @@ def packed_depth(header: Header, depth: NDArray[np.uint16]) -> tuple[dict[str, A
 
 
 def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
-    """What a page is told of what is followed in the frame of `header`."""
+    """Followed target in the frame of `header`, for a page."""
     item = TargetItem.model_construct(header=header, state=target.state, box=target.box)
     return _json(item)
 
@@ -91,7 +91,7 @@ def _json(item: AnswerModel) -> dict[str, Any]:
 
 
 def packed_places(found: Detections, ground: Ground | None = None) -> dict[str, Any]:
-    """What a page is told of where on the ground each detection stands, beside the detections.
+    """Detections for a page, each with its place on the ground.
 
     Args:
         found: The detections, best first, with the camera and the odometry of their frame.

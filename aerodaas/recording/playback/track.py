@@ -47,14 +47,14 @@ _NOTHING = StatusOut(
 
 
 class Room:
-    """What a recording's page has room for; what does not fit is counted."""
+    """Room for names on a recording's page; the rest is counted."""
 
     def __init__(self) -> None:
         self._left = _MOST_NAMES
         self.untold = 0
         """Changes, places and alerts left out."""
 
-    def take(self, names: int) -> bool:
+    def reserve(self, names: int) -> bool:
         """Whether so many more names fit."""
         if names > self._left:
             self.untold += 1
@@ -92,7 +92,7 @@ class TrackBuilder:
         self._change(now, {"mode": state.mode.value})
         if track.time and now < track.time[-1] + self._interval:
             return
-        self._hear(now, state.traffic)
+        self._add_traffic(now, state.traffic)
         odometry = state.odometry
         track.time.append(now)
         track.position.append(_axes(odometry.position))
@@ -111,13 +111,13 @@ class TrackBuilder:
                          track.gps):  # fmt: skip
                 del rows[1::2]
 
-    def _hear(self, now: float, told: Sequence[Traffic]) -> None:
+    def _add_traffic(self, now: float, told: Sequence[Traffic]) -> None:
         """Take the other aircraft of a state, once a second and when the last one is gone."""
         heard = self._track.traffic
         aircraft = [TrafficOut.of(one) for one in told[:_MOST_AIRCRAFT] if _is_placed(one)]
         due = not heard or now >= heard[-1].since + _HEARD_SECONDS or not aircraft
         changed = bool(aircraft or (heard and heard[-1].aircraft))
-        if changed and due and self._room.take(1 + len(aircraft)):
+        if changed and due and self._room.reserve(1 + len(aircraft)):
             heard.append(HeardOut(since=now, aircraft=aircraft))
 
     def mission(self, status: MissionStatus, ahead: int) -> None:
@@ -141,7 +141,7 @@ class TrackBuilder:
             place = (one.x, one.y, one.z)
             if self._known.get(one.id) == place:
                 continue
-            if self._room.take(1):
+            if self._room.reserve(1):
                 self._known[one.id] = place
                 self._track.places.append(PlaceOut(since=now, id=one.id, place=place))
         self._change(now, self._ahead())
@@ -161,7 +161,7 @@ class TrackBuilder:
         # Vehicle and mission tell of slightly different times.
         new = self._now.model_copy(update={"time": max(now, last), **fields})
         names = (new.visited, new.given_up, new.pending, new.faults)
-        if self._room.take(1 + sum(map(len, names))):
+        if self._room.reserve(1 + sum(map(len, names))):
             self._now = new
             self._track.statuses.append(new)
 

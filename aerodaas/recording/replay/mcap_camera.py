@@ -12,7 +12,7 @@ from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.errors import RecordingError, SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
-from aerodaas.recording.pictures import Shot, decoded_ahead, picture_topics, shots
+from aerodaas.recording.pictures import RecordedImage, decoded_ahead, picture_topics, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.steady_clock import SteadyClock
 
@@ -39,8 +39,8 @@ class McapCamera:
         self._model: CameraModel | None = None
         self._recording: Recording | None = None
         self._topic = ""
-        self._shots: Iterator[Shot] = iter(())
-        self._next: Shot | None = None
+        self._shots: Iterator[RecordedImage] = iter(())
+        self._next: RecordedImage | None = None
         self._clock = SteadyClock()
         self._time = 0
         """When `_next` was taken, nanoseconds by `_clock`."""
@@ -80,7 +80,7 @@ class McapCamera:
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Return the newest image due at `stamp`; None if already returned or broken."""
         del pose
-        due: Shot | None = None
+        due: RecordedImage | None = None
         while self._next is not None and self._due_at(self._next, stamp) <= stamp:
             due = self._next
             self._advance(stamp)
@@ -102,11 +102,11 @@ class McapCamera:
             self._recording.close()
             self._recording = None
 
-    def _picture(self, picture: Picture, shot: Shot) -> Picture:
+    def _picture(self, picture: Picture, shot: RecordedImage) -> Picture:
         del shot
         return picture
 
-    def _due_at(self, shot: Shot, stamp: int) -> int:
+    def _due_at(self, shot: RecordedImage, stamp: int) -> int:
         """Mission time at which the next image is due; the first one is due at once."""
         del shot
         if self._offset is None:
@@ -140,7 +140,7 @@ class McapCamera:
             self._clock = SteadyClock()
             self._time = self._clock.steady(self._next.record.captured) if self._next else 0
 
-    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+    def _play(self, found: Iterator[RecordedImage]) -> Iterator[RecordedImage]:
         return found
 
     def _choose(self, recording: Recording) -> str:
@@ -168,16 +168,16 @@ class ReplayedCamera(McapCamera):
         """True after the last image was returned, unless the recorded camera was endless."""
         return super().finished and not self._settings.loop
 
-    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+    def _play(self, found: Iterator[RecordedImage]) -> Iterator[RecordedImage]:
         # Every image is played as fast as possible: decoding takes longest.
         return decoded_ahead(found)
 
-    def _due_at(self, shot: Shot, stamp: int) -> int:
+    def _due_at(self, shot: RecordedImage, stamp: int) -> int:
         del stamp
         return shot.header.stamp
 
     def _begin_again(self, stamp: int) -> None:
         """Do nothing: mission time does not restart."""
 
-    def _picture(self, picture: Picture, shot: Shot) -> Picture:
+    def _picture(self, picture: Picture, shot: RecordedImage) -> Picture:
         return replace(picture, stamp=shot.header.stamp)

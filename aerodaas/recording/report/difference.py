@@ -255,7 +255,7 @@ def _stamp(message: Any) -> int:  # noqa: ANN401 - of a class of `_READERS`
 
 
 def _result(record: Record, what: str, kind: str, content: Content) -> tuple[str, Key, Content]:
-    """What was computed from one measurement."""
+    """Result that was computed from one measurement."""
     header: Header = record.value.header
     stream = record.topic.removesuffix(f"/{kind}").strip("/")
     return f"{stream} {what}", (header.source, header.stamp), content

@@ -14,7 +14,7 @@ import numpy as np
 from aerodaas.errors import RecordingError
 from aerodaas.geometry.frames import is_finite
 from aerodaas.recording.export.output import new_file
-from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, shots
+from aerodaas.recording.pictures import DETECTIONS_SCHEMA, RecordedImage, shots
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, from_rpy
 from aerodaas.recording.ros import typestore
@@ -182,7 +182,7 @@ class _Conversion:
         )
         yield _Message("/tf_static", typestore.TRANSFORMS, message)
 
-    def _picture(self, shot: Shot) -> Iterator[_Message]:
+    def _picture(self, shot: RecordedImage) -> Iterator[_Message]:
         stream = shot.record.topic.removesuffix("/image")
         stamp, frame = shot.header.stamp, shot.header.source
         # ROS 2 has no message of its own for videos: their frames are files, too.

@@ -37,7 +37,7 @@ from aerodaas.recording.provenance import Provenance, package_versions
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
-from aerodaas.recording.ros.beginning import BagTopics, Beginning
+from aerodaas.recording.ros.bag_preview import BagPreview, BagTopics
 from aerodaas.ros.incoming import battery_of, detection_items, fix_of, odometry_of
 
 __all__ = ["ImportedBag", "import_bag"]
@@ -54,7 +54,7 @@ _RECENT = 256
 
 @dataclass(frozen=True, slots=True)
 class ImportedBag:
-    """What came of an import."""
+    """Result of an import."""
 
     summary: RecordingSummary
     skipped: Mapping[str, tuple[int, str]]
@@ -97,7 +97,7 @@ def import_bag(
     if not bag.topics:
         raise RecordingError(f"{bag.path} holds no whole message: it is empty, or was cut off")
     topics.check(bag.topics)
-    beginning = Beginning(bag, topics)
+    beginning = BagPreview(bag, topics)
     environment = _environment(bag.path, beginning)
     # No revision: it is that of an application.
     provenance = Provenance(
@@ -112,7 +112,7 @@ def import_bag(
             path, config=config, provenance=provenance, home=beginning.home
         ) as recorder:
             work = _Import(beginning, recorder)
-            work.take(bag)
+            work.run(bag)
             if not work.taken:
                 raise RecordingError(f"nothing of {bag.path} could be read: {_why(bag, work)}")
             summary = recorder.close()
@@ -134,7 +134,7 @@ def _why(bag: RosBag, work: _Import) -> str:
 class _Import:
     """One pass over the bag, message by message."""
 
-    def __init__(self, beginning: Beginning, recorder: FlightRecorder) -> None:
+    def __init__(self, beginning: BagPreview, recorder: FlightRecorder) -> None:
         self.skipped: dict[str, tuple[int, str]] = {}
         self.taken = 0
         self._beginning = beginning
@@ -153,7 +153,7 @@ class _Import:
         self._recent: dict[str, OrderedDict[int, tuple[int, int, int]]] = {}
         """Number, width and height of each camera's newest pictures by stamp."""
 
-    def take(self, bag: RosBag) -> None:
+    def run(self, bag: RosBag) -> None:
         """Read all and write what is whole."""
         takers: dict[str, Callable[[BagMessage, int, int], None]] = {
             "camera": self._picture,
@@ -258,7 +258,7 @@ class _Import:
         self._recorder.write(Message(stream, sequence, recorded, header, 0, (), item))
 
 
-def _environment(path: Path, beginning: Beginning) -> EnvironmentConfig:
+def _environment(path: Path, beginning: BagPreview) -> EnvironmentConfig:
     """The environment that a run with these sensors would have had."""
     topics = beginning.topics
     sensors: list[dict[str, Any]] = []

@@ -125,7 +125,7 @@ def fit_clock_line(pairs: Floats) -> ClockLine:
 
 @dataclass
 class RecordedClock:
-    """What a recording tells of one robot's autopilot: its clock, its motion, when it was armed."""
+    """Clock, motion and arming of one robot's autopilot, as recorded."""
 
     pairs: list[tuple[float, float, float]] = field(default_factory=list)
     """Mission seconds, the autopilot's seconds, error in seconds (NaN: not by TIMESYNC)."""
@@ -134,7 +134,7 @@ class RecordedClock:
     armed: list[float] = field(default_factory=list)
     """Mission seconds of the states with motors armed."""
 
-    def take(self, state: VehicleState) -> None:
+    def add_state(self, state: VehicleState) -> None:
         """Take a state."""
         now = seconds(state.stamp)
         clock = state.extra.get("autopilot_time", np.nan)
@@ -190,7 +190,7 @@ def recorded_clocks(recording: Recording) -> dict[str, RecordedClock]:
     """Read what a recording tells of each robot's autopilot, by robot."""
     clocks: dict[str, RecordedClock] = {}
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
-        clocks.setdefault(record.labels.robot, RecordedClock()).take(record.value)
+        clocks.setdefault(record.labels.robot, RecordedClock()).add_state(record.value)
     return clocks
 
 

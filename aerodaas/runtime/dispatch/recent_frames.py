@@ -39,7 +39,7 @@ class FrameReferences:
         """Start without frames."""
         self._newest: dict[str, int] = {}
 
-    def note(self, message: Message[Any]) -> None:
+    def add(self, message: Message[Any]) -> None:
         """Store the number of a stream's newest message."""
         self._newest[message.stream] = message.seq
 
@@ -58,7 +58,7 @@ class RecentFrames:
         """Keep the newest `FRAME_DEPTH` messages of each of `streams`."""
         self._kept = {stream: deque[Message[Any]](maxlen=FRAME_DEPTH) for stream in streams}
 
-    def note(self, message: Message[Any]) -> None:
+    def add(self, message: Message[Any]) -> None:
         """Keep a message if it is of one of the streams."""
         if message.stream in self._kept:
             self._kept[message.stream].append(message)

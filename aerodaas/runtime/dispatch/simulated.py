@@ -44,7 +44,7 @@ class Executions:
 
     @classmethod
     def of(cls, simulation: SimulationConfig) -> Executions | None:
-        """Those of an environment; None where executions take no mission time.
+        """Executions of an environment; None where executions take no mission time.
 
         Raises SchedulerError or UnknownIdError for times and networks that there are not.
         """

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.protocol.playback import PlaybackOut
-from aerodaas.recording.playback.film import Film
 from aerodaas.recording.playback.flight import read_flight
+from aerodaas.recording.playback.frame_index import FrameIndex
 from aerodaas.recording.reader import Recording
 
 __all__ = ["Player", "Players"]
@@ -29,7 +29,7 @@ class Player:
         self._path = path
         self._recording = recording
         self._lock = threading.Lock()
-        self._film: Film | None = None
+        self._film: FrameIndex | None = None
         self._closed = False
         self._problem = ""
         self._read = 0.0

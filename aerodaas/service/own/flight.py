@@ -169,7 +169,7 @@ class FlightRun(Protocol):
         """State that was polled last."""
         ...
 
-    def look(self, newest: int = 200) -> FlightState:
+    def poll(self, newest: int = 200) -> FlightState:
         """Its present state; raises AeroDaaSError."""
         ...
 
@@ -424,7 +424,7 @@ class OwnFlight:
         self._commanded = False
         # The thread that waits for the run meets the same error and handles it.
         with contextlib.suppress(AeroDaaSError):
-            self._record(self._run.look(0))
+            self._record(self._run.poll(0))
 
     def _record(self, state: FlightState) -> None:
         with self._looking:

@@ -62,7 +62,7 @@ _ABOVE = np.array([0.35, 0.2, 0.91])
 
 @dataclass(frozen=True)
 class Garment:
-    """What is worn around the torso, where it is no plain shirt and no vest."""
+    """Garment around the torso, where it is no plain shirt and no vest."""
 
     texture: Texture
     """u runs once around from the back, v from the hem to the neck."""
@@ -191,7 +191,7 @@ def _torso(build: float) -> Mesh:
 
 
 def _around(hem: float, flare: float, build: float) -> Mesh:
-    """What is worn around a torso, whose hem stands off the body."""
+    """Mesh of a garment around a torso, whose hem stands off the body."""
     radii, levels = _CHEST_RADII * _girth(build), _CHEST_LEVELS.copy()
     radii[:2] += flare
     levels[0] = -hem

@@ -26,10 +26,10 @@ from aerodaas.simulation.scene.rubble import add_rubble
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import Thing, World
 
-__all__ = ["Looks", "Scene"]
+__all__ = ["ObjectAppearance", "Scene"]
 
 
-class Looks:
+class ObjectAppearance:
     """Appearance of objects by their seeds; a subclass may vary it more."""
 
     def palette(self, world: World) -> Palette:
@@ -59,9 +59,9 @@ class Looks:
 class Scene:
     """Scene nodes of a world; `update` moves the moving objects."""
 
-    def __init__(self, world: World, looks: Looks | None = None) -> None:
+    def __init__(self, world: World, looks: ObjectAppearance | None = None) -> None:
         """Build the static objects, and the figures of moving ones."""
-        self.looks = looks or Looks()
+        self.looks = looks or ObjectAppearance()
         self.root = NodePath("world")
         self.palette = self.looks.palette(world)
         self._light = Light.draw(world.scenario.sky, world.seed)

@@ -34,7 +34,7 @@ class Dem(EdgeCloudEdf):
         return decisions
 
     def loss(self, task: Task, now: int) -> float:
-        """What `task` loses by leaving the edge: the difference to the cloud, or everything."""
+        """Utility that `task` loses off the edge: the difference to the cloud, or all of it."""
         profile = task.profile
         if now + self.cloud_time(task) < task.deadline and profile.cloud_gain >= 0:
             return abs(profile.edge_gain - profile.cloud_gain)

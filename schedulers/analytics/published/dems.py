@@ -48,13 +48,13 @@ class Dems(Dem):
             return [self.drop(task, now, "no time left for the cloud")]
         leave = task.deadline - MARGIN - takes
         if leave <= now:
-            return [self.leave(task, now, reason)]
+            return [self._reject(task, now, reason)]
         self.tentative[task] = reason
         heappush(self._leaves, (leave, self._waited, task))
         self._waited += 1
         return [WakeAt(leave)]
 
-    def leave(self, task: Task, now: int, reason: str) -> Decision:
+    def _reject(self, task: Task, now: int, reason: str) -> Decision:
         """The task can wait no longer."""
         if task.profile.cloud_gain > 0 and self.resources.cloud_slots:
             return self.send(task, reason)
@@ -69,7 +69,7 @@ class Dems(Dem):
             if task in tentative:
                 due.append((number, task))
         due.sort()
-        return [self.leave(task, now, tentative.pop(task)) for _, task in due]
+        return [self._reject(task, now, tentative.pop(task)) for _, task in due]
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Steal a task that fits before the queue, else run the queue's head."""

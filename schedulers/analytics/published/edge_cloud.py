@@ -34,7 +34,7 @@ class EdgeCloudEdf(EdgeQueue):
 
 
 class EdgeCloudSjf(EdgeCloudEdf):
-    """The same with the shortest job first on the edge."""
+    """Edge and cloud, with the shortest job first on the edge."""
 
     def key(self, task: Task) -> float:
         """Expected time on the edge."""

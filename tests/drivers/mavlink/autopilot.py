@@ -140,11 +140,11 @@ class SteppedClock:
                 return super().get_nowait()
 
         monkeypatch.setattr(link_module, "queue", SimpleNamespace(SimpleQueue=Inbox))
-        monkeypatch.setattr(MavlinkLink, "_start", lambda link: self.turns.append(link.turn))
+        monkeypatch.setattr(MavlinkLink, "_start", lambda link: self.turns.append(link.step))
         closing = MavlinkLink.close
 
         def close(link: MavlinkLink) -> None:
-            self.turns = [turn for turn in self.turns if turn != link.turn]
+            self.turns = [turn for turn in self.turns if turn != link.step]
             closing(link)
 
         monkeypatch.setattr(MavlinkLink, "close", close)

@@ -318,7 +318,7 @@ class FlownMission:
     def turn(self) -> None:
         """One turn of the loop."""
         self.ends.advance(_TURN)
-        self.loop.turn(self.now(), self.neighbours)
+        self.loop.step(self.now(), self.neighbours)
         assert self.loop.state is not None
         self.modes.append(self.loop.state.mode)
         if self.states[-1:] != [self.mission.state]:

@@ -32,7 +32,7 @@ class Exchanges:
 
     def hear(self, tc1: int, ts1: int) -> None:
         """A TIMESYNC comes now."""
-        self.clock.take(mavlink.MAVLink_timesync_message(tc1, ts1))
+        self.clock.on_timesync(mavlink.MAVLink_timesync_message(tc1, ts1))
 
     def exchange(self, up: float, down: float) -> None:
         """One exchange with so many seconds of each way."""

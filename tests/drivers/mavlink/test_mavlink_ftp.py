@@ -79,8 +79,8 @@ class World:
                 if packet is not None:
                     return packet
             self.now += STEP
-            self._up.turn(self.now)
-            self._down.turn(self.now)
+            self._up.deliver(self.now)
+            self._down.deliver(self.now)
         return None
 
     def read(self, size: int, begin: int = 0) -> bytes:

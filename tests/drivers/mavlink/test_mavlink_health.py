@@ -75,19 +75,19 @@ def lasting(*messages: Any) -> list[str]:  # noqa: ANN401
     """What is told of a vehicle that has said each of these, and said the last for a second."""
     health = Health()
     for now, message in enumerate((*messages, messages[-1])):
-        health.take(message, float(now))
+        health.on_message(message, float(now))
     return health.faults(float(len(messages)))
 
 
 def test_a_complaint_is_told_from_its_first_second_on() -> None:
     """Not a moment before; a text that changes meanwhile is the same complaint."""
     health = Health()
-    health.take(estimator(along=6.0), 10.0)
-    health.take(estimator(along=11.0), 10.75)
+    health.on_message(estimator(along=6.0), 10.0)
+    health.on_message(estimator(along=11.0), 10.75)
     assert health.faults(10.99) == []
     assert health.faults(11.0) == ["estimator: position unsure by more than 10 m"]
-    health.take(estimator(), 11.5)
-    health.take(estimator(along=11.0), 12.0)
+    health.on_message(estimator(), 11.5)
+    health.on_message(estimator(along=11.0), 12.0)
     assert health.faults(12.5) == []
 
 
@@ -166,9 +166,9 @@ def test_an_estimator_is_lost_after_a_second() -> None:
     health = Health()
     assert not health.lost(10.0)
     for now, lost in ((10.0, False), (10.9, False), (11.0, True), (15.0, True)):
-        health.take(estimator(WELL & ~HORIZONTAL), now)
+        health.on_message(estimator(WELL & ~HORIZONTAL), now)
         assert health.lost(now) is lost
-    health.take(estimator(), 15.5)
+    health.on_message(estimator(), 15.5)
     assert not health.lost(20.0)
 
 
@@ -187,9 +187,9 @@ def test_an_estimator_is_lost_after_a_second() -> None:
 def test_what_makes_a_position_unsure(ill: Any, *, sure: bool) -> None:  # noqa: ANN401
     """At once: the fix, the estimator's own doubt, its loss, and a GPS that jumps."""
     health = Health()
-    health.take(gps(3), 0.0)
+    health.on_message(gps(3), 0.0)
     assert health.sure_of_position
-    health.take(ill, 1.0)
+    health.on_message(ill, 1.0)
     assert health.sure_of_position is sure
 
 
@@ -197,11 +197,11 @@ def test_what_makes_a_position_unsure(ill: Any, *, sure: bool) -> None:  # noqa:
 def test_a_gps_is_silent_after_four_seconds_of_others(gaps: int, *, silent: bool) -> None:
     """Eight words of others, half a second apart, are four; one word of its own ends it."""
     health = Health()
-    health.take(gps(3), 10.0)
+    health.on_message(gps(3), 10.0)
     for half in range(1, gaps + 1):
-        health.take(shaking(), 10.0 + half / 2)
+        health.on_message(shaking(), 10.0 + half / 2)
     assert health.faults(15.0) == (["GPS: it has fallen silent"] if silent else [])
-    health.take(gps(3), 15.0)
+    health.on_message(gps(3), 15.0)
     assert health.faults(15.0) == []
 
 
@@ -217,12 +217,12 @@ def test_a_fix_that_is_lost() -> None:
 def test_silence_comes_first_and_nothing_twice() -> None:
     """A battery that both it and its autopilot call unhealthy is one complaint."""
     health = Health()
-    health.take(gps(3), 0.0)
-    health.take(status(BATTERY, BATTERY, 0), 0.0)
-    health.take(battery(mavlink.MAV_BATTERY_CHARGE_STATE_UNHEALTHY), 0.0)
+    health.on_message(gps(3), 0.0)
+    health.on_message(status(BATTERY, BATTERY, 0), 0.0)
+    health.on_message(battery(mavlink.MAV_BATTERY_CHARGE_STATE_UNHEALTHY), 0.0)
     assert health.faults(1.0) == ["battery: unhealthy"]
     for second in range(1, 6):
-        health.take(shaking(), float(second))
+        health.on_message(shaking(), float(second))
     assert health.faults(6.0) == ["GPS: it has fallen silent", "battery: unhealthy"]
 
 
@@ -263,7 +263,7 @@ def test_clipping_is_what_was_added_since(sensor: int) -> None:
         for second in range(4):
             counts = [100, 100, 100]
             counts[sensor] += second * step
-            health.take(shaking(clipped=tuple(counts)), float(second))
+            health.on_message(shaking(clipped=tuple(counts)), float(second))
         return health.faults(3.0)
 
     assert told(10) == []
@@ -302,9 +302,11 @@ def test_an_estimator_that_is_lost_leaves_no_position() -> None:
     for tenth in range(100):
         now = tenth / 10
         boot = 1000 + 100 * tenth
-        telemetry.take(mavlink.MAVLink_local_position_ned_message(boot, 1, 2, 3, 0, 0, 0), now)
-        telemetry.take(mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0), now)
-        telemetry.take(estimator(WELL if tenth < 50 else WELL & ~0x18), now)
+        telemetry.on_message(
+            mavlink.MAVLink_local_position_ned_message(boot, 1, 2, 3, 0, 0, 0), now
+        )
+        telemetry.on_message(mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0), now)
+        telemetry.on_message(estimator(WELL if tenth < 50 else WELL & ~0x18), now)
         assert telemetry.knows_place(now) == (tenth < 60)
 
 
@@ -313,11 +315,11 @@ def test_whatever_is_measured_is_survived(flags: int, one: float, other: float, 
     """Any figures, NaN and infinities among them: texts, and no exception."""
     health = Health()
     for now in (0.0, 2.0):
-        health.take(estimator(flags, along=one, compass=other), now)
-        health.take(ekf(flags, compass=one), now)
-        health.take(shaking(0.0, 0.0, other), now)
-        health.take(status(bits, bits, ~bits & 0xFFFFFFFF), now)
-        health.take(battery(flags & 7, bits), now)
+        health.on_message(estimator(flags, along=one, compass=other), now)
+        health.on_message(ekf(flags, compass=one), now)
+        health.on_message(shaking(0.0, 0.0, other), now)
+        health.on_message(status(bits, bits, ~bits & 0xFFFFFFFF), now)
+        health.on_message(battery(flags & 7, bits), now)
     assert all(isinstance(text, str) and text for text in health.faults(2.0))
 
 
@@ -332,7 +334,7 @@ def test_px4_lists_its_arming_checks_nowhere_but_in_health() -> None:
     ]
     telemetry, heard = Telemetry(), [(PX4().ready(Telemetry()), ArduPilot().ready(Telemetry()))]
     for message in said:
-        telemetry.take(message, 0.0)
+        telemetry.on_message(message, 0.0)
         heard.append((PX4().ready(telemetry), ArduPilot().ready(telemetry)))
     assert [px4 for px4, _ in heard] == [None, None, False, True, False, True]
     assert [ardupilot for _, ardupilot in heard] == [None, None, None, None, False, True]
@@ -341,7 +343,7 @@ def test_px4_lists_its_arming_checks_nowhere_but_in_health() -> None:
 def report(events: EventReader, *names: str) -> None:
     """A whole report of the arming checks."""
     for name in ("commander_arming_check_summary", *names, "commander_health_summary"):
-        events.take(event_number(name), 3, next(SEQUENCE))
+        events.decode(event_number(name), 3, next(SEQUENCE))
 
 
 def test_px4_objects_to_what_hold_would_not_mend() -> None:
@@ -349,7 +351,7 @@ def test_px4_objects_to_what_hold_would_not_mend() -> None:
     telemetry, px4 = Telemetry(), PX4()
     telemetry.altitude = 488.0
     assert px4.objections(telemetry, 0.0) == ["PX4 has not told yet whether its arming checks pass"]
-    telemetry.take(status(GYRO, GYRO, GYRO), 0.0)
+    telemetry.on_message(status(GYRO, GYRO, GYRO), 0.0)
     assert px4.objections(telemetry, 0.0) == ["PX4's arming checks fail"]
     telemetry.custom_mode = 6 << 16
     report(telemetry.events, "check_modes_offboard_signal")
@@ -365,8 +367,8 @@ def test_a_report_of_checks_whose_beginning_got_lost_is_none() -> None:
     """What the checks object to is for take-offs; alone, it is no news of a flight."""
     events = EventReader()
     report(events, "check_mag_missing")
-    assert events.take(event_number("check_modes_offboard_signal"), 3, next(SEQUENCE)) is None
-    events.take(event_number("commander_health_summary"), 3, next(SEQUENCE))
+    assert events.decode(event_number("check_modes_offboard_signal"), 3, next(SEQUENCE)) is None
+    events.decode(event_number("commander_health_summary"), 3, next(SEQUENCE))
     assert events.objections == ("compass: missing",)
 
 
@@ -377,7 +379,7 @@ def test_events_are_told_in_words_or_not_at_all() -> None:
     names = ("commander_kill_sw_engaged", "commander_failsafe_enter_generic", "no_such_thing")
     for number, name in enumerate(names):
         event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 2, [0] * 40)
-        telemetry.take(event, 1.0)
+        telemetry.on_message(event, 1.0)
     assert telemetry.texts.recent(1.0, 5.0) == ["the kill switch was used"]
 
 
@@ -391,7 +393,7 @@ def test_what_the_arming_checks_object_to_is_no_text_of_its_own() -> None:
     )
     for number, name in enumerate(names):
         event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 2, [0] * 40)
-        telemetry.take(event, 1.0)
+        telemetry.on_message(event, 1.0)
     assert telemetry.texts.recent(1.0, 5.0) == []
     assert telemetry.events.objections == ("its present mode needs setpoints",)
 
@@ -409,7 +411,9 @@ def test_too_few_satellites_are_counted(satellites: int, fix: int, said: str) ->
     """A number that is not told is no complaint."""
     health = Health()
     assert health.gps_objection == ""
-    health.take(mavlink.MAVLink_gps_raw_int_message(0, fix, 1, 1, 0, 80, 80, 0, 0, satellites), 0.0)
+    health.on_message(
+        mavlink.MAVLink_gps_raw_int_message(0, fix, 1, 1, 0, 80, 80, 0, 0, satellites), 0.0
+    )
     assert health.gps_objection == said
 
 
@@ -419,13 +423,13 @@ def test_what_px4_acts_for_is_told_before_what_a_mode_lacks() -> None:
     report(telemetry.events, "check_mag_missing")
     gone = ("check_modes_offboard_signal", "check_mag_missing", "check_gf_violation_custom_gf")
     for name in ("commander_arming_check_summary", *gone, "commander_health_summary"):
-        telemetry.events.take(event_number(name), 3, next(SEQUENCE), (), 100.0)
+        telemetry.events.decode(event_number(name), 3, next(SEQUENCE), (), 100.0)
     assert px4.protection_reasons(telemetry, 101.0, 12.0) == ["its own geofence: outside"]
     arguments = [0] * 40
     arguments[5] = 4
     number = event_number("commander_failsafe_enter")
     sequence = next(SEQUENCE)
-    telemetry.take(mavlink.mavlink_map[410](0, 0, number, 0, sequence, 2, arguments), 101.0)
+    telemetry.on_message(mavlink.mavlink_map[410](0, 0, number, 0, sequence, 2, arguments), 101.0)
     assert px4.protection_reasons(telemetry, 101.0, 12.0)[1] == "battery: critical"
     report(telemetry.events, "check_modes_offboard_signal")
     assert not px4.protection_reasons(telemetry, 200.0, 12.0)
@@ -454,9 +458,9 @@ def test_a_connected_vehicle_tells_all_of_it(flight: Flight, family: str) -> Non
 def test_a_gap_in_what_is_heard_counts_as_one_second() -> None:
     """Three gaps of ten seconds are three, the fourth four, the fifth more."""
     health = Health()
-    health.take(gps(3), 0.0)
+    health.on_message(gps(3), 0.0)
     for gap in range(1, 6):
-        health.take(shaking(), 10.0 * gap)
+        health.on_message(shaking(), 10.0 * gap)
         assert bool(health.faults(10.0 * gap)) is (gap == 5)
 
 
@@ -472,7 +476,7 @@ def after(*messages: Any) -> Health:  # noqa: ANN401
     """Health after these messages."""
     health = Health()
     for message in messages:
-        health.take(message, 100.0)
+        health.on_message(message, 100.0)
     return health
 
 

@@ -98,10 +98,10 @@ def test_its_heartbeats_go_out_once_a_second_while_the_loop_is_well(world: World
     seen = {}
     for tenth in range(25):
         world.healthy = not 9 <= tenth <= 14
-        world.link.turn(100.0 + tenth / 10)
+        world.link.step(100.0 + tenth / 10)
         seen[tenth] = world.link.counts.sent
     assert seen == {tenth: 1 + (tenth >= 15) for tenth in range(25)}
-    world.link.turn(102.51)
+    world.link.step(102.51)
     assert [one.get_type() for one in world.sent()] == ["HEARTBEAT"] * 3
 
 
@@ -117,7 +117,7 @@ def test_what_its_heartbeats_say(
 ) -> None:
     """That it is no autopilot, and alive; under its own numbers."""
     world = World(monkeypatch, role=role, own_component=77)
-    world.link.turn(100.0)
+    world.link.step(100.0)
     (beat,) = world.sent()
     assert (beat.get_srcSystem(), beat.get_srcComponent()) == (system, 77)
     assert (beat.type, beat.autopilot) == (kind, mavlink.MAV_AUTOPILOT_INVALID)
@@ -129,14 +129,14 @@ def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
     """And only the one system's one component from then on."""
     world.says(BEAT, 1)
     world.says(BEAT, 2, 5)
-    world.link.turn(100.0)
+    world.link.step(100.0)
     assert world.heard == [("HEARTBEAT", 100.0)] * 2
     with pytest.raises(AssertionError):
         _ = world.link.target
     world.link.adopt((2, 5), HERE, 100.0)
     for system, component in ((1, 1), (2, 1), (1, 5), (2, 5)):
         world.says(LOOK, system, component)
-    world.link.turn(101.0)
+    world.link.step(101.0)
     assert world.heard[2:] == [("ATTITUDE", 101.0)]
     assert (world.link.counts.received, world.link.counts.strangers) == (3, 3)
 
@@ -147,12 +147,12 @@ def test_it_answers_to_the_address_of_its_vehicle(world: World) -> None:
     world.says(BEAT, 1, peer=HERE)
     world.says(BEAT, 2, peer=THERE)
     world.says(BEAT, 3, peer=THERE)
-    world.link.turn(100.0)
+    world.link.step(100.0)
     world.link.send(BEAT)
     world.link.adopt((2, 1), THERE, 100.0)
     world.link.send(BEAT)
     world.says(BEAT, 2, peer=HERE)
-    world.link.turn(100.1)
+    world.link.step(100.1)
     world.link.send(BEAT)
     peers = [peers for _, peers in world.wire.sent]
     assert peers == [(), (HERE, THERE), (HERE, THERE), (THERE,), (THERE,)]
@@ -168,7 +168,7 @@ def test_who_waits_for_an_answer_gets_it(world: World) -> None:
         world.says(LOOK)
         world.says(BEAT)
         world.says(LOOK, 2)
-        world.link.turn(100.0)
+        world.link.step(100.0)
         assert [both.get_nowait().get_type(), one.get_nowait().get_type()] == [
             "ATTITUDE",
             "HEARTBEAT",
@@ -176,7 +176,7 @@ def test_who_waits_for_an_answer_gets_it(world: World) -> None:
         assert both.empty()
         assert one.empty()
     world.says(LOOK)
-    world.link.turn(101.0)
+    world.link.step(101.0)
     assert both.empty()
 
 
@@ -184,13 +184,13 @@ def test_what_a_wire_brings_in_pieces_is_put_together(world: World) -> None:
     """On one without addresses; a datagram's beginning is no other one's."""
     packet = world.says(LOOK, peer=None)
     world.wire.inbox = [(packet[:9], None), (packet[9:], None)]
-    world.link.turn(100.0)
+    world.link.step(100.0)
     assert [kind for kind, _ in world.heard] == ["ATTITUDE"]
     world.wire.inbox = [(packet[:9], HERE), (packet[9:], HERE)]
-    world.link.turn(101.0)
+    world.link.step(101.0)
     assert len(world.heard) == 1
     world.says(LOOK)
-    world.link.turn(102.0)
+    world.link.step(102.0)
     assert len(world.heard) == 2
 
 
@@ -198,13 +198,13 @@ def test_senders_are_put_together_apart(world: World) -> None:
     """The halves of two wires' packets do not mix, and what makes no sense is counted."""
     packet = world.says(LOOK, peer=None)
     world.wire.inbox = [(packet[:9], None), (b"\xfd", HERE), (packet[9:], None)]
-    world.link.turn(100.0)
+    world.link.step(100.0)
     assert len(world.heard) == 1
     assert world.link.counts.damaged == 0
     spoilt = bytearray(packet)
     spoilt[12] ^= 1
     world.wire.inbox = [(bytes(spoilt), HERE), (bytes(spoilt), THERE)]
-    world.link.turn(101.0)
+    world.link.step(101.0)
     assert world.link.counts.damaged >= 2
     assert len(world.heard) == 1
 
@@ -213,7 +213,7 @@ def test_a_crowd_on_one_port_is_forgotten(world: World) -> None:
     """64 senders' addresses are remembered, and all go on to be heard."""
     for system in range(1, 81):
         world.says(BEAT, system, peer=(f"10.0.0.{system}", 1))
-        world.link.turn(100.0 + system)
+        world.link.step(100.0 + system)
     world.wire.sent.clear()
     world.link.send(BEAT)
     ((_, peers),) = world.wire.sent
@@ -232,10 +232,10 @@ def test_everything_is_passed_on_both_ways(monkeypatch: pytest.MonkeyPatch) -> N
     world.wire.inbox.append((b"noise", THERE))
     world.says(BEAT, 3, peer=THERE)
     world.healthy = False
-    world.link.turn(100.0)
+    world.link.step(100.0)
     assert [packet for packet, _ in world.station.sent][:3] == [*said, b"noise"]
     world.station.inbox = [(b"one", None), (b"two", None)]
-    world.link.turn(100.1)
+    world.link.step(100.1)
     assert world.wire.sent == [(b"one", (HERE, THERE)), (b"two", (HERE, THERE))]
     world.link.close()
     assert world.wire.closed
@@ -268,7 +268,7 @@ def test_an_impostor_moves_nothing_while_the_vehicle_speaks(world: World) -> Non
             world.says(BEAT, peer=THERE)
             world.says(LOOK, peer=THERE)
             world.says(LOOK, peer=("10.0.0.2", 777))
-            world.link.turn(101.0 + second)
+            world.link.step(101.0 + second)
         assert answers.empty()
     assert {kind for kind, _ in world.heard} == {"HEARTBEAT"}
     assert (world.link.counts.received, world.link.counts.impostors) == (20, 60)
@@ -298,9 +298,9 @@ def test_a_vehicle_that_starts_anew_elsewhere(
     world.stands = stands
     world.link.adopt((1, 1), HERE, 90.0)
     world.says(LOOK)
-    world.link.turn(100.0)
+    world.link.step(100.0)
     world.says(message, peer=THERE)
-    world.link.turn(100.0 + silent)
+    world.link.step(100.0 + silent)
     world.link.send(BEAT)
     assert world.wire.sent[-1][1] == ((THERE,) if moves else (HERE,))
     assert world.link.counts.impostors == (not moves)
@@ -313,10 +313,10 @@ def test_a_signed_vehicle_is_followed_even_in_flight(keyed: World) -> None:
     keyed.stands = False
     keyed.link.adopt((1, 1), HERE, 100.0)
     keyed.says(BEAT, key=KEY, peer=THERE)
-    keyed.link.turn(104.0)
+    keyed.link.step(104.0)
     assert keyed.link.counts.impostors == 1
     keyed.says(BEAT, key=KEY, peer=THERE)
-    keyed.link.turn(106.0)
+    keyed.link.step(106.0)
     keyed.link.send(BEAT)
     assert keyed.wire.sent[-1][1] == (THERE,)
 
@@ -325,16 +325,16 @@ def test_unsigned_wrongly_signed_and_replayed_packets_are_told(keyed: World) -> 
     """Each is dropped; what is merely damaged is no forgery."""
     keyed.link.adopt((1, 1), HERE, 100.0)
     packet = keyed.says(LOOK, key=KEY)
-    keyed.link.turn(100.0)
+    keyed.link.step(100.0)
     assert (keyed.link.counts.received, keyed.link.reports(100.0)) == (1, [])
     damaged = bytearray(packet)
     damaged[12] ^= 1
     keyed.wire.inbox.append((bytes(damaged), HERE))
-    keyed.link.turn(110.0)
+    keyed.link.step(110.0)
     assert (keyed.link.counts.refused, keyed.link.reports(110.0)) == (0, [])
     for count, sent in enumerate((packet, forged(), forged(bytes(32))), 1):
         keyed.wire.inbox.append((sent, HERE))
-        keyed.link.turn(120.0)
+        keyed.link.step(120.0)
         assert keyed.link.counts.refused == count
     assert keyed.link.counts.received == 1
     said = "link: packets that are unsigned, wrongly signed or replayed are dropped"
@@ -348,9 +348,9 @@ def test_a_forged_time_does_not_lock_the_vehicle_out(keyed: World) -> None:
     sign_with(forger, bytes(32))
     forger.signing.timestamp += 10**9
     keyed.wire.inbox.append((bytes(BEAT.pack(forger)), HERE))
-    keyed.link.turn(100.0)
+    keyed.link.step(100.0)
     keyed.says(LOOK, key=KEY)
-    keyed.link.turn(100.1)
+    keyed.link.step(100.1)
     assert [kind for kind, _ in keyed.heard] == ["ATTITUDE"]
 
 
@@ -364,7 +364,7 @@ def test_the_ground_station_gets_nothing_forged(monkeypatch: pytest.MonkeyPatch)
     world.says(BEAT, 2, peer=("10.0.0.3", 1))
     world.wire.inbox.append((b"noise" + passed[0], ("10.0.0.3", 1)))
     world.wire.inbox.append((passed[1] + passed[0], THERE))
-    world.link.turn(100.1)
+    world.link.step(100.1)
     assert [packet for packet, _ in world.station.sent] == passed
 
 
@@ -375,12 +375,12 @@ def test_a_second_ground_station_commands_nothing(monkeypatch: pytest.MonkeyPatc
     world.link.adopt((1, 1), HERE, 100.0)
     station, attacker = ("127.0.0.1", 1), ("127.0.0.1", 2)
     world.station.inbox = [(b"first", station), (b"attack", attacker)]
-    world.link.turn(101.0)
+    world.link.step(101.0)
     world.stands = False
     world.station.inbox = [(b"attack", attacker)]
-    world.link.turn(200.0)
+    world.link.step(200.0)
     world.says(BEAT)
-    world.link.turn(200.1)
+    world.link.step(200.1)
     assert [packet for packet, _ in world.wire.sent] == [b"first"]
     assert [peers for _, peers in world.station.sent] == [(station,)]
     assert world.link.counts.strangers == 2
@@ -388,7 +388,7 @@ def test_a_second_ground_station_commands_nothing(monkeypatch: pytest.MonkeyPatc
     assert world.link.reports(200.1) == [said]
     world.stands = True
     world.station.inbox = [(b"next", attacker)]
-    world.link.turn(201.0)
+    world.link.step(201.0)
     assert world.wire.sent[-1][0] == b"next"
 
 

@@ -50,7 +50,7 @@ class Orders:
 
     def answer(self, order: PendingCommand, result: int, now: float, system: int = OURS) -> None:
         """Acknowledge it, to `system`."""
-        self.commander.take(acknowledgement(order.number, result, system), now)
+        self.commander.on_ack(acknowledgement(order.number, result, system), now)
 
 
 def test_a_command_with_a_frame_carries_whole_degrees_times_ten_million() -> None:
@@ -74,7 +74,7 @@ def test_an_order_is_repeated_after_a_second() -> None:
     orders = Orders()
     orders.give(ARM, 10.0)
     for now, sent in ((10.99, 1), (11.0, 2), (11.99, 2), (12.5, 3), (13.4, 3), (13.5, 4)):
-        orders.commander.turn(now)
+        orders.commander.step(now)
         assert len(orders.sent) == sent
 
 
@@ -92,7 +92,7 @@ def test_what_an_answer_means(result: int, *, accepted: bool, text: str) -> None
     """In words where there are any, told with how often the order was sent."""
     orders = Orders()
     orders.give(ARM, 0.0)
-    orders.commander.turn(1.0)
+    orders.commander.step(1.0)
     orders.answer(ARM, result, 1.1)
     assert orders.told == [CommandResult(accepted=accepted, text=text, tries=2)]
     assert orders.commander.under_way(ARM.number) is None
@@ -131,15 +131,15 @@ def test_orders_of_different_numbers_go_side_by_side() -> None:
     orders.commander.give(CLIMB, told.append, now=0.0)
     assert orders.commander.under_way(ARM.number) is ARM
     assert orders.commander.under_way(CLIMB.number) is CLIMB
-    orders.commander.turn(1.0)
+    orders.commander.step(1.0)
     assert [one.command for one in orders.sent] == [ARM.number, CLIMB.number, CLIMB.number]
     done[0] = True
-    orders.commander.turn(1.2)
+    orders.commander.step(1.2)
     assert orders.told == [CommandResult(accepted=True, tries=1)]
     assert told == []
     assert orders.commander.under_way(ARM.number) is None
     assert orders.commander.under_way(CLIMB.number) is CLIMB
-    orders.commander.turn(2.0)
+    orders.commander.step(2.0)
     assert len(orders.sent) == 4
     assert orders.sent[3].command == CLIMB.number
 
@@ -166,11 +166,11 @@ def test_what_steers_waits_until_the_vehicle_is_heard() -> None:
     for order in (ARM, CLIMB, ArduPilot.check()):
         orders.give(order)
     for second in range(1, 20):
-        orders.commander.turn(float(second))
+        orders.commander.step(float(second))
     assert {one.command for one in orders.sent} == {mavlink.MAV_CMD_RUN_PREARM_CHECKS}
     assert len(orders.told) == 1, "of the check, which is given up"
     heard[0] = True
-    orders.commander.turn(20.0)
+    orders.commander.step(20.0)
     assert [one.command for one in orders.sent[-2:]] == [ARM.number, CLIMB.number]
     assert len(orders.told) == 1
 
@@ -335,10 +335,10 @@ def test_a_withdrawn_order_is_not_repeated() -> None:
     orders = Orders()
     orders.give(CLIMB)
     orders.commander.withdraw(CLIMB.number)
-    orders.commander.turn(5.0)
+    orders.commander.step(5.0)
     orders.answer(CLIMB, mavlink.MAV_RESULT_ACCEPTED, 5.0)
     assert (len(orders.sent), orders.told) == (1, [])
     orders.give(ARM, 6.0)
     for second in range(7, 20):
-        orders.commander.turn(second * 1.01)
+        orders.commander.step(second * 1.01)
     assert orders.told == [CommandResult(accepted=False, text="no answer", tries=6)]

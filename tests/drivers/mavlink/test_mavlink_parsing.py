@@ -119,9 +119,9 @@ def test_any_message_of_anybody_is_survived(
             message = mav.decode(frame)
         except mavlink.MAVError:
             continue
-        vehicle._take(message, 1.0, None)
+        vehicle._on_message(message, 1.0, None)
         if vehicle._finder.found is not None:
-            vehicle._telemetry.take(message, 1.0)
+            vehicle._telemetry.on_message(message, 1.0)
     assert vehicle._phase.wish is None
 
 
@@ -139,6 +139,6 @@ def test_texts_in_pieces(pieces: list[tuple[str, int, int]]) -> None:
     """Whatever pieces come, memory is bounded and nothing but printable text comes out."""
     texts = Texts()
     for text, number, piece in pieces:
-        texts.take(text, 3, 1.0, number, piece)
+        texts.add_statustext(text, 3, 1.0, number, piece)
     assert len(texts._pieces) <= 16
     assert all(text.isprintable() for text in texts.recent(1.0, 5.0))

@@ -173,12 +173,12 @@ def test_a_yaw_from_north_is_turned_to_the_nose() -> None:
     """A locked gimbal tells it so: looking east (90 degrees) from a nose to the north."""
     gimbal = gimbal_of(*FREE)
     east = [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
-    gimbal.take(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, 0.0)
+    gimbal.on_attitude(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, 0.0)
     assert gimbal.attitude is not None
     assert gimbal.attitude.yaw == pytest.approx(-math.pi / 2)
-    gimbal.take(status(0, east), 0.0, 7, 1.0)
+    gimbal.on_attitude(status(0, east), 0.0, 7, 1.0)
     assert gimbal.attitude.yaw == pytest.approx(-math.pi / 2)
-    gimbal.take(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, math.pi / 2)
+    gimbal.on_attitude(status(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, east), 0.0, 7, math.pi / 2)
     assert gimbal.attitude.yaw == pytest.approx(0.0)
 
 
@@ -192,7 +192,7 @@ def test_no_attitude_is_anything_but_finite(
 ) -> None:
     """Whatever a gimbal tells."""
     gimbal = gimbal_of(*FREE)
-    gimbal.take(status(flags, quaternion, device), 0.0, 7, 0.0)
+    gimbal.on_attitude(status(flags, quaternion, device), 0.0, 7, 0.0)
     seen = gimbal.attitude
     assert seen is None or all(map(math.isfinite, (seen.pitch, seen.yaw, seen.roll)))
 

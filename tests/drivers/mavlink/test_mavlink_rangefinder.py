@@ -38,7 +38,7 @@ def below(*messages: Any, now: float = 10.0, attitude: Attitude = LEVEL) -> floa
     """What is below, by messages at 10 s."""
     sensor = Rangefinder()
     for message in messages:
-        sensor.take(message, 10.0)
+        sensor.on_message(message, 10.0)
     return sensor.below(attitude, now)
 
 
@@ -79,10 +79,10 @@ def test_its_silence_is_told() -> None:
     """Two seconds are none; out of range is no silence; a robot that needs none misses none."""
     sensor = Rangefinder()
     assert "no word from it, which" in sensor.fault(0.0)
-    sensor.take(reading(5000), 10.0)
+    sensor.on_message(reading(5000), 10.0)
     assert sensor.fault(12.0) == ""
     assert "no word from it for 3 s" in sensor.fault(13.0)
-    sensor.take(reading(100, orientation=mavlink.MAV_SENSOR_ROTATION_NONE), 13.0)
+    sensor.on_message(reading(100, orientation=mavlink.MAV_SENSOR_ROTATION_NONE), 13.0)
     assert sensor.fault(13.0), "one that looks ahead is another one"
     assert Telemetry().rangefinder is None
 
@@ -92,7 +92,7 @@ def test_several_rangefinders_stamp_each_their_own() -> None:
     telemetry = Telemetry(measures_ground=True)
     ahead = reading(90, id=0, orientation=mavlink.MAV_SENSOR_ROTATION_NONE)
     for message in (ahead, reading(350, id=1), reading(500, id=1)):
-        telemetry.take(message, 10.0)
+        telemetry.on_message(message, 10.0)
     assert telemetry.rangefinder is not None
     assert telemetry.rangefinder.below(LEVEL, 10.0) == pytest.approx(3.5)
 

@@ -249,10 +249,10 @@ def listener() -> RemoteId:
 def test_three_seconds_are_fresh_and_no_more() -> None:
     """To the dot."""
     told = listener()
-    told.take(arm_status(GOOD), 10.0)
+    told.on_arm_status(arm_status(GOOD), 10.0)
     assert told.objection(13.0) == ""
     assert told.objection(13.001) == "the transmitter has said nothing for 3 s"
-    told.take(arm_status(GOOD), 14.0)
+    told.on_arm_status(arm_status(GOOD), 14.0)
     assert told.objection(14.0) == ""
 
 
@@ -270,7 +270,7 @@ def test_three_seconds_are_fresh_and_no_more() -> None:
 def test_only_zero_is_ready(status: int, error: bytes, said: str) -> None:
     """Whatever else it says; what cannot be printed is not shown."""
     told = listener()
-    told.take(arm_status(status, error), 0.0)
+    told.on_arm_status(arm_status(status, error), 0.0)
     objection = told.objection(0.0)
     assert objection is not None
     assert objection.replace("\ufffd", "").replace("  ", " ") == said
@@ -279,10 +279,10 @@ def test_only_zero_is_ready(status: int, error: bytes, said: str) -> None:
 def test_of_two_transmitters_both_must_be_ready() -> None:
     """The one that is not is told of."""
     told = listener()
-    told.take(arm_status(GOOD, component=236), 0.0)
-    told.take(arm_status(BAD, b"second", component=237), 0.0)
+    told.on_arm_status(arm_status(GOOD, component=236), 0.0)
+    told.on_arm_status(arm_status(BAD, b"second", component=237), 0.0)
     assert told.objection(1.0) == "second"
-    told.take(arm_status(GOOD, component=237), 1.0)
+    told.on_arm_status(arm_status(GOOD, component=237), 1.0)
     assert told.objection(1.0) == ""
 
 

@@ -242,9 +242,9 @@ def test_it_falls_until_it_lies(lying: float, *, falling: bool) -> None:
     flight.stop()
     flight.fly(1.0, rise=-5.0)
     flight.fly(lying)
-    flight.touchdown.turn(flight.now)
+    flight.touchdown.update(flight.now)
     assert flight.touchdown.falling is falling
-    flight.touchdown.turn(flight.now + 1.0)
+    flight.touchdown.update(flight.now + 1.0)
     assert flight.touchdown.falling is falling, "what is a second old says nothing of the present"
     assert flight.touchdown.ended is FlightEnd.FELL
 
@@ -256,7 +256,7 @@ def test_whatever_fell_lies_after_ten_seconds() -> None:
     flight.touchdown.observe(flight.mode, flight.now, armed=True)
     flight.stop()
     for seconds, falling in ((5.0, True), (10.0, True), (10.1, False)):
-        flight.touchdown.turn(flight.now + seconds)
+        flight.touchdown.update(flight.now + seconds)
         assert flight.touchdown.falling is falling
 
 
@@ -269,7 +269,7 @@ def test_an_autopilot_that_starts_anew_in_flight_falls() -> None:
     restarted = flight.now
     flight.fly(9.0)
     for seconds, falling in ((10.0, True), (10.1, False)):
-        flight.touchdown.turn(restarted + seconds)
+        flight.touchdown.update(restarted + seconds)
         assert flight.touchdown.falling is falling
     flight.touchdown.observe(flight.mode, flight.now, armed=True)
     assert (flight.touchdown.ended, flight.touchdown.fault) == (None, "")

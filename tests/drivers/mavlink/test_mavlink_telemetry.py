@@ -55,7 +55,7 @@ def told(*messages: Any, now: float = 10.0) -> Telemetry:  # noqa: ANN401
     """What is known after these messages, all at once."""
     telemetry = Telemetry()
     for message in messages:
-        telemetry.take(message, now)
+        telemetry.on_message(message, now)
     return telemetry
 
 
@@ -96,7 +96,7 @@ def test_a_local_position_stays_in_the_autopilots_frame() -> None:
     for index in range(6):
         spoilt = [9.0] * 6
         spoilt[index] = math.nan
-        telemetry.take(local(1001 + index, *spoilt), 11.0)
+        telemetry.on_message(local(1001 + index, *spoilt), 11.0)
         assert telemetry.position == pytest.approx([1.0, 2.0, -3.0])
         assert telemetry.velocity == pytest.approx([0.1, 0.2, -0.3])
         assert telemetry.position_at == 10.0
@@ -116,8 +116,8 @@ def test_a_place_is_known_for_less_than_a_second(
 ) -> None:
     """Both where it is and how it stands."""
     telemetry = Telemetry()
-    telemetry.take(local(1000), position_at)
-    telemetry.take(attitude(1000), attitude_at)
+    telemetry.on_message(local(1000), position_at)
+    telemetry.on_message(attitude(1000), attitude_at)
     assert telemetry.knows_place(10.0) is known
 
 
@@ -126,11 +126,11 @@ def test_a_global_position_is_in_degrees_and_metres() -> None:
     telemetry = told(globe(1, 473977420, -85455940, 488123))
     assert telemetry.place == pytest.approx((47.397742, -8.545594))
     assert telemetry.altitude == 488.123
-    telemetry.take(globe(2, 0, 85455940, 5000), 10.0)
+    telemetry.on_message(globe(2, 0, 85455940, 5000), 10.0)
     assert telemetry.place == pytest.approx((0.0, 8.545594))
-    telemetry.take(globe(3, 473977420, 0, 6000), 10.0)
+    telemetry.on_message(globe(3, 473977420, 0, 6000), 10.0)
     assert telemetry.place == pytest.approx((47.397742, 0.0))
-    telemetry.take(globe(4, 0, 0, 6000), 10.0)
+    telemetry.on_message(globe(4, 0, 0, 6000), 10.0)
     assert {"place", "altitude"} <= unknown(telemetry)
 
 
@@ -200,10 +200,10 @@ def test_how_long_it_has_said_nothing_new() -> None:
     """Since its latest message, or since the latest whose stamp moved on, if that was before."""
     telemetry = told(local(1000), now=10.0)
     assert telemetry.silence(10.5) == 0.5
-    telemetry.take(local(1000), 11.0)
-    telemetry.take(beat(4), 11.5)
+    telemetry.on_message(local(1000), 11.0)
+    telemetry.on_message(beat(4), 11.5)
     assert telemetry.silence(12.0) == 2.0
-    telemetry.take(attitude(1001), 12.0)
+    telemetry.on_message(attitude(1001), 12.0)
     assert telemetry.silence(12.25) == 0.25
 
 
@@ -211,15 +211,15 @@ def test_of_one_kind_only_what_is_newer_is_taken() -> None:
     """A packet that was overtaken, or comes twice, changes nothing; kinds count apart."""
     telemetry = told(local(2000, 2.0, 0, 0, 0, 0, 0))
     for stamp in (1999, 2000):
-        telemetry.take(local(stamp, 9.0, 0, 0, 0, 0, 0), 10.5)
+        telemetry.on_message(local(stamp, 9.0, 0, 0, 0, 0, 0), 10.5)
         assert telemetry.position is not None
         assert telemetry.position[0] == 2.0
         assert telemetry.position_at == 10.0
-    telemetry.take(attitude(1999, 0.5, 0, 0, 0, 0, 0), 10.5)
+    telemetry.on_message(attitude(1999, 0.5, 0, 0, 0, 0, 0), 10.5)
     assert telemetry.attitude.roll == 0.5
     assert telemetry.boot_time == 2.0
     assert telemetry.ticked_at == 10.0
-    telemetry.take(local(2001, 3.0, 0, 0, 0, 0, 0), 10.6)
+    telemetry.on_message(local(2001, 3.0, 0, 0, 0, 0, 0), 10.6)
     assert telemetry.position is not None
     assert telemetry.position[0] == 3.0
     assert telemetry.ticked_at == 10.6
@@ -246,7 +246,7 @@ def test_of_another_life_of_the_autopilot_nothing_is_left() -> None:
     telemetry = told(beat(4, ARMED, 0x60000), *before)
     assert telemetry.knows_place(10.0)
     health, events = telemetry.health, telemetry.events
-    telemetry.take(local(1000, 5.0, 0, 0, 0, 0, 0), 10.1)
+    telemetry.on_message(local(1000, 5.0, 0, 0, 0, 0, 0), 10.1)
     assert telemetry.reboots == 1
     assert not telemetry.armed
     assert unknown(telemetry) == PLACES
@@ -257,7 +257,7 @@ def test_of_another_life_of_the_autopilot_nothing_is_left() -> None:
     assert telemetry.position is not None
     assert telemetry.position[0] == 5.0, "the first word of its new life counts"
     assert not telemetry.knows_place(10.1)
-    telemetry.take(attitude(1000), 10.2)
+    telemetry.on_message(attitude(1000), 10.2)
     assert telemetry.knows_place(10.2)
     assert telemetry.battery.fraction == 0.87
     assert telemetry.custom_mode == 0x60000
@@ -266,9 +266,9 @@ def test_of_another_life_of_the_autopilot_nothing_is_left() -> None:
 def test_a_start_is_told_once_by_heartbeats() -> None:
     """Of two HEARTBEATs that boot only the first, and only after one that did not."""
     telemetry = told(beat(mavlink.MAV_STATE_ACTIVE))
-    telemetry.take(local(5000), 10.0)
+    telemetry.on_message(local(5000), 10.0)
     for now in (11.0, 12.0):
-        telemetry.take(beat(mavlink.MAV_STATE_BOOT, ARMED), now)
+        telemetry.on_message(beat(mavlink.MAV_STATE_BOOT, ARMED), now)
         assert telemetry.reboots == 1
     assert telemetry.position_at == -math.inf
     assert np.isnan(telemetry.boot_time)

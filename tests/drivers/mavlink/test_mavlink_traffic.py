@@ -64,7 +64,7 @@ def table(**config: Any) -> TrafficTable:  # noqa: ANN401
 
 def take(known: TrafficTable, now: float = 0.0, sea: float | None = SEA, **fields: Any) -> None:  # noqa: ANN401
     """Let it hear a report."""
-    known.take(report(**fields), now, ORIGIN, sea, HERE)
+    known.update(report(**fields), now, ORIGIN, sea, HERE)
 
 
 def heard(now: float = 0.0, sea: float | None = SEA, **fields: Any) -> tuple[Traffic, ...]:  # noqa: ANN401

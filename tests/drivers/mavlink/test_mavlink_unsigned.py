@@ -67,7 +67,7 @@ def test_one_that_obeys_the_unsigned_is_connected() -> None:
     answer = mavlink.MAVLink_command_ack_message(
         mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_RESULT_DENIED, target_system=245
     )
-    connecting.require_answer(commander, "drone", lambda: commander.take(answer, 0.0))
+    connecting.require_answer(commander, "drone", lambda: commander.on_ack(answer, 0.0))
 
 
 def test_the_fleets_state_says_so() -> None:

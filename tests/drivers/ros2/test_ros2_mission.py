@@ -59,7 +59,7 @@ def test_a_mission_to_waypoints_and_home(ros_link: RosLink, topics: str) -> None
             loop = SetpointLoop(vehicle, mission)
             places = []
             while not mission.finished:
-                loop.turn(clock.now(), ())
+                loop.step(clock.now(), ())
                 places.append(drone.motion.position)
                 assert clock.now() < 60e9, mission.status
                 time.sleep(0.05)

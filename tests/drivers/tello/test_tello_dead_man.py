@@ -25,7 +25,7 @@ link.bind(("127.0.0.1", 0))
 guard = DeadMan(link, ("127.0.0.1", int(sys.argv[1])))
 while True:
     link.sendto(b"rc 0 60 0 0", ("127.0.0.1", int(sys.argv[1])))
-    guard.note(moving=True)
+    guard.restart(moving=True)
     time.sleep(0.05)
 """
 
@@ -71,7 +71,7 @@ def test_a_goodbye_is_silent(ear: socket.socket, *, moving: bool) -> None:
     """Whoever closes in order has said his own last word."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         guard = DeadMan(link, ear.getsockname())
-        guard.note(moving=moving)
+        guard.restart(moving=moving)
         guard.close()
     ear.settimeout(0.5)
     with pytest.raises(TimeoutError):

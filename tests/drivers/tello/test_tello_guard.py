@@ -174,7 +174,7 @@ def test_how_a_guard_is_started(started: Process) -> None:
 def test_what_a_guard_is_told(started: Process) -> None:
     """A letter with every `rc`, and a goodbye; then it is waited for."""
     for moving in (True, False, True):
-        started.guard.note(moving=moving)
+        started.guard.restart(moving=moving)
     started.guard.close()
     assert started.words() == b"msmq"
     assert started.words() == b"", "the pipe is closed"
@@ -197,7 +197,7 @@ def test_a_guard_that_hangs_or_has_died_ends_no_flight(
 ) -> None:
     """What cannot be said to it is let be; closing waits for it all the same."""
     trouble(started)
-    started.guard.note(moving=True)
+    started.guard.restart(moving=True)
     started.guard.close()
     assert started.waited == [5.0]
 

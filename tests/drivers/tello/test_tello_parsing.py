@@ -145,8 +145,8 @@ def test_a_battery_that_jumps_is_not_believed_at_once() -> None:
     gauge = BatteryGauge()
     assert math.isnan(gauge.battery.fraction)
     for percent in (80, 80, 80, 0, 80, 79, 100, 0, 79):
-        gauge.take(percent)
+        gauge.add(percent)
         assert 0.79 <= gauge.battery.fraction <= 0.8
     for _ in range(9):
-        gauge.take(10)
+        gauge.add(10)
     assert gauge.battery.fraction == pytest.approx(0.1)

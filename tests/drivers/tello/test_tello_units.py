@@ -188,5 +188,5 @@ def test_the_middle_of_the_newest_nine_figures(percents: list[int], charge: floa
     gauge = BatteryGauge()
     assert math.isnan(gauge.battery.fraction)
     for percent in percents:
-        gauge.take(percent)
+        gauge.add(percent)
     assert gauge.battery.fraction == charge

@@ -83,7 +83,7 @@ class Wire:
 
         def guard(sender: _Socket, peer: tuple[str, int]) -> Any:  # noqa: ANN401
             assert (sender, peer) == (self.commands, TELLO)
-            return SimpleNamespace(note=self._note, close=self._goodbye)
+            return SimpleNamespace(restart=self._note, close=self._goodbye)
 
         quiet = SimpleNamespace(Thread=thread, Lock=threading.Lock, Event=threading.Event)
         clock = SimpleNamespace(monotonic=lambda: self.now)

@@ -257,7 +257,7 @@ class Flown:
         while self.mission.state in {MissionState.IDLE, MissionState.PREFLIGHT}:
             now += NANOSECONDS // 20
             assert now < 10 * NANOSECONDS
-            loop.turn(now)
+            loop.step(now)
 
     @property
     def alerts(self) -> Iterator[str]:
@@ -309,7 +309,7 @@ def test_the_list_is_kept_as_it_was_before_take_off() -> None:
     assert kept is not None
     assert gravest(kept.items) is Verdict.WARNING
     vehicle.told = WELL
-    flown.loop.turn(kept.stamp + 5 * NANOSECONDS)
+    flown.loop.step(kept.stamp + 5 * NANOSECONDS)
     assert flown.loop.health is kept
 
 
@@ -321,7 +321,7 @@ def test_a_mission_that_has_not_begun_goes_through_the_list_each_second() -> Non
     loop = SetpointLoop(vehicle, mission)
     seen = []
     for turn in range(41):
-        loop.turn(turn * NANOSECONDS // 20)
+        loop.step(turn * NANOSECONDS // 20)
         assert loop.health is not None
         seen.append(loop.health.stamp)
     assert sorted(set(seen)) == [0, NANOSECONDS, 2 * NANOSECONDS]

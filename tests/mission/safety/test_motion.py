@@ -75,7 +75,7 @@ class WindyFlight:
         while self.now < end and not self.mission.finished:
             self.now += _PERIOD
             self.vehicle.advance_to(self.now)
-            self.loop.turn(self.now)
+            self.loop.step(self.now)
             truth = self.vehicle.read().truth
             assert truth is not None
             self.places.append(truth.position)

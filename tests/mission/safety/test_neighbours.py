@@ -30,7 +30,7 @@ def _where(*, stamp: int = 0, flying: bool = True) -> Whereabouts:
 def _known(**told: Whereabouts) -> Neighbours:
     known = Neighbours()
     for name, where in told.items():
-        known.hear(name, where)
+        known.update(name, where)
     return known
 
 
@@ -53,7 +53,7 @@ def test_who_is_silent_is_not_believed_to_brake() -> None:
     assert known.newly_silent(_SILENT_NS + 2, ()) == [], "each silence is told once"
     (other,) = known.around("west", _SILENT_NS + 1, 3.0)
     assert other.apart == (3.0, 3.0)
-    known.hear("east", _where(stamp=_SILENT_NS))
+    known.update("east", _where(stamp=_SILENT_NS))
     assert known.newly_silent(_SILENT_NS + 2, ()) == []
     (other,) = known.around("west", _SILENT_NS + 2, 3.0)
     assert other.apart is None
@@ -82,7 +82,7 @@ def test_each_drone_asks_for_itself_at_one_moment() -> None:
     known, now = _known(east=_where()), 2 * _SILENT_NS
     assert [one.apart for one in known.around("west", now, 3.0)] == [(3.0, 3.0)]
     assert [one.apart for one in known.around("north", now, 5.0)] == [(5.0, 5.0)]
-    known.hear("east", _where(stamp=now))
+    known.update("east", _where(stamp=now))
     (other,) = known.around("north", now, 5.0)
     assert other.apart is None
     assert other.position == pytest.approx([5.0, 0.0, 10.0])
@@ -109,7 +109,7 @@ def test_a_place_that_is_none_leaves_the_last(part: Literal["position", "velocit
     where = Whereabouts.of(replace(state, odometry=broken))
     known = _known(east=_where())
     assert where is None
-    known.hear("east", where)
+    known.update("east", where)
     (other,) = known.around("west", 2 * _SILENT_NS, 3.0)
     assert other.apart is not None
     assert known.newly_silent(2 * _SILENT_NS, ()) == ["east"]
@@ -134,7 +134,7 @@ def test_a_drone_whose_companion_dies_is_not_flown_into(lost: float) -> None:
                     drones[me].send(VelocitySetpoint(np.zeros(3)))
                 continue
             odometry = states[me].odometry
-            known.hear(name, Whereabouts(now, odometry.position, odometry.velocity, flying=True))
+            known.update(name, Whereabouts(now, odometry.position, odometry.velocity, flying=True))
             asked = PositionSetpoint(states[1 - me].odometry.position, None, 4.0)
             others = known.around(name, now, limits.separation)
             clamped = guards[me].clamp(asked, odometry, 0.05, others)

@@ -57,7 +57,7 @@ def test_a_battery_at_its_limit_is_beyond_it(
 ) -> None:
     """At 25 % the drone returns, at 12.5 % it lands; a gauge that says nothing is told of."""
     found = supervisor().assess(state(charge), 0)
-    assert (found.demand, found.gravest.kind) == (demand, kind)
+    assert (found.action, found.gravest.kind) == (demand, kind)
     word = {"battery_low": "low", "battery_critical": "critical"}.get(kind)
     assert word is None or found.gravest.text == f"the battery is {word} at {charge:.0%}"
 
@@ -74,14 +74,14 @@ def test_the_way_home_is_kept_in_the_battery() -> None:
         (needed * 1.001, FailsafeAction.NOTHING),
     ):
         found = supervisor(limits).assess(state(charge, at=(40.0, 0.0, 5.0)), 0)
-        assert found.demand is demand
+        assert found.action is demand
     reserve = replace_limits(battery_return=0.1, battery_land=0.1)
     for charge, demand in (
         (needed + 0.1, FailsafeAction.RETURN),
         (needed + 0.1001, FailsafeAction.NOTHING),
     ):
         found = supervisor(reserve).assess(state(charge, at=(40.0, 0.0, 5.0)), 0)
-        assert found.demand is demand
+        assert found.action is demand
 
 
 def replace_limits(**more: float) -> LimitsConfig:
@@ -103,7 +103,7 @@ def test_a_link_that_is_lost_for_its_time_out_sends_the_drone_home(lost: str) ->
         now = began + after
         told = replace(silent, stamp=now) if lost == "mode" else silent
         found = watching.assess(told, now)
-        assert found.demand is demand
+        assert found.action is demand
         assert found.gravest.kind == "link_lost"
     assert found.gravest.text == "no word from the vehicle for 3 s"
 
@@ -113,7 +113,7 @@ def test_a_link_that_is_lost_for_its_time_out_sends_the_drone_home(lost: str) ->
 )
 def test_a_state_is_stale_after_a_second(age: float, demand: FailsafeAction) -> None:
     """One that is a second old still tells where the drone is."""
-    assert supervisor().assess(state(stamp=10 - age), 10 * NANOSECONDS).demand is demand
+    assert supervisor().assess(state(stamp=10 - age), 10 * NANOSECONDS).action is demand
 
 
 def test_a_silence_is_counted_from_its_beginning() -> None:
@@ -138,14 +138,14 @@ def test_a_position_that_is_gone_for_its_time_out_lands_the_drone() -> None:
     ):
         blind = state(at=nowhere, stamp=second, faults=("GPS: no fix",))
         found = watching.assess(blind, round(second * NANOSECONDS))
-        assert found.demand is demand
+        assert found.action is demand
         assert found.gravest.kind == "no_position"
     text = "the vehicle does not know its position; GPS: no fix, for 3 s"
     assert found.gravest.text == text
     found = watching.assess(state(stamp=13.5), round(13.5 * NANOSECONDS))
     assert found is CALM
     blind = state(at=nowhere, stamp=14.0)
-    assert watching.assess(blind, 14 * NANOSECONDS).demand is FailsafeAction.HOLD, "it counts anew"
+    assert watching.assess(blind, 14 * NANOSECONDS).action is FailsafeAction.HOLD, "it counts anew"
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_a_position_that_is_gone_for_its_time_out_lands_the_drone() -> None:
 def test_whoever_else_flies_is_let_fly(mode: VehicleMode, kind: str) -> None:
     """Even where the battery is critical, the position unknown and the drone out of its fence."""
     found = supervisor().assess(state(0.0, at=(80.0, 0.0, 5.0), mode=mode), 0)
-    assert (found.demand, found.gravest.kind) == (FailsafeAction.RELEASE, kind)
+    assert (found.action, found.gravest.kind) == (FailsafeAction.RELEASE, kind)
     assert {one.kind for one in found.findings} == {kind, "battery_critical", "geofence"}
 
 
@@ -163,10 +163,10 @@ def test_the_gravest_of_several_is_done() -> None:
     watching = supervisor()
     watching.assess(state(mode=VehicleMode.LOST), 0)
     both = watching.assess(state(0.1, mode=VehicleMode.LOST), 0)
-    assert both.demand is FailsafeAction.LAND
+    assert both.action is FailsafeAction.LAND
     assert {one.kind for one in both.findings} == {"link_lost", "battery_critical"}
     outside = supervisor().assess(state(at=(51.0, 0.0, 5.0)), 0)
-    assert outside.demand is FailsafeAction.HOLD
+    assert outside.action is FailsafeAction.HOLD
     assert [one.kind for one in outside.findings] == ["geofence"]
     assert "at (51.0, 0.0, 5.0) m" in outside.findings[0].text
 
@@ -174,7 +174,7 @@ def test_the_gravest_of_several_is_done() -> None:
 def test_faults_of_the_vehicle_are_told_and_demand_nothing() -> None:
     """Each by itself, in the vehicle's words."""
     found = supervisor().assess(state(faults=("GPS: 4 satellites", "compass")), 0)
-    assert found.demand is FailsafeAction.NOTHING
+    assert found.action is FailsafeAction.NOTHING
     assert [(one.kind, one.text) for one in found.findings] == [
         ("vehicle", "GPS: 4 satellites"),
         ("vehicle", "compass"),

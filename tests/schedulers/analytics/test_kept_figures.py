@@ -20,7 +20,7 @@ from aerodaas.schedulers.analytics.base import (
     Task,
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate, chance
-from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 from aerodaas.schedulers.analytics.published.dems_a import TOLERANCE, WINDOW, _Estimate
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf, EdgeCloudSjf
 from aerodaas.schedulers.analytics.published.gems import Gems
@@ -34,12 +34,12 @@ from aerodaas.schedulers.lab.workload import Workload
 MS = MILLISECOND
 _IDLE_SHARE = 0.5
 
-Step = tuple[float, Lane, Job]
+Step = tuple[float, JobQueue, Job]
 State = tuple[float, float, tuple[int, ...], tuple[Step, ...]]
 
 
 def plain_plan(
-    lanes: list[Lane], start: float, until: float, price: float, width: int, gap: float
+    lanes: list[JobQueue], start: float, until: float, price: float, width: int, gap: float
 ) -> list[Step]:
     """The beam search as one would write it down; a state is merit, time, places, steps."""
     beam: list[State] = [(0.0, start, (0,) * len(lanes), ())]
@@ -66,7 +66,7 @@ def plain_plan(
     return list(max(ended, key=lambda one: one[0])[3])
 
 
-def step(state: State, lanes: list[Lane], number: int) -> list[State]:
+def step(state: State, lanes: list[JobQueue], number: int) -> list[State]:
     """The state after the next job of a lane, if that can be early enough and gains anything."""
     merit, free, places, steps = state
     lane = lanes[number]
@@ -83,7 +83,7 @@ def step(state: State, lanes: list[Lane], number: int) -> list[State]:
 
 
 @st.composite
-def lanes_to_plan(draw: st.DrawFn) -> list[Lane]:
+def lanes_to_plan(draw: st.DrawFn) -> list[JobQueue]:
     """Up to five lanes of up to four jobs, in order of release."""
     lanes = []
     for number in range(draw(st.integers(0, 5))):
@@ -100,7 +100,7 @@ def lanes_to_plan(draw: st.DrawFn) -> list[Lane]:
             for place, release in enumerate(times)
         ]
         lanes.append(
-            Lane(TimeEstimate(float(mean), draw(st.sampled_from([1.0, 15.0, 60.0]))), jobs)
+            JobQueue(TimeEstimate(float(mean), draw(st.sampled_from([1.0, 15.0, 60.0]))), jobs)
         )
     return lanes
 
@@ -113,7 +113,7 @@ def lanes_to_plan(draw: st.DrawFn) -> list[Lane]:
     st.integers(0, 99),
 )
 def test_a_plan_is_that_of_the_plain_search(
-    lanes: list[Lane], start: int, until: int, width: int, gap: int
+    lanes: list[JobQueue], start: int, until: int, width: int, gap: int
 ) -> None:
     """Job by job, with the same starts, also where deadlines, gaps and horizons are integers."""
     found = plan(lanes, start, until, 0.125, width=width, gap=gap)

@@ -25,7 +25,7 @@ from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates,
 from aerodaas.schedulers.analytics.forecast import Forecast
 from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
-from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.schedulers.lab.network import Network
@@ -75,7 +75,7 @@ def test_periodic_arrivals_are_forecast_after_three_gaps() -> None:
     assert list(forecast.due(450, 10_000)) == []
 
 
-def _best_by_enumeration(lanes: list[Lane], price: float, until: float) -> float:
+def _best_by_enumeration(lanes: list[JobQueue], price: float, until: float) -> float:
     """Best merit over all sequences that respect the lanes' order, by brute force."""
     jobs = [(lane, job) for lane in lanes for job in lane.jobs]
     best = -inf
@@ -106,7 +106,7 @@ def _best_by_enumeration(lanes: list[Lane], price: float, until: float) -> float
 def test_a_wide_beam_finds_the_best_plan(jobs: list[tuple[int, int, int]], price: float) -> None:
     """One job per lane, certain times: as good as the best of all orders."""
     lanes = [
-        Lane(TimeEstimate(length, 1e-6), [Job(number, release, 200.0, gain, 0.0)])
+        JobQueue(TimeEstimate(length, 1e-6), [Job(number, release, 200.0, gain, 0.0)])
         for number, (length, release, gain) in enumerate(jobs)
     ]
     steps = plan(lanes, 0.0, 1000.0, price, width=1000, gap=1000.0)
@@ -124,8 +124,8 @@ def test_a_wide_beam_finds_the_best_plan(jobs: list[tuple[int, int, int]], price
 
 def test_a_plan_waits_for_a_better_job_only_if_the_gap_allows() -> None:
     """A long cheap job now, or a dear one that arrives in 50 and must start at once."""
-    cheap = Lane(TimeEstimate(100, 1e-6), [Job("cheap", 0, 1000, 5, 0)])
-    dear = Lane(TimeEstimate(100, 1e-6), [Job("dear", 50, 150, 100, 0)])
+    cheap = JobQueue(TimeEstimate(100, 1e-6), [Job("cheap", 0, 1000, 5, 0)])
+    dear = JobQueue(TimeEstimate(100, 1e-6), [Job("dear", 50, 150, 100, 0)])
     patient = plan([cheap, dear], 0, 300, 0.01, width=8, gap=60)
     assert [job.what for _, _, job in patient] == ["dear", "cheap"]
     assert patient[0][0] == 50

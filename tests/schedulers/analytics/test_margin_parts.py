@@ -24,7 +24,7 @@ from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates
 from aerodaas.schedulers.analytics.forecast import Forecast
 from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
-from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.testing.scheduler_kit import play
@@ -251,7 +251,7 @@ def test_an_answer_to_a_question_from_before_the_silence_does_not_end_it() -> No
         assert (cloud.silent_since is None) == ends
 
 
-def chosen(*lanes: Lane, start: float = 0.0, until: float = 1000.0) -> list[str]:
+def chosen(*lanes: JobQueue, start: float = 0.0, until: float = 1000.0) -> list[str]:
     """What a plan runs, in order, with a price of 0.01 for each moment."""
     steps = plan(lanes, start, until, 0.01, width=16, gap=50)
     return [job.what for _, _, job in steps]
@@ -263,27 +263,27 @@ def test_a_plan_passes_over_what_would_have_to_be_early(
     runs: bool,  # noqa: FBT001
 ) -> None:
     """A job of 100, give or take 20, is not tried where it must take less than 80."""
-    lane = Lane(TimeEstimate(100, 20), [Job("job", 0, deadline, 100, 0)])
+    lane = JobQueue(TimeEstimate(100, 20), [Job("job", 0, deadline, 100, 0)])
     assert chosen(lane) == (["job"] if runs else [])
 
 
 def test_a_plan_counts_the_chance_from_where_a_job_begins() -> None:
     """Begun at 100 and due at 190, a job of 100 ± 20 has 31 % of 100, less than its loss of 50."""
-    lane = Lane(TimeEstimate(100, 20), [Job("job", 0, 190, 100, 50)])
+    lane = JobQueue(TimeEstimate(100, 20), [Job("job", 0, 190, 100, 50)])
     assert chosen(lane, start=100) == []
     assert chosen(lane, start=50) == ["job"]
 
 
 def test_a_plan_runs_nothing_for_nothing() -> None:
     """A loss of the benefit gains nothing, for certain."""
-    assert chosen(Lane(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 100)])) == []
-    assert chosen(Lane(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 99)])) == ["job"]
+    assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 100)])) == []
+    assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 99)])) == ["job"]
 
 
 def test_a_plan_prefers_a_quick_gain_to_a_long_small_one() -> None:
     """Each must start at once, so one of the two is lost."""
-    quick = Lane(TimeEstimate(10, 1e-6), [Job("quick", 0, 11, 100, 0)])
-    long = Lane(TimeEstimate(200, 1e-6), [Job("long", 0, 201, 5, 0)])
+    quick = JobQueue(TimeEstimate(10, 1e-6), [Job("quick", 0, 11, 100, 0)])
+    long = JobQueue(TimeEstimate(200, 1e-6), [Job("long", 0, 201, 5, 0)])
     assert chosen(quick, long) == ["quick"]
     assert chosen(long, quick) == ["quick"]
 
@@ -291,7 +291,7 @@ def test_a_plan_prefers_a_quick_gain_to_a_long_small_one() -> None:
 def test_a_plan_takes_a_lane_s_jobs_in_their_order_and_passes_over_the_hopeless() -> None:
     """The first of three is past its deadline; the others follow each other."""
     jobs = [Job("past", 0, 50, 100, 0), Job("next", 0, 150, 100, 0), Job("last", 0, 250, 100, 0)]
-    assert chosen(Lane(TimeEstimate(100, 1e-6), jobs)) == ["next", "last"]
+    assert chosen(JobQueue(TimeEstimate(100, 1e-6), jobs)) == ["next", "last"]
 
 
 @pytest.mark.parametrize(("under_way", "wait"), [(1, 0), (2, 100), (4, 300)])

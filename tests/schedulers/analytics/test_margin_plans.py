@@ -15,18 +15,18 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate
 from aerodaas.schedulers.analytics.margin import Margin
-from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
 
 MS = MILLISECOND
 
 
-def one(name: str, time: float, *, release: float = 0, deadline: float, benefit: float) -> Lane:
+def one(name: str, time: float, *, release: float = 0, deadline: float, benefit: float) -> JobQueue:
     """A lane of one job that takes `time` for certain."""
-    return Lane(TimeEstimate(time, 1e-6), [Job(name, release, deadline, benefit, 0)])
+    return JobQueue(TimeEstimate(time, 1e-6), [Job(name, release, deadline, benefit, 0)])
 
 
 def chosen(
-    *lanes: Lane, until: float = 1000, price: float = 0.01, width: int = 8, gap: float = 50
+    *lanes: JobQueue, until: float = 1000, price: float = 0.01, width: int = 8, gap: float = 50
 ) -> list[str]:
     """What a plan from 0 runs, in order."""
     return [job.what for _, _, job in plan(lanes, 0, until, price, width=width, gap=gap)]
@@ -44,7 +44,9 @@ def test_a_plan_may_wait_for_as_long_as_the_gap(gap: float, first: str) -> None:
 def test_a_plan_ends_with_the_job_that_ends_at_its_horizon(until: float, count: int) -> None:
     """Of two jobs of 100, the first reaches 100 and not 101."""
     jobs = [Job(name, 0, 1000, 100, 0) for name in ("first", "second")]
-    assert chosen(Lane(TimeEstimate(100, 1e-6), jobs), until=until) == ["first", "second"][:count]
+    assert (
+        chosen(JobQueue(TimeEstimate(100, 1e-6), jobs), until=until) == ["first", "second"][:count]
+    )
 
 
 def test_a_plan_without_alternatives_keeps_the_one_that_gains_most() -> None:

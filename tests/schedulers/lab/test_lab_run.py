@@ -27,7 +27,7 @@ from aerodaas.schedulers.lab.plots import plot_bars, plot_observations, plot_tim
 from aerodaas.schedulers.lab.run import run_lab
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
-from aerodaas.schedulers.lab.workload import Arrival, Workload
+from aerodaas.schedulers.lab.workload import TaskArrival, Workload
 
 SHORT = Workload.named("2D-A", 10 * NANOSECONDS)
 VARYING = ExecutionTimes("lognormal", 0.15)
@@ -155,7 +155,7 @@ def test_a_workload_on_more_edges_has_as_many_drones_on_each() -> None:
     assert SHORT.on_edges(5).drones == 10
     fleet = Workload.named("80D-A/7").on_edges(3)
     assert (fleet.drones, fleet.edges) == (34, 3)
-    listed = Workload("listed", SHORT.models, arrivals=(Arrival(0, "HV"),))
+    listed = Workload("listed", SHORT.models, arrivals=(TaskArrival(0, "HV"),))
     with pytest.raises(SchedulerError, match="lists its tasks"):
         listed.on_edges(2)
 

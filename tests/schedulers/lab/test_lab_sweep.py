@@ -26,7 +26,7 @@ from aerodaas.schedulers.lab.metrics import compare, holm, permutation_p, seeds_
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sweep import SweepResult
 from aerodaas.schedulers.lab.sweep_plots import plot_sweep
-from aerodaas.schedulers.lab.workload import Arrival
+from aerodaas.schedulers.lab.workload import TaskArrival
 from aerodaas.testing.scheduler_kit import check_scheduler
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "sweeps.md"
@@ -164,7 +164,7 @@ def test_listed_tasks_keep_their_drones() -> None:
     """A recorded workload has its own; the network may change."""
     models = Workload.named("2D-P").models
     listed = Workload(
-        "flown", models, duration=NANOSECONDS, arrivals=(Arrival(0, next(iter(models))),)
+        "flown", models, duration=NANOSECONDS, arrivals=(TaskArrival(0, next(iter(models))),)
     )
     with pytest.raises(SchedulerError, match="lists its tasks"):
         run_sweep(["edf"], {"drones": [2]}, workload=listed, seeds=[0], jobs=1)

@@ -56,7 +56,7 @@ def run(data: bytes) -> None:
     robot = _ENVIRONMENT.robots[0]
     camera = TelloCamera(robot.sensors[0], _ENVIRONMENT)
     for number, packet in enumerate(_packets(data)):
-        camera.take(packet, 1_000_000 * number)
+        camera.on_packet(packet, 1_000_000 * number)
         picture = camera.capture(10**12, None)
         if picture is not None:
             height, width, colours = picture.image.shape

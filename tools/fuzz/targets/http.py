@@ -113,7 +113,7 @@ class _Link:
             self.flight.turn()
         return self._now
 
-    def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
+    def poll(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         del newest
         status, vehicle = self.flight.mission.status, self.drone.read()
         drone = SimpleNamespace(status=status, state=vehicle, health=None)

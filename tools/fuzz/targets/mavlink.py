@@ -154,7 +154,7 @@ class _Rig:
         if not self.quiet:
             self._speak()
         if self.link is not None:
-            self.link.turn(self.now)
+            self.link.step(self.now)
 
     def _speak(self) -> None:
         climb = 0.0

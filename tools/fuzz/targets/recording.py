@@ -22,7 +22,7 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
+from aerodaas.cli.recorded_workload import RecordedWorkload, flown_trace, flown_workload
 from aerodaas.config.model import RecordingConfig, SensorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import AeroDaaSError
@@ -194,7 +194,7 @@ def _replay(path: Path, _folder: Path, _plotted: bool) -> None:  # noqa: FBT001
 
 
 def _lab(path: Path, _folder: Path, _plotted: bool) -> None:  # noqa: FBT001
-    flown = Flown.read(path)
+    flown = RecordedWorkload.read(path)
     workload = flown_workload(flown)
     flown_trace(flown, workload.tasks(0, random.Random(0)))
 

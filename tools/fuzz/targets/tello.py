@@ -95,7 +95,7 @@ class _Rig:
         if not self.quiet and self._turns % 2:
             self.states.append((_state(h=self.height, time=int(self.motors)), *_OWN))
         if self.link is not None:
-            self.link.turn()
+            self.link.step()
 
 
 class _Socket:
@@ -134,7 +134,7 @@ def run(data: bytes) -> None:
         rig.link = started
 
     def guard(*_: object) -> Any:  # noqa: ANN401
-        return SimpleNamespace(note=lambda **_: None, close=lambda: None)
+        return SimpleNamespace(restart=lambda **_: None, close=lambda: None)
 
     clock = clock_of(rig, rig.advance)
     with replaced(

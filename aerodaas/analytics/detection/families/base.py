@@ -64,7 +64,7 @@ class Candidates:
         """Count the candidates."""
         return len(self.scores)
 
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Candidates:
+    def select(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Candidates:
         """The candidates at `index`, in that order."""
         keypoints = None if self.keypoints is None else self.keypoints[index]
         return Candidates(
@@ -129,7 +129,7 @@ def keep_finite(candidates: Candidates) -> Candidates:
         finite &= np.isfinite(candidates.keypoints).all(axis=(1, 2))
     if finite.all():
         return candidates
-    kept = candidates.take(finite)
+    kept = candidates.select(finite)
     invalid = candidates.invalid + int(np.count_nonzero(~finite))
     return Candidates(kept.boxes, kept.scores, kept.classes, kept.keypoints, invalid)
 

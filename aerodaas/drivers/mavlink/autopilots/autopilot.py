@@ -156,7 +156,7 @@ class Autopilot(ABC):
 
     @abstractmethod
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
-        """What its own protection acts for.
+        """Reasons for which the autopilot's own protection acts.
 
         Args:
             telemetry: The vehicle's.

@@ -152,7 +152,7 @@ class PX4(Autopilot):
         return list(found) or ["PX4's arming checks fail"]
 
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
-        """What its checks have newly found in flight, and texts of its events."""
+        """New findings of its checks in flight, and texts of its events."""
         said = telemetry.texts.recent(now, seconds)
         return [*telemetry.events.new_objections(now, seconds), *said]
 
@@ -173,7 +173,7 @@ class PX4(Autopilot):
     def fallback(
         self, settings: MavlinkSettings, ceiling: float, software: str
     ) -> tuple[FallbackParameter, ...]:
-        """What it does when setpoints stop, and without its ground station where that is us.
+        """Parameters for when setpoints stop, or its ground station, which we may be, is silent.
 
         A ground station's vehicle holds first and returns after the 10 s by which PX4 calls the
         ground station lost, so that a moment without a link sends it nowhere; a companion's

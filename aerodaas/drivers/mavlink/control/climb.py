@@ -78,7 +78,7 @@ class Climb:
         """True once the last order is given."""
         return not self._orders
 
-    def turn(self, now: float, up: float, rise: float) -> bool:
+    def update(self, now: float, up: float, rise: float) -> bool:
         """Update with the height `up` in metres and climb rate `rise` in m/s; True when done."""
         self._now = now
         self._settle_doubt(now)

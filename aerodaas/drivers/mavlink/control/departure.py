@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from aerodaas.drivers.mavlink.control.climb import Climb
-from aerodaas.drivers.mavlink.control.withdrawal import Withdrawal
+from aerodaas.drivers.mavlink.control.takeoff_cancellation import TakeoffCancellation
 from aerodaas.drivers.mavlink.microservices.commander import Commander, PendingCommand
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
@@ -52,7 +52,7 @@ class Departure:
         self._top = math.inf
         """Height of the latest take-off, metres up in the autopilot's frame."""
         self._climb: Climb | None = None
-        self._withdrawal: Withdrawal | None = None
+        self._withdrawal: TakeoffCancellation | None = None
 
     @property
     def goal(self) -> float | None:
@@ -108,7 +108,7 @@ class Departure:
         if not self._flies():
             # In the mode of a take-off, a late order to arm would make it fly.
             self._commander.give(self._hold, now=now)
-        self._withdrawal = Withdrawal(
+        self._withdrawal = TakeoffCancellation(
             self._commander, self._disarm, self._land, now, flies=self._flies()
         )
 
@@ -141,12 +141,12 @@ class Departure:
                 self._withdrawal = None
                 phase.rest()
 
-    def turn(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Update the climb; called 20 times a second."""
         position, velocity = self._telemetry.position, self._telemetry.velocity
         if self._climb is None or position is None:
             return
-        if self._climb.turn(now, -float(position[2]), -float(velocity[2])):
+        if self._climb.update(now, -float(position[2]), -float(velocity[2])):
             self._climb = None
 
     def _shows(self, order: PendingCommand) -> bool:

@@ -157,7 +157,7 @@ class MovingTarget:
 
 
 def _excess_aside(vehicle: Vector, velocity: Vector, start: Vector, end: Vector) -> Vector:
-    """What a vehicle that flies aside from the line to `end` is told to fly back, ENU m/s.
+    """Velocity back to the line for a vehicle that flies aside from the line to `end`, ENU m/s.
 
     What draws it to the line is no excess.
     """

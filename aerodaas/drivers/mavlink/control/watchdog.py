@@ -47,7 +47,7 @@ class Watchdog:
         return now - self._fed_at > _GONE
 
     def step(self, now: float, phase: FlightPhase) -> FlightMode | None:
-        """What to ask a vehicle in `phase` for because the loop hangs, each mode once.
+        """Flight mode to request in `phase` because the loop hangs, each mode once.
 
         Called 20 times a second; `now` in monotonic seconds.
         """

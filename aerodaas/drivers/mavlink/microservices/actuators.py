@@ -178,7 +178,7 @@ class MavlinkActuators:
         if self._commander is not None:
             self._next(self._commander)
 
-    def take(self, message: Message) -> None:
+    def on_message(self, message: Message) -> None:
         """Process one of `messages`; in the link's thread."""
         move = self._current
         if move is None or not move.acknowledged or not move.requests:
@@ -189,7 +189,7 @@ class MavlinkActuators:
         elif contradiction is not None and move.requests >= _REQUESTS:
             self._end(move, f"acknowledged, and not done: {contradiction}")
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Ask what is put out; in the link's thread."""
         commander = self._commander
         if commander is None:

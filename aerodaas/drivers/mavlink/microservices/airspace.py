@@ -52,19 +52,19 @@ class Airspace:
         """Begin to tell and to ask, once the vehicle is connected."""
         self._link, self._commander, self._alignment = link, commander, alignment
 
-    def take(self, message: Message, now: float) -> None:
+    def on_message(self, message: Message, now: float) -> None:
         """Process one of `messages`."""
         if message.get_type() == "OPEN_DRONE_ID_ARM_STATUS":
-            self._remote_id.take(message, now)
+            self._remote_id.on_arm_status(message, now)
         elif self._alignment is not None:
             origin, sea_level = self._alignment.origin, self._alignment.sea_level
-            self._traffic.take(message, now, origin, sea_level, self._here)
+            self._traffic.update(message, now, origin, sea_level, self._here)
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Tell the transmitter what is due, and ask for traffic."""
         if self._link is None or self._commander is None:
             return
-        for message in self._remote_id.turn(now, self._place, self._link.target[0]):
+        for message in self._remote_id.due_messages(now, self._place, self._link.target[0]):
             self._link.send(message)
         self._ask(self._commander, now)
 
@@ -97,7 +97,7 @@ class Airspace:
         return self._stood
 
     def traffic(self, here: Vector, now: float) -> tuple[Traffic, ...]:
-        """What flies around `here` (ENU metres) at `now`, the nearest first."""
+        """Traffic around `here` (ENU metres) at `now`, the nearest first."""
         self._here = here if is_finite(here) else self._here
         return self._traffic.around(self._here, now)
 
@@ -107,10 +107,10 @@ class Airspace:
         return {"traffic_ignored": self._traffic.ignored} if self._traffic.heard else {}
 
     def objection(self, now: float) -> str | None:
-        """What its Remote ID objects to; empty if nothing, None if there is none to be asked."""
+        """Objection of its Remote ID; empty if there is none, None without Remote ID."""
         return self._remote_id.objection(now)
 
     def faults(self, now: float) -> list[str]:
-        """The same as a fault of the vehicle."""
+        """Objection of its Remote ID as a fault of the vehicle."""
         said = self.objection(now)
         return [f"Remote ID: {said}"] if said else []

@@ -20,7 +20,7 @@ _WIDEST = 179.0
 
 @dataclass(frozen=True, slots=True)
 class CameraModelTold:
-    """What a camera is."""
+    """Model of a camera, as it tells it."""
 
     name: str
     """Vendor and model; empty where neither is told."""
@@ -32,7 +32,7 @@ class CameraModelTold:
 
 @dataclass(frozen=True, slots=True)
 class CaptureStatus:
-    """What a camera does."""
+    """Activity of a camera: pictures taken, video, free storage."""
 
     taken: int
     """Pictures that it ever took, by its own count."""

@@ -174,7 +174,7 @@ class Commander:
             pending = self._pending.get(number)
             return None if pending is None else pending.order
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_ack(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Process a COMMAND_ACK."""
         if message.target_system not in {0, self._ours}:
             return
@@ -201,7 +201,7 @@ class Commander:
             word = _RESULTS.get(message.result, f"result {message.result}")
             pending.done(CommandResult(accepted=False, text=word, tries=pending.tries))
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Repeat or give up unacknowledged commands; end those that telemetry shows to be done."""
         ended: list[tuple[_Pending, CommandResult]] = []
         with self._lock:

@@ -80,7 +80,7 @@ class _Search:
     """Whether it is asked for as in former days, since it was refused otherwise."""
 
     def command(self) -> PendingCommand:
-        """What asks for it."""
+        """Command that requests the message."""
         now = mavlink.MAV_CMD_REQUEST_MESSAGE, (float(self.message),)
         number, values = _BEFORE[self.message] if self.before else now
         padded = (*values, *[0.0] * (_VALUES - len(values)))
@@ -143,7 +143,7 @@ class PayloadComponent:
 
     @property
     def name(self) -> str:
-        """What people are told of it."""
+        """Name of the component in texts for people."""
         if not self._own:
             return "the autopilot's camera"
         return f"{'camera' if self.number in CAMERAS else 'gimbal'} (component {self.number})"
@@ -166,7 +166,7 @@ class PayloadComponent:
         """Its camera; None without one, or while it says nothing any more."""
         return None if self.gone(now) else self.camera
 
-    def take(self, message: Message, now: float) -> None:
+    def on_message(self, message: Message, now: float) -> None:
         """Process a message of its own, other than an attitude."""
         if self._own:
             if self.gone(now):
@@ -175,14 +175,14 @@ class PayloadComponent:
         kind = message.get_type()
         if kind == "COMMAND_ACK":
             if self._own:
-                self.commander.take(message, now)
+                self.commander.on_ack(message, now)
         elif kind in {"CAMERA_IMAGE_CAPTURED", "CAMERA_FEEDBACK"}:
             if self.camera is not None:
-                self.camera.take(message)
+                self.camera.on_message(message)
         else:
-            self._learn(message, kind, now)
+            self._on_information(message, kind, now)
 
-    def _learn(self, message: Message, kind: str, now: float) -> None:
+    def _on_information(self, message: Message, kind: str, now: float) -> None:
         """Take in what was searched for."""
         if kind == "GIMBAL_MANAGER_INFORMATION":
             self.gimbal = self.gimbal or MavlinkGimbal(message, self.commander)
@@ -220,7 +220,7 @@ class PayloadComponent:
 
     @property
     def status(self) -> CameraStatus | None:
-        """What its camera says that it is and does; None before, and without one."""
+        """Status of its camera; None until it is known, and without a camera."""
         model, card, capture = self._model, self.card, self._capture
         if model is None:
             return None
@@ -249,7 +249,7 @@ class PayloadComponent:
             return bool(self.streams)
         return self._informed if message == _CAMERA else self.gimbal is not None
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Repeat commands, search on, and give up what does not come."""
         if self._own:
             if self.gone(now):
@@ -257,9 +257,9 @@ class PayloadComponent:
                     self.camera.give_up("the camera says nothing any more")
                     self.camera.recorder.give_up()
                 return
-            self.commander.turn(now)
+            self.commander.step(now)
         if self.camera is not None:
-            self.camera.turn(now)
+            self.camera.step(now)
         for search in self._searches:
             if (
                 not self._knows(search.message, now)

@@ -69,18 +69,18 @@ class EventReader:
 
     @property
     def objections_to_hold(self) -> tuple[str, ...]:
-        """The same without those of its present mode's own requirements: hold has none of them."""
+        """Objections without those of the present mode's own requirements, which hold lacks."""
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
     def new_objections(self, now: float, seconds: float) -> list[str]:
-        """Those of the last `seconds`, in flight as well: they are what its failsafes act for.
+        """Objections of the last `seconds`, also in flight: its failsafes act for them.
 
         What a mode lacks is among them only where there is nothing else.
         """
         new = [text for text in self.objections if now - self._since[text] <= seconds]
         return [text for text in new if text not in _OF_THE_MODE] or new
 
-    def take(
+    def decode(
         self,
         number: int,
         log_levels: int,

@@ -14,7 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FallbackParameter
-from aerodaas.drivers.mavlink.microservices.journal import Changes, Journal, ParameterChange
+from aerodaas.drivers.mavlink.microservices.parameter_backup import (
+    Changes,
+    ParameterBackup,
+    ParameterChange,
+)
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
 from aerodaas.drivers.mavlink.microservices.way_home import other_way_home, upload_way_home
@@ -61,7 +65,7 @@ class Fallback:
         settings: MavlinkSettings,
         *,
         name: str,
-        journal: Journal,
+        journal: ParameterBackup,
     ) -> None:
         """Of robot `name`; nothing is read or changed yet."""
         self._link = link
@@ -115,7 +119,7 @@ class Fallback:
             )
 
     def examine(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> list[str]:
-        """What keeps it from coming home, one sentence each; nothing is changed."""
+        """Faults that keep the vehicle from coming home, one sentence each; nothing is changed."""
         wanted = self._autopilot.fallback(self._settings, ceiling, software)
         obstacles = [unable] if (unable := self._unable()) else []
         obstacles += [one.text for one in self._judge(wanted)]
@@ -169,7 +173,7 @@ class Fallback:
         return f'{name} cannot fly this settings.way_home by itself; take "return"'
 
     def _unsettable(self, ceiling: float, software: str) -> list[str]:
-        """What keeps it from coming home even in a flight that sets all that can be set."""
+        """Faults that remain even after all parameters that can be set are set."""
         if unable := self._unable():
             return [unable]
         judged = self._judge(self._autopilot.fallback(self._settings, ceiling, software))

@@ -121,7 +121,7 @@ class FtpPacket:
 
 
 class Turn(NamedTuple):
-    """What a script wants next."""
+    """Packets that a script sends next, and how long it waits for the answer."""
 
     packets: tuple[FtpPacket, ...]
     """To be sent now."""
@@ -213,7 +213,7 @@ class FtpClient:
         raise refusal
 
     def farewell(self) -> FtpPacket:
-        """What ends the session; there is no need to wait for its answer."""
+        """Packet that ends the session; its answer need not be awaited."""
         return self._request(mavlink.MAV_FTP_OPCODE_TERMINATESESSION)
 
     def _open(self, path: str, size: int) -> FtpScript[None]:
@@ -254,7 +254,7 @@ class FtpClient:
         bursts, grew = not waiting, False
         until = self.now + _TIMEOUT
         while (waiting or bursts) and not pieces.whole:
-            packet = yield from self._turn(until, *requests)
+            packet = yield from self._exchange(until, *requests)
             requests = ()
             if packet is None:
                 break
@@ -265,7 +265,7 @@ class FtpClient:
                     self._require_open(path, None, packet)
                     return grew, True
             elif packet.request in {_READ, _BURST} and packet.session == self._session:
-                if pieces.take(packet.offset, packet.content):
+                if pieces.add(packet.offset, packet.content):
                     grew, until = True, self.now + _TIMEOUT
                 waiting.discard(packet.sequence)
                 bursts = bursts and not (packet.request == _BURST and packet.complete)
@@ -292,18 +292,18 @@ class FtpClient:
         request = replace(request, content=content)
         for _ in range(_TRIES):
             until = self.now + _TIMEOUT + reckoning
-            packet = yield from self._turn(until, request)
+            packet = yield from self._exchange(until, request)
             while packet is not None:
                 if packet.sequence == _answer(request) and packet.request == opcode:
                     return packet
-                packet = yield from self._turn(until)
+                packet = yield from self._exchange(until)
         raise VehicleError("the autopilot does not answer when asked for its files")
 
     def _rest(self, until: float) -> FtpScript[None]:
-        while (yield from self._turn(until)) is not None:
+        while (yield from self._exchange(until)) is not None:
             pass
 
-    def _turn(self, until: float, *packets: FtpPacket) -> FtpScript[FtpPacket | None]:
+    def _exchange(self, until: float, *packets: FtpPacket) -> FtpScript[FtpPacket | None]:
         packet, self.now = yield Turn(packets, until)
         return packet
 
@@ -327,7 +327,7 @@ class _Pieces:
     def whole(self) -> bool:
         return self.at >= self.size
 
-    def take(self, offset: int, content: bytes) -> bool:
+    def add(self, offset: int, content: bytes) -> bool:
         """Take a piece; whether it has anything new."""
         content = content[: max(0, self.size - offset)]
         known = len(self._ahead.get(offset, b""))

@@ -123,7 +123,7 @@ class MavlinkGimbal:
         # Somebody else may have taken it since.
         self._ours = self._ours and outcome.accepted
 
-    def take(self, message: Message, now: float, stamp: int, heading: float) -> None:
+    def on_attitude(self, message: Message, now: float, stamp: int, heading: float) -> None:
         """Process a GIMBAL_DEVICE_ATTITUDE_STATUS, heard at mission clock `stamp`.
 
         `heading` is the vehicle's, radians clockwise from north. What is no attitude, or another

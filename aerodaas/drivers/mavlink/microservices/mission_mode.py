@@ -143,7 +143,7 @@ class MavlinkMissionMode:
         self._lock = lock
         self._forget()
 
-    def leave(self) -> None:
+    def clear(self) -> None:
         """Forget the plan."""
         with self._lock:
             self._forget()
@@ -222,23 +222,23 @@ class MavlinkMissionMode:
         if self._phase is _P.STARTING:
             self._fail(text)
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Take one of `messages`."""
         kind = message.get_type()
         if kind in Upload.messages:
             if self._upload is not None:
-                self._upload.take(message, now)
+                self._upload.on_message(message, now)
                 self._mind_upload(now)
         elif self._phase is _P.UPLOADING:
             self._selected(message)
         elif self._phase is _P.FLYING:
             self._follow(message.seq, reached=kind == "MISSION_ITEM_REACHED")
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Do what is due; called 20 times a second."""
         if self._phase is _P.UPLOADING:
             if self._upload is not None:
-                self._upload.turn(now)
+                self._upload.step(now)
                 self._mind_upload(now)
             elif now >= self._deadline:
                 self._select(now)

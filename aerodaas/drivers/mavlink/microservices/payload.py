@@ -143,7 +143,7 @@ class Payload:
             pause()
 
     def outcomes(self) -> list[PhotoOutcome]:
-        """What became of pictures of all cameras; the caller locks."""
+        """Outcomes of pictures of all cameras; the caller locks."""
         cameras = [one.camera for one in self._ranked() if one.camera is not None]
         return [outcome for camera in cameras for outcome in camera.outcomes()]
 
@@ -178,7 +178,7 @@ class Payload:
             ]
 
     def cameras(self) -> list[CameraStatus]:
-        """What its cameras say that they are and do, the preferred one first."""
+        """Status of each camera, the preferred one first."""
         with self._lock:
             told = (one.status for one in self._ranked())
             return [status for status in told if status is not None]
@@ -196,10 +196,10 @@ class Payload:
     def _moment(self) -> tuple[int, Odometry | None, GimbalAttitude | None]:
         return self.clock.now(), self._odometry, self._attitude()
 
-    def take(self, message: Message, now: float) -> None:
+    def on_message(self, message: Message, now: float) -> None:
         """Process one of the autopilot's `messages`; in the link's thread."""
         if self._autopilot is not None:
-            self._hear(self._autopilot, message, now)
+            self._on_component_message(self._autopilot, message, now)
 
     def take_component(self, message: Message, now: float) -> None:
         """Process what a component with an id of its own says; in the link's thread."""
@@ -212,10 +212,12 @@ class Payload:
                     return
                 commander = self._autopilot.commander.to(number)
                 self._own[number] = self._component(commander, own=True)
-            self._hear(self._own[number], message, now)
+            self._on_component_message(self._own[number], message, now)
 
-    def _hear(self, component: PayloadComponent, message: Message, now: float) -> None:
-        component.take(message, now)
+    def _on_component_message(
+        self, component: PayloadComponent, message: Message, now: float
+    ) -> None:
+        component.on_message(message, now)
         if message.get_type() != "GIMBAL_DEVICE_ATTITUDE_STATUS":
             return
         yaw = math.nan if self._odometry is None else self._odometry.yaw
@@ -223,12 +225,12 @@ class Payload:
         for one in self._ranked():
             # A device speaks for itself, or whoever manages it speaks for it.
             if one.gimbal is not None and component.number in {one.number, one.gimbal.device}:
-                one.gimbal.take(message, now, self.clock.now(), heading)
+                one.gimbal.on_attitude(message, now, self.clock.now(), heading)
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Search on, and see to the gimbals' attitudes; in the link's thread."""
         for one in self._ranked():
-            one.turn(now)
+            one.step(now)
             one.see_to_attitude(now, self._commander_of)
 
     def _commander_of(self, device: int) -> Commander | None:

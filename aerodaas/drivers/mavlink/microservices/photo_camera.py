@@ -112,15 +112,15 @@ class MavlinkCamera:
         return bool(self._outcomes)
 
     def outcomes(self) -> list[PhotoOutcome]:
-        """What became of pictures since the last call."""
+        """Outcomes of pictures since the last call."""
         found = list(self._outcomes)
         self._outcomes.clear()
         return found
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Give up a picture that is not told."""
         self._now = now
-        self.recorder.turn(now)
+        self.recorder.step(now)
         if self._request is not None and now >= self._request.deadline:
             self._fail(self._request, "the camera does not tell of the picture")
 
@@ -154,7 +154,7 @@ class MavlinkCamera:
         self._request = None
         self._outcomes.append(PhotoFailure(request.number, reason))
 
-    def take(self, message: Message) -> None:
+    def on_message(self, message: Message) -> None:
         """Process a CAMERA_IMAGE_CAPTURED or a CAMERA_FEEDBACK."""
         told = message.get_type() == "CAMERA_IMAGE_CAPTURED"
         index = int(message.image_index if told else message.img_idx)

@@ -102,9 +102,9 @@ class Upload:
         self._tries = self._transfers = 0
         self._whole = False
         """Whether the last item was sent since something was repeated."""
-        self.turn(now)
+        self.step(now)
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Answer a message of the vehicle."""
         if self.done or self.failure or message.mission_type != self._kind:
             return
@@ -123,7 +123,7 @@ class Upload:
             self._whole |= message.seq == len(items) - 1
             self._say(now)
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Repeat what was said last, if its answer is overdue."""
         if self.done or self.failure or now < self.due:
             return
@@ -158,8 +158,8 @@ def upload(
         one = Upload(link.send, link.target, items, kind, progress=progress, now=began)
         while not (one.done or one.failure):
             if message := _next(inbox, kind, one.due - time.monotonic()):
-                one.take(message, time.monotonic())
-            one.turn(time.monotonic())
+                one.on_message(message, time.monotonic())
+            one.step(time.monotonic())
     if one.failure:
         raise VehicleError(one.failure)
 

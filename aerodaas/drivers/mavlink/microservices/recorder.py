@@ -52,7 +52,7 @@ class MavlinkRecorder:
         """Whether its status has yet to agree with what it has acknowledged."""
         return self._acknowledged is not None and not self._confirmed
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Let time pass."""
         self._now = now
 

@@ -62,13 +62,13 @@ class RemoteId:
         self._due = -math.inf
         self._next = 0
 
-    def take(self, message: Message, now: float) -> None:
+    def on_arm_status(self, message: Message, now: float) -> None:
         """Process an OPEN_DRONE_ID_ARM_STATUS."""
         error = _printable(message.error)
         self._told[message.get_srcComponent()] = now, int(message.status), error
 
     def objection(self, now: float) -> str | None:
-        """What keeps it from being ready at `now`; empty if nothing does, None if nobody asks."""
+        """Reason for which Remote ID is not ready at `now`; empty if it is, None without it."""
         if not self._told:
             return None if self._config is None else "no transmitter is heard"
         for heard_at, status, error in self._told.values():
@@ -78,7 +78,7 @@ class RemoteId:
                 return error or "the transmitter is not ready, and does not say why"
         return ""
 
-    def turn(
+    def due_messages(
         self, now: float, place: Callable[[], OperatorPlace | None], target: int
     ) -> list[Message]:
         """The messages that are due at `now`, for the vehicle `target`.
@@ -126,7 +126,7 @@ class RemoteId:
         return whole, update
 
     def _static(self, config: RemoteIdConfig, target: int) -> list[Message]:
-        """What does not change: who operates what for which purpose, as far as it is configured."""
+        """Messages that do not change: operator, aircraft and purpose, where configured."""
         made: list[Any] = []
         if config.uas_id is not None and not self._observes:
             number = list(config.uas_id.encode().ljust(_NUMBER, b"\0"))

@@ -20,7 +20,7 @@ _TROUBLES = {
 
 @dataclass(frozen=True)
 class CardState:
-    """What a camera said of its card."""
+    """State of a camera's memory card, as the camera tells it."""
 
     free: float | None
     """MiB; None where it is not told."""

@@ -26,7 +26,9 @@ class Texts:
         self._texts: deque[_Text] = deque(maxlen=_KEPT)
         self._pieces: dict[int, dict[int, str]] = {}
 
-    def take(self, text: str, severity: int, now: float, number: int = 0, piece: int = 0) -> None:
+    def add_statustext(
+        self, text: str, severity: int, now: float, number: int = 0, piece: int = 0
+    ) -> None:
         """Add one STATUSTEXT; one in pieces has a `number` other than zero."""
         whole = 50
         if number == 0:

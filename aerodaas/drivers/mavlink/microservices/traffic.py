@@ -47,7 +47,7 @@ class _Report:
 
 
 class TrafficTable:
-    """What flies around one vehicle; seconds are monotonic."""
+    """Table of the aircraft around one vehicle; seconds are monotonic."""
 
     def __init__(self, config: TrafficConfig) -> None:
         """Know of nothing yet."""
@@ -59,7 +59,7 @@ class TrafficTable:
         self.ignored = 0
         """Reports that were not believed: invalid, stale, contradictory, or beyond the number."""
 
-    def take(
+    def update(
         self,
         message: Message,
         now: float,
@@ -125,7 +125,7 @@ class TrafficTable:
 def _report(
     message: Message, now: float, origin: GeodeticOrigin, sea_level: float | None
 ) -> _Report | None:
-    """What a message says; None for one that says nothing of use."""
+    """Report in a message; None for one without a usable place."""
     flags = message.flags
     places = flags & mavlink.ADSB_FLAGS_VALID_COORDS
     nowhere = message.lat == 0 and message.lon == 0

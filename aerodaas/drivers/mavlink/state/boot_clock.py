@@ -85,7 +85,7 @@ class BootClock:
         self._pending = (int(now * NANOSECONDS) // _SYSTEMS - 1) * _SYSTEMS + system
         return mavlink.MAVLink_timesync_message(0, self._pending)
 
-    def take(self, message: Any) -> None:  # noqa: ANN401
+    def on_timesync(self, message: Any) -> None:  # noqa: ANN401
         """Take a TIMESYNC of the autopilot; its own requests are none of our answers."""
         now = self._clock()
         if message.tc1 > 0 and (message.ts1 - self._system) % _SYSTEMS == 0:
@@ -115,7 +115,7 @@ class BootClock:
         return self._clock() - self._unanswered_since
 
     def reading(self, at: float) -> tuple[float, float] | None:
-        """What it reads at the second `at` of ours, and by how much that may be wrong, in seconds.
+        """Reading of the vehicle's clock at our second `at`, and its error bound, both in seconds.
 
         None before the first exchange.
         """

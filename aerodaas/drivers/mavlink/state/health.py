@@ -121,7 +121,7 @@ class Health:
             "SYS_STATUS": self._sensors,
         }
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Process a message of any kind."""
         if self._heard_at is not None:
             self._gps_silence += min(now - self._heard_at, _GAP)
@@ -161,7 +161,7 @@ class Health:
         """Whether the estimator and the GPS have no complaint about where it is."""
         return not any(name in self._complaints for name in ("fix", "unsure", "lost", "glitch"))
 
-    def _note(self, name: str, text: str, now: float) -> None:
+    def _set_fault(self, name: str, text: str, now: float) -> None:
         """Set the fault `name`, or clear it without a text."""
         if not text:
             self._complaints.pop(name, None)
@@ -180,16 +180,20 @@ class Health:
         # A vehicle that never had a fix flies without GPS, or reports the reason itself.
         lost = message.fix_type < _FIX and math.isfinite(self._fixed_at)
         kind = "a fix in the plane only" if message.fix_type == _FIX - 1 else "no fix"
-        self._note("fix", f"GPS: {kind}" if lost else "", now)
+        self._set_fault("fix", f"GPS: {kind}" if lost else "", now)
 
     def _estimator(self, message: Any, now: float) -> None:  # noqa: ANN401
         # PX4 sets the bit of a constant position when all is well, and clears it when it is lost.
         flags = message.flags & ~mavlink.ESTIMATOR_CONST_POS_MODE
         self._flags(flags, now, glitch=mavlink.ESTIMATOR_GPS_GLITCH)
         unsure = _step(message.pos_horiz_accuracy, _UNSURE)
-        self._note("unsure", unsure and f"estimator: position unsure by more than {unsure} m", now)
+        self._set_fault(
+            "unsure", unsure and f"estimator: position unsure by more than {unsure} m", now
+        )
         unsure = _step(message.pos_vert_accuracy, _UNSURE)
-        self._note("height", unsure and f"estimator: height unsure by more than {unsure} m", now)
+        self._set_fault(
+            "height", unsure and f"estimator: height unsure by more than {unsure} m", now
+        )
         self._fit({"compass": message.mag_ratio}, 1.0, now)
         places = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio)
         self.compass, self.estimator = _largest(message.mag_ratio), _largest(*places)
@@ -211,16 +215,16 @@ class Health:
     def _flags(self, flags: int, now: float, *, glitch: int) -> None:
         """Process the bits that both kinds of status have in common."""
         lost = not flags & _HORIZONTAL or flags & mavlink.ESTIMATOR_CONST_POS_MODE
-        self._note("lost", "estimator: no position along the ground" if lost else "", now)
+        self._set_fault("lost", "estimator: no position along the ground" if lost else "", now)
         jumps = "estimator: GPS positions jump, and are not believed"
-        self._note("glitch", jumps if flags & glitch else "", now)
+        self._set_fault("glitch", jumps if flags & glitch else "", now)
         level = flags & mavlink.ESTIMATOR_ATTITUDE
-        self._note("attitude", "" if level else "estimator: attitude unknown", now)
+        self._set_fault("attitude", "" if level else "estimator: attitude unknown", now)
 
     def _fit(self, misfits: dict[str, float], limit: float, now: float) -> None:
         for name, value in misfits.items():
             text = f"estimator: what is measured of its {name} does not fit"
-            self._note(f"misfit {name}", text if value > limit else "", now)
+            self._set_fault(f"misfit {name}", text if value > limit else "", now)
 
     def _age(self, message: Any, _: float) -> None:  # noqa: ANN401
         if message.id == 0 and message.cycle_count != _UNKNOWN:
@@ -233,18 +237,18 @@ class Health:
             self.cells = _cells([*message.voltages, *message.voltages_ext])
         said = [_CHARGES[message.charge_state]] if message.charge_state in _CHARGES else []
         said += [text for bit, text in _BATTERY_FAULTS.items() if message.fault_bitmask & bit]
-        self._note(name, f"{name}: {', '.join(said)}" if said else "", now)
+        self._set_fault(name, f"{name}: {', '.join(said)}" if said else "", now)
 
     def _vibration(self, message: Any, now: float) -> None:  # noqa: ANN401
         shakes = _step(max(message.vibration_x, message.vibration_y, message.vibration_z), _SHAKES)
         self.vibration = _largest(message.vibration_x, message.vibration_y, message.vibration_z)
         text = shakes and f"vibration: more than {shakes} m/s²"
-        self._note("vibration", text, now)
+        self._set_fault("vibration", text, now)
         clipped = message.clipping_0 + message.clipping_1 + message.clipping_2
         more = 0 if self._clipped is None else clipped - self._clipped
         self._clipped = clipped
         clips = "vibration: beyond what the accelerometers measure"
-        self._note("clipping", clips if more > _CLIPS else "", now)
+        self._set_fault("clipping", clips if more > _CLIPS else "", now)
 
     def _sensors(self, message: Any, now: float) -> None:  # noqa: ANN401
         bad = (
@@ -255,7 +259,7 @@ class Health:
         if self._charges_told:
             bad &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
         for bit, name in _SENSORS.items():
-            self._note(f"sensor {name}", f"{name}: unhealthy" if bad & bit else "", now)
+            self._set_fault(f"sensor {name}", f"{name}: unhealthy" if bad & bit else "", now)
 
 
 def _largest(*values: float) -> float | None:

@@ -29,7 +29,7 @@ class Rangefinder:
         self._heard_at = self._read_at = -math.inf
         self._metres = math.nan
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Update by a DISTANCE_SENSOR; those that look elsewhere are not heeded."""
         if message.orientation != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
             return
@@ -50,7 +50,7 @@ class Rangefinder:
         return self._metres * upright
 
     def fault(self, now: float) -> str:
-        """What is wrong with it, for the operator; empty if nothing is."""
+        """Fault of the rangefinder for the operator; empty if there is none."""
         silence = now - self._heard_at
         if silence <= _SILENT:
             return ""

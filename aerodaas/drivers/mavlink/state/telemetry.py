@@ -119,7 +119,7 @@ class Telemetry:
             "HOME_POSITION": self._home,
             "FENCE_STATUS": self._fence,
             "SYSTEM_TIME": self._time,
-            "TIMESYNC": lambda message, _: self.boot_clock.take(message),
+            "TIMESYNC": lambda message, _: self.boot_clock.on_timesync(message),
             "AUTOPILOT_VERSION": self._version,
             "MISSION_CURRENT": self._mission,
             "MISSION_ITEM_REACHED": self._reached,
@@ -128,7 +128,7 @@ class Telemetry:
             "DISTANCE_SENSOR": self._distance,
         }
 
-    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Update by a message of the vehicle."""
         if now - self.heard_at > _GAP:
             self.back_at = now
@@ -137,7 +137,7 @@ class Telemetry:
         self.seen[kind] = now
         if not self._fresh(kind, message, now):
             return
-        self.health.take(message, now)
+        self.health.on_message(message, now)
         taker = self._takers.get(kind)
         if taker is not None:
             taker(message, now)
@@ -300,7 +300,7 @@ class Telemetry:
 
     def _distance(self, message: Any, now: float) -> None:  # noqa: ANN401
         if self.rangefinder is not None:
-            self.rangefinder.take(message, now)
+            self.rangefinder.on_message(message, now)
 
     def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
         version = message.flight_sw_version
@@ -316,10 +316,12 @@ class Telemetry:
         self.mission_reached = float(message.seq)
 
     def _text(self, message: Any, now: float) -> None:  # noqa: ANN401
-        self.texts.take(message.text, message.severity, now, message.id, message.chunk_seq)
+        self.texts.add_statustext(
+            message.text, message.severity, now, message.id, message.chunk_seq
+        )
 
     def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
-        said = self.events.take(
+        said = self.events.decode(
             message.event, message.log_levels, message.sequence, message.arguments, now
         )
         if said is not None:

@@ -120,7 +120,7 @@ class Touchdown:
         where = f", {height:.0f} m above where they started" if math.isfinite(height) else ""
         self.fault = f"motors: stopped in flight{where}"
 
-    def turn(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Check whether it has come to rest."""
         lies = now - self._moved_at < _FRESH and now - self._still_since > 2 * _STILL
         if (lies and not self._blind) or now - self._stopped_at > _FALLEN:

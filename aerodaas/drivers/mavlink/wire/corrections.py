@@ -110,7 +110,7 @@ class Corrections:
         self.passed += 1
 
     def reports(self, now: float) -> list[str]:
-        """What the operator must know at `now`, one sentence each."""
+        """Reports for the operator at `now`, one sentence each."""
         said = []
         if now - self._heard_at > _STALE:
             said.append(f"corrections: none from {self._url}")

@@ -51,7 +51,7 @@ class Finder:
         self._others: dict[tuple[int, int], str] = {}
         self.found: FoundVehicle | None = None
 
-    def take(self, message: Any, peer: Peer = None) -> None:  # noqa: ANN401 - pymavlink has no types
+    def on_heartbeat(self, message: Any, peer: Peer = None) -> None:  # noqa: ANN401 - pymavlink has no types
         """Process a HEARTBEAT of any sender, from the address `peer`."""
         system, component = message.get_srcSystem(), message.get_srcComponent()
         objection, family = self._judge(message, system)

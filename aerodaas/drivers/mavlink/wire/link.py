@@ -217,7 +217,7 @@ class MavlinkLink:
         self.pins.adopt(target, peer, now)
 
     def reports(self, now: float) -> list[str]:
-        """What the operator must know about strangers on the link, one sentence each."""
+        """Reports for the operator about unknown senders on the link, one sentence each."""
         said = self.pins.pin.reports(now)
         if self._forwarder is not None:
             said += self._forwarder.pin.reports(now)
@@ -274,11 +274,11 @@ class MavlinkLink:
     def _run(self) -> None:
         while not self._closing.is_set():
             self._wait(max(0.0, min(_TICK, self._turn_due - time.monotonic())))
-            self.turn(time.monotonic())
+            self.step(time.monotonic())
 
-    def turn(self, now: float) -> None:
+    def step(self, now: float) -> None:
         """Process received packets, and do the work due at `now`; called by the link's thread."""
-        self._hear(now)
+        self._receive(now)
         if self._forwarder is not None:
             strangers = self._forwarder.strangers
             for packet in self._forwarder.receive(now):
@@ -300,11 +300,11 @@ class MavlinkLink:
         with contextlib.suppress(OSError, ValueError):
             select.select([wire for wire in wires if wire >= 0], [], [], duration)
 
-    def _hear(self, now: float) -> None:
+    def _receive(self, now: float) -> None:
         for content, peer in self._wire.receive():
             framer = self._framer(peer)
             for message in framer.feed(content):
-                self._take(message, peer, now)
+                self._route(message, peer, now)
             if peer is not None:
                 framer.flush()
             if self._forwarder is not None and all(
@@ -327,11 +327,11 @@ class MavlinkLink:
         with self._lock:
             return decoded(self._mav, frame)
 
-    def _take(self, message: Message, peer: Peer, now: float) -> None:
+    def _route(self, message: Message, peer: Peer, now: float) -> None:
         sender: Sender = (message.get_srcSystem(), message.get_srcComponent())
         target = self.pins.target
         if sender != target:
-            self.pins.meet(sender, peer)
+            self.pins.remember(sender, peer)
         if target is not None:
             if self.pins.carries(sender, peer):
                 self._on_component(message, now)

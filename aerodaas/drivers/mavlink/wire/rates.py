@@ -35,7 +35,7 @@ class RateKeeper:
         self._reboots = 0
         self._waiting = False
 
-    def turn(self, telemetry: Telemetry, now: float) -> None:
+    def step(self, telemetry: Telemetry, now: float) -> None:
         """Request the next missing message; called by the link's thread."""
         if telemetry.reboots != self._reboots:
             self._reboots = telemetry.reboots

@@ -40,7 +40,7 @@ class SenderPins:
         self.pin.set(peer, now)
         self.target = target
 
-    def meet(self, sender: Sender, peer: Peer) -> None:
+    def remember(self, sender: Sender, peer: Peer) -> None:
         """Remember a sender other than the adopted vehicle."""
         if len(self._others) < _MOST:
             self._others.setdefault(sender, peer)

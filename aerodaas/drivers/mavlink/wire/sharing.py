@@ -114,7 +114,7 @@ class WireShare:
     def close(self) -> None:
         """Give the share back; the last one closes the wire."""
         with _lock:
-            self._owner.leave(self)
+            self._owner.remove(self)
         with self._lock:
             self._bell.close()
             self._rope.close()
@@ -146,7 +146,7 @@ class _SharedWire:
         self._use((*self.shares, share))
         return share
 
-    def leave(self, share: WireShare) -> None:
+    def remove(self, share: WireShare) -> None:
         """Serve `share` no more; close the wire if it was the last."""
         self._use(tuple(one for one in self.shares if one is not share))
         if self.shares or self._closing:

@@ -69,7 +69,7 @@ class _Clocked(mavlink.MAVLinkSigning):  # type: ignore[misc]
 
     @property
     def timestamp(self) -> int:
-        """What the next packet is signed with: never one that was signed or heard before."""
+        """Timestamp of the next signed packet: never one that was signed or received before."""
         return max(self._newest, int((time.time() - _EPOCH) * _TICKS))
 
     @timestamp.setter

@@ -193,7 +193,7 @@ def outcomes_figure(flight: RecordedFlight) -> Figure:
         [
             Patch(facecolor=colour, edgecolor="white", hatch=hatch, label=words(name))
             for name in met
-            for colour, hatch in [_look(name)]
+            for colour, hatch in [_line_style(name)]
         ],
         columns=4,
     )
@@ -204,7 +204,7 @@ def _bar(axes: Axes, row: int, counts: dict[str, int]) -> None:
     left, whole = 0, sum(counts.values())
     for name in sorted(counts, key=lambda one: list(_LOOKS).index(one) if one in _LOOKS else 99):
         count = counts[name]
-        colour, hatch = _look(name)
+        colour, hatch = _line_style(name)
         axes.barh(row, count, left=left, color=colour, hatch=hatch, edgecolor="white", height=0.75)
         if count >= _LEAST_SHARE * whole:
             box = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
@@ -212,6 +212,6 @@ def _bar(axes: Axes, row: int, counts: dict[str, int]) -> None:
         left += count
 
 
-def _look(name: str) -> tuple[str, str]:
+def _line_style(name: str) -> tuple[str, str]:
     colour, hatch = _LOOKS.get(name, ("grey", "++"))
     return OKABE_ITO[colour], hatch

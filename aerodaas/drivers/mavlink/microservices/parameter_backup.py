@@ -11,7 +11,7 @@ from aerodaas.config.user_folders import state_folder
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.errors import VehicleError
 
-__all__ = ["Changes", "Journal", "ParameterChange"]
+__all__ = ["Changes", "ParameterBackup", "ParameterChange"]
 
 
 class ParameterChange(NamedTuple):
@@ -22,7 +22,7 @@ class ParameterChange(NamedTuple):
 
 
 class Changes(BaseModel):
-    """What was changed on one vehicle."""
+    """Changes of parameters and mission on one vehicle."""
 
     # What an item leaves open is not a number, which JSON has no word for.
     model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
@@ -33,7 +33,7 @@ class Changes(BaseModel):
     """The mission that it held before; None: it was left alone."""
 
 
-class Journal:
+class ParameterBackup:
     """The journal of one vehicle, a file that only its owner can read."""
 
     def __init__(self, vehicle: str) -> None:
@@ -41,7 +41,7 @@ class Journal:
         self.path = state_folder() / "vehicles" / f"{vehicle}.json"
 
     def read(self) -> Changes | None:
-        """What is still to be put back; None if nothing. Raises VehicleError."""
+        """Changes that are still to be restored; None if there are none. Raises VehicleError."""
         try:
             content = self.path.read_text(encoding="utf-8")
         except FileNotFoundError:

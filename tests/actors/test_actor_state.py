@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from aerodaas.actors.base import ActorInfo
-from aerodaas.actors.run import flight, member
+from aerodaas.actors.run import actor_state, flight
+from aerodaas.actors.run.actor_state import require_clock
 from aerodaas.actors.run.flight import Flight
-from aerodaas.actors.run.member import require_clock
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import MissionError
 
@@ -27,7 +27,7 @@ def test_a_clock_is_read_between_call_and_answer(
     monkeypatch: pytest.MonkeyPatch, clock: float, said: str | None
 ) -> None:
     """Called at 100 s and answered at 105 s by our clock, with a second's tolerance."""
-    monkeypatch.setattr(member, "host_time_ns", lambda: 105 * NANOSECONDS)
+    monkeypatch.setattr(actor_state, "host_time_ns", lambda: 105 * NANOSECONDS)
     if said is None:
         require_clock("drone", _info(clock), 100 * NANOSECONDS)
     else:
@@ -49,7 +49,7 @@ def test_calls_that_take_long_are_no_fault_of_a_clock(monkeypatch: pytest.Monkey
         remote = SimpleNamespace(remote=lambda: call(name))
         return SimpleNamespace(name=name, setup=(), handle=SimpleNamespace(prepare=remote))
 
-    for module in (member, flight):
+    for module in (actor_state, flight):
         monkeypatch.setattr(module, "host_time_ns", lambda: round(now[0] * NANOSECONDS))
     monkeypatch.setattr("ray.wait", lambda waiting, timeout: (waiting[:1], timeout))
     monkeypatch.setattr(flight, "ask", infos.get)

@@ -17,7 +17,7 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.schema import MessageError
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.messages import NavigationRecord
-from aerodaas.recording.pictures import Shot, camera_of, detections, shots
+from aerodaas.recording.pictures import RecordedImage, camera_of, detections, shots
 from aerodaas.recording.playback.page_items import (
     packed_depth,
     packed_picture,
@@ -26,7 +26,7 @@ from aerodaas.recording.playback.page_items import (
 )
 from aerodaas.recording.reader import Recording
 
-__all__ = ["NAVIGATION_SCHEMA", "Captures", "Film", "Packed"]
+__all__ = ["NAVIGATION_SCHEMA", "Captures", "FrameIndex", "Packed"]
 
 NAVIGATION_SCHEMA = "aerodaas.Navigation"
 Packed = tuple[dict[str, Any], bytes]
@@ -68,16 +68,16 @@ class Captures:
 
 
 @dataclass
-class _Reel:
+class _TopicReader:
     """A topic's pictures, being read from some place on."""
 
-    shots: Iterator[Shot]
+    shots: Iterator[RecordedImage]
     place: int
     """Place of the picture that was read last."""
-    shot: Shot | None = None
+    shot: RecordedImage | None = None
 
 
-class Film:
+class FrameIndex:
     """Pictures of a recording by time; for one thread at a time."""
 
     def __init__(
@@ -104,7 +104,7 @@ class Film:
         self._navigation = navigation
         self._mounts = mounts
         self._schemas = {name: one.schema for name, one in recording.topics.items()}
-        self._reels: dict[str, _Reel] = {}
+        self._reels: dict[str, _TopicReader] = {}
 
     def at(self, stream: str, time: int, *, depth: bool = False) -> list[Packed]:
         """The picture of a stream that was the last one captured at or before a time.
@@ -130,13 +130,13 @@ class Film:
                 return [*known, *measured, packed]
         return []
 
-    def _shot(self, topic: str, captures: Captures, place: int) -> Shot | None:
+    def _shot(self, topic: str, captures: Captures, place: int) -> RecordedImage | None:
         reel = self._reels.get(topic)
         if reel is not None and reel.place == place:
             return reel.shot
         if reel is None or not self._comes(captures, reel.place, place):
             since = self._start(topic, captures, place)
-            reel = self._reels[topic] = _Reel(shots(self._recording, [topic], since), place)
+            reel = self._reels[topic] = _TopicReader(shots(self._recording, [topic], since), place)
         captured, recorded = captures.captured[place], captures.recorded[place]
         for shot in reel.shots:
             if shot.record.captured == captured and shot.record.stamp == recorded:
@@ -175,7 +175,7 @@ class Film:
                 return first if key is None else key
             look *= 4
 
-    def _detections(self, camera: str, shot: Shot) -> Iterator[Packed]:
+    def _detections(self, camera: str, shot: RecordedImage) -> Iterator[Packed]:
         header = shot.header
         for stream, (topic, captures) in self._found.items():
             times = {captures.recorded[place] for place in captures.at(header.stamp)}
@@ -216,7 +216,7 @@ def _message(stream: str, stamp: int, captured: int) -> dict[str, Any]:
     return {"kind": "item", "stream": stream, "stamp": stamp, "captured": captured}
 
 
-def _packed(stream: str, shot: Shot) -> Packed | None:
+def _packed(stream: str, shot: RecordedImage) -> Packed | None:
     """A picture as a live view sends it; None for one that is broken."""
     message = _message(stream, shot.record.stamp, shot.record.captured)
     data = _jpeg(shot)
@@ -232,11 +232,11 @@ def _packed(stream: str, shot: Shot) -> Packed | None:
     return {**message, "item": _picture(shot, data), "blob": True}, data
 
 
-def _picture(shot: Shot, data: bytes) -> dict[str, Any]:
+def _picture(shot: RecordedImage, data: bytes) -> dict[str, Any]:
     return packed_picture(shot.header, len(data), "jpeg", measured=shot.measured is not None)
 
 
-def _measured(stream: str, shot: Shot) -> Iterator[Packed]:
+def _measured(stream: str, shot: RecordedImage) -> Iterator[Packed]:
     """The depth of a picture, if there is any that is whole."""
     depth = shot.depth()
     if depth is not None:
@@ -245,7 +245,7 @@ def _measured(stream: str, shot: Shot) -> Iterator[Packed]:
         yield {**message, "item": item, "blob": True}, data
 
 
-def _jpeg(shot: Shot) -> bytes | None:
+def _jpeg(shot: RecordedImage) -> bytes | None:
     """The recorded bytes of a picture that a browser can show as they are."""
     if shot.video is not None or shot.format not in {"jpeg", "jpg"}:
         return None

@@ -15,7 +15,7 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 
-__all__ = ["Withdrawal"]
+__all__ = ["TakeoffCancellation"]
 
 _CALM = 2
 """HEARTBEATs in a row with standing motors after which it is over."""
@@ -23,7 +23,7 @@ _SETTLED = 1.5
 """Seconds after the last order or start of motors before which it is not."""
 
 
-class Withdrawal:
+class TakeoffCancellation:
     """Stops the motors of a vehicle that may be starting them, or lands it if it flies already.
 
     Its methods are called in the link's thread or under the driver's lock.

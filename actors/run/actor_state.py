@@ -15,7 +15,7 @@ from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.errors import AeroDaaSError, MissionError, SilentError
 from aerodaas.runtime.reports import ActorReport
 
-__all__ = ["Member", "ask", "require_clock", "routes"]
+__all__ = ["ActorState", "ask", "require_clock", "routes"]
 
 _ANSWER_TIMEOUT = 5.0
 _CLOCKS_APART = 1.0
@@ -23,7 +23,7 @@ _CLOCKS_APART = 1.0
 
 
 @dataclass
-class Member:
+class ActorState:
     """State of one actor of the run."""
 
     name: str
@@ -65,7 +65,7 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
         raise SilentError(f"an actor did not answer within {timeout:.0f} s") from None
 
 
-def routes(member: Member, members: Iterable[Member]) -> dict[str, list[Any]]:
+def routes(member: ActorState, members: Iterable[ActorState]) -> dict[str, list[Any]]:
     """Readers of each stream of `member` on other nodes, or without shared memory."""
     here = member.info
     assert here is not None  # noqa: S101 - prepared

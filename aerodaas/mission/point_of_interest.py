@@ -14,7 +14,7 @@ from aerodaas.geometry.frames import Vector, wrap_angle
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import Gimbal, GimbalAttitude, GimbalTarget
 
-__all__ = ["AIMED", "Gaze", "direction_to", "fresh", "near"]
+__all__ = ["AIMED", "PointOfInterest", "direction_to", "fresh", "near"]
 
 AIMED = 0.05
 """Radians of pitch and yaw within which a gimbal looks where it is to: some three degrees, less
@@ -68,8 +68,8 @@ def near(attitude: GimbalAttitude, aim: GimbalTarget) -> bool:
     return max(pitch, abs(wrap_angle(attitude.yaw - aim.yaw))) <= AIMED
 
 
-class Gaze:
-    """What one drone looks at."""
+class PointOfInterest:
+    """Place that one drone's gimbal, or its nose, looks at."""
 
     def __init__(self) -> None:
         """Look at nothing in particular."""
@@ -91,7 +91,7 @@ class Gaze:
         self._bearing = self._told = self._clipped = None
         self._by_nose = False
 
-    def turn(self, gimbal: Gimbal | None, odometry: Odometry, now: int, yaw: float | None) -> None:
+    def aim(self, gimbal: Gimbal | None, odometry: Odometry, now: int, yaw: float | None) -> None:
         """Aim `gimbal` and the nose from where the drone is, at `now` (ns).
 
         `yaw` is a heading that is asked for otherwise, which the nose keeps. Raises what the gimbal
@@ -115,14 +115,14 @@ class Gaze:
         target = GimbalTarget(pitch, aside)
         if not math.isfinite(aside):
             return
-        clipped = self._tell(gimbal, target, now)
+        clipped = self._command_gimbal(gimbal, target, now)
         turned = abs(wrap_angle(clipped.yaw - aside)) > AIMED
         self._by_nose = self._by_nose or (turned and now == self._told_at)
         aim = GimbalTarget(clipped.pitch, clipped.yaw if self.heading is None else aside)
         attitude = fresh(gimbal.attitude, now)
         self.there = attitude is not None and near(attitude, aim)
 
-    def _tell(self, gimbal: Gimbal, target: GimbalTarget, now: int) -> GimbalTarget:
+    def _command_gimbal(self, gimbal: Gimbal, target: GimbalTarget, now: int) -> GimbalTarget:
         """Tell the gimbal where that is due; returns the target within its range."""
         told, clipped = self._told, self._clipped
         if told is not None and clipped is not None:

@@ -25,9 +25,9 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.lab.simulator import Trace
-from aerodaas.schedulers.lab.workload import Arrival, Workload
+from aerodaas.schedulers.lab.workload import TaskArrival, Workload
 
-__all__ = ["Flown", "FlownTask", "flown_trace", "flown_workload"]
+__all__ = ["FlownTask", "RecordedWorkload", "flown_trace", "flown_workload"]
 
 _ENDS = {"drop": TaskOutcome.DROPPED} | {outcome.value: outcome for outcome in TaskOutcome}
 _ANSWERED = (TaskOutcome.DONE, TaskOutcome.LATE)
@@ -59,7 +59,7 @@ class FlownTask:
         answered = self.outcome in _ANSWERED and self.began is not None
         return self.ended - (self.began or 0) if answered else None
 
-    def note(self, decision: Decision) -> None:
+    def apply(self, decision: Decision) -> None:
         """Update by a recorded decision or outcome."""
         action, reason = decision.action, decision.reason
         if action in {"edge", "cloud"}:
@@ -75,7 +75,7 @@ class FlownTask:
 
 
 @dataclass(frozen=True)
-class Flown:
+class RecordedWorkload:
     """Tasks of a recording, with the decisions of its analytics scheduler."""
 
     name: str
@@ -86,7 +86,7 @@ class Flown:
     resources: Resources
 
     @classmethod
-    def read(cls, path: str | Path) -> Flown:
+    def read(cls, path: str | Path) -> RecordedWorkload:
         """Read a recording.
 
         Raises RecordingError for one without decisions or without its environment.
@@ -123,7 +123,7 @@ def _tasks(decisions: Iterable[Decision]) -> list[FlownTask]:
                 int(figures.get("number", 0)),
                 round(figures.get("reserve_ms", 0.0) * MILLISECOND),
             )
-        task.note(decision)
+        task.apply(decision)
     return sorted(found.values(), key=lambda task: (task.arrival, task.number))
 
 
@@ -135,7 +135,7 @@ def _cloud_slots(environment: EnvironmentConfig, simulated_time: bool) -> int:  
     return sum(one.executors for one in clouds if simulated_time or not one.simulated)
 
 
-def flown_workload(flown: Flown) -> Workload:
+def flown_workload(flown: RecordedWorkload) -> Workload:
     """Make a workload of the tasks that a flight's analytics scheduler decided on.
 
     Each task arrives when it did. Its time where it ran is the one observed. Where it did not
@@ -151,7 +151,7 @@ def flown_workload(flown: Flown) -> Workload:
     )
 
 
-def flown_trace(flown: Flown, tasks: list[Task]) -> Trace:
+def flown_trace(flown: RecordedWorkload, tasks: list[Task]) -> Trace:
     """Trace of a flight, in the lab's format.
 
     `tasks` are those of `flown_workload`. So the same code evaluates flight and lab.
@@ -170,7 +170,7 @@ def flown_trace(flown: Flown, tasks: list[Task]) -> Trace:
 class _Observed:
     """Execution times in one place: those of each model, and their change in the flight."""
 
-    def __init__(self, flown: Flown, place: TaskPlace) -> None:
+    def __init__(self, flown: RecordedWorkload, place: TaskPlace) -> None:
         seen = [
             (one.began, one.model, one.took)
             for one in flown.tasks
@@ -197,13 +197,13 @@ class _Observed:
         return max(1, self._typical[task.model] + self._beyond[nearest])
 
 
-def _arrivals(flown: Flown) -> Iterator[Arrival]:
+def _arrivals(flown: RecordedWorkload) -> Iterator[TaskArrival]:
     observed = {place: _Observed(flown, place) for place in (TaskPlace.EDGE, TaskPlace.CLOUD)}
     for task in flown.tasks:
         times = {place: one.estimate(task) for place, one in observed.items()}
         if task.took is not None:
             times[task.place] = task.took
-        yield Arrival(
+        yield TaskArrival(
             task.arrival,
             task.model,
             task.source,

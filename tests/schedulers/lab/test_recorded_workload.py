@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from aerodaas import Environment
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.flown_workload import Flown, flown_trace, flown_workload
 from aerodaas.cli.lab import app
+from aerodaas.cli.recorded_workload import RecordedWorkload, flown_trace, flown_workload
 from aerodaas.config.model import TaskConfig
 from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
@@ -59,7 +59,7 @@ def test_a_recorded_flight_becomes_a_workload(flyer: Flyer) -> None:
     run = flyer.fly(_watch_with_two, _CONTENT, speed=1.0)
     assert run.recording is not None
     values = run.reports()["dispatcher"].values
-    flown = Flown.read(run.recording)
+    flown = RecordedWorkload.read(run.recording)
     workload = flown_workload(flown)
     assert flown.resources.cloud_slots == 5
     # Those of the last second may be undecided when the flight ends.
@@ -104,7 +104,7 @@ def test_a_flight_without_decisions_is_refused(flyer: Flyer) -> None:
     run = flyer.fly(lambda env: env.get_robot_by_id("drone").navigate(hop((2, 0))), FLAT)
     assert run.recording is not None
     with pytest.raises(RecordingError, match="no decisions of an analytics scheduler; fly with"):
-        Flown.read(run.recording)
+        RecordedWorkload.read(run.recording)
     outcome = CliRunner().invoke(app, ["run", "--from", str(run.recording)])
     assert outcome.exit_code == RecordingError.exit_code
     assert "no decisions" in outcome.output
@@ -113,4 +113,4 @@ def test_a_flight_without_decisions_is_refused(flyer: Flyer) -> None:
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     """As everywhere."""
     with pytest.raises(RecordingError, match="cannot open the recording"):
-        Flown.read(tmp_path / "nothing.mcap")
+        RecordedWorkload.read(tmp_path / "nothing.mcap")

@@ -23,7 +23,7 @@ from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
 from aerodaas.ros.incoming import battery_of, euler_of, fix_of, odometry_of, stamp_of
 
-__all__ = ["BagTopics", "Beginning", "Taken", "use_of"]
+__all__ = ["BagPreview", "BagTopics", "Taken", "use_of"]
 
 _TYPES = {
     "camera": (typestore.COMPRESSED_IMAGE, typestore.IMAGE),
@@ -104,7 +104,7 @@ class BagTopics:
 
 
 def use_of(schema: str) -> str:
-    """What a topic of this type can be taken for: an option of `aerodaas import`; or empty."""
+    """Option of `aerodaas import` that fits topics of this type; empty if none does."""
     return next((use for use, types in _TYPES.items() if schema in types), "")
 
 
@@ -201,8 +201,8 @@ def _mount(translation: NDArray[np.float64], rotation: NDArray[np.float64]) -> d
     }
 
 
-class Beginning:
-    """What the first seconds of a bag tell of all of it."""
+class BagPreview:
+    """Preview of a bag from its first seconds."""
 
     def __init__(self, bag: RosBag, topics: BagTopics) -> None:
         """Read the beginning of `bag`; raises RecordingError for odometry that is not in ENU."""
@@ -237,7 +237,7 @@ class Beginning:
                 break
             # What is no place, size or fix tells nothing here; the import counts it.
             with suppress(ValueError):
-                self._look(message, types[message.topic])
+                self._inspect(message, types[message.topic])
         stamps = [one for topic in wanted for one in self._stamps[topic]]
         self.epoch_ns = min(stamps, default=0)
         """Time of the earliest message taken, nanoseconds since 1970."""
@@ -297,7 +297,7 @@ class Beginning:
         topics = found or list(self.topics.camera.values())
         return topics[0] if len(topics) == 1 else None
 
-    def _look(self, message: BagMessage, kind: str) -> None:
+    def _inspect(self, message: BagMessage, kind: str) -> None:
         value, topic = message.value, message.topic
         if kind == typestore.TRANSFORMS:
             for transform in value.transforms:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from aerodaas.cameras.live import LiveSource
 from aerodaas.config.secrets import SecretUrl
 
-__all__ = ["TOLD", "ToldSource"]
+__all__ = ["TOLD", "VehicleAddressedSource"]
 
 _log = logging.getLogger(__name__)
 
@@ -20,7 +20,7 @@ _PROTOCOLS = "rtsp,rtp,srtp,tls,udp,tcp"
 """Protocols that FFmpeg may use for such an address, whatever the stream refers it to: no files."""
 
 
-class ToldSource:
+class VehicleAddressedSource:
     """A live source whose address comes later; the first one counts, and there is no other."""
 
     finished = False

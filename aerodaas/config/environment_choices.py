@@ -10,7 +10,7 @@ from typing import Any
 
 from aerodaas.errors import ConfigError, UnknownIdError
 
-__all__ = ["VEHICLES", "Beginning", "camera_words", "default_address"]
+__all__ = ["VEHICLES", "EnvironmentChoices", "camera_words", "default_address"]
 
 VEHICLES = ("simulated", "px4", "ardupilot", "tello")
 
@@ -42,8 +42,8 @@ def camera_words(vehicle: str) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Beginning:
-    """What the file shall hold."""
+class EnvironmentChoices:
+    """Choices from which an environment file is written."""
 
     vehicle: str
     """One of `VEHICLES`."""
