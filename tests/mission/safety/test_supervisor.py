@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from grounds import clearance
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.messages.odometry import Battery, Odometry
-from aerodaas.messages.vehicle import VehicleMode, VehicleState
+from aerodaas.messages.vehicle import VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.mission.actions import Fly
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import CALM, Supervisor
@@ -75,6 +77,8 @@ def test_the_way_home_is_kept_in_the_battery() -> None:
     ):
         found = supervisor(limits).assess(state(charge, at=(40.0, 0.0, 5.0)), 0)
         assert found.action is demand
+        text = f"the way home needs {needed:.0%} of the battery's {charge:.0%}"
+        assert found.gravest.text == (text if demand is FailsafeAction.RETURN else "")
     reserve = replace_limits(battery_return=0.1, battery_land=0.1)
     for charge, demand in (
         (needed + 0.1, FailsafeAction.RETURN),
@@ -87,6 +91,30 @@ def test_the_way_home_is_kept_in_the_battery() -> None:
 def replace_limits(**more: float) -> LimitsConfig:
     """The limits of these tests with others instead."""
     return LIMITS.model_copy(update=more)
+
+
+def test_a_vehicle_is_lost_for_good_at_its_time_out() -> None:
+    """To the nanosecond, and not before."""
+    watching = supervisor()
+    watching.assess(state(mode=VehicleMode.LOST), 0)
+    timeout = round(LIMITS.return_timeout * NANOSECONDS)
+    assert watching.lost_for_good(timeout - 1) == ""
+    assert "lost" in watching.lost_for_good(timeout)
+
+
+def test_a_drone_that_stands_on_a_hill_is_landed() -> None:
+    """Its height is counted from the ground below it, and not from where it took off."""
+    for hill, demand in ((8.0, FailsafeAction.LAND), (0.0, FailsafeAction.NOTHING)):
+        meter = EnergyMeter(EnergyModel(LIMITS.endurance, np.zeros(3)))
+        above = clearance(lambda east, _, hill=hill: np.where(east > 10.0, hill, 0.0), LIMITS, 0.1)
+        watching = Supervisor(LIMITS, np.zeros(3), Geofence(FENCE), meter, above)
+        setpoint = VelocitySetpoint(np.array([2.0, 0.0, 0.0]))
+        watching.motion.command(Fly(setpoint), setpoint)
+        found = CALM
+        for second in range(12):
+            told = state(at=(30.0, 0.0, 8.4), stamp=float(second))
+            found = watching.assess(told, second * NANOSECONDS)
+        assert found.action is demand
 
 
 @pytest.mark.parametrize("lost", ["mode", "stamp"])
