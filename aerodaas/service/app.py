@@ -11,7 +11,7 @@ import anyio.to_thread
 from fastapi import APIRouter, FastAPI
 
 from aerodaas.config.map_tiles import MapTilesConfig
-from aerodaas.service.http.gate import Admission, Gate
+from aerodaas.service.http.gate import Admission, LimitsMiddleware
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.http.map_archive import archive_routes
 from aerodaas.service.http.page import page_routes
@@ -64,5 +64,5 @@ def build_app(
     register_refusals(app)
     for router in (*routers, page_routes(framed=framed, tiles=tiles), archive_routes(tiles)):
         app.include_router(router)
-    app.add_middleware(Gate, admission=admission, limits=limits)
+    app.add_middleware(LimitsMiddleware, admission=admission, limits=limits)
     return app

@@ -322,7 +322,7 @@ class LeaseBook:
         """
         with self._lock:
             self._settle(now, fleet)
-            lease = self._demand(id_)
+            lease = self._required(id_)
             if lease.ends is None:
                 raise RefusedError(409, f"lease {id_} is queued: extend it when it is granted")
             if not 0 < minutes <= _LONGEST - lease.minutes:
@@ -411,12 +411,12 @@ class LeaseBook:
     ) -> tuple[Lease, ...]:
         with self._lock:
             self._drop(expired(self._live.values(), now))
-            lease = self._demand(id_)
+            lease = self._required(id_)
             self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
             self._settle(now, fleet)
             return self._take_changes()
 
-    def _demand(self, id_: str) -> Lease:
+    def _required(self, id_: str) -> Lease:
         lease = self._live.get(id_)
         if lease is None:
             raise RefusedError(404, f"there is no lease {id_} that is queued or granted")

@@ -12,7 +12,7 @@ from starlette.types import Receive, Scope, Send
 
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.http.gate import Admission, Gate
+from aerodaas.service.http.gate import Admission, LimitsMiddleware
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
 
 
@@ -32,7 +32,7 @@ class Held:
 
     def __init__(self) -> None:
         self.free = asyncio.Event()
-        self.gate = Gate(self._wait, Admission(Tokens()), PROVIDER)
+        self.gate = LimitsMiddleware(self._wait, Admission(Tokens()), PROVIDER)
         self.asked: list[asyncio.Task[int]] = []
 
     async def _wait(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -14,7 +14,7 @@ from urllib.parse import quote, urlencode
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from aerodaas.environment.provider.address import ServiceAddress
-from aerodaas.environment.provider.exchange import Exchange, Method
+from aerodaas.environment.provider.exchange import Method, ProviderConnection
 from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
@@ -91,7 +91,7 @@ class ProviderClient:
             ConfigError: For an address of another form.
         """
         self.address = ServiceAddress.parse(url, insecure=insecure)
-        self._exchange = Exchange(self.address, token, timeout)
+        self._exchange = ProviderConnection(self.address, token, timeout)
 
     def me(self) -> AccountOut:
         """The account that the token belongs to."""

@@ -17,7 +17,7 @@ from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
 from aerodaas.http_client import http_client, http_errors, read_at_most
 
-__all__ = ["Exchange", "Method", "printed"]
+__all__ = ["Method", "ProviderConnection", "printed"]
 
 _MOST_BYTES = 32 << 20
 """Largest JSON of an answer: a mission of 64 robots has a thousandth of that."""
@@ -44,7 +44,7 @@ _CUT = (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError)
 Method: TypeAlias = Literal["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"]
 
 
-class Exchange:
+class ProviderConnection:
     """Requests to one service; safe in any thread."""
 
     def __init__(self, address: ServiceAddress, token: str | None, timeout: float) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import Self
 
 from aerodaas.config.extras import require_extra
-from aerodaas.environment.provider.exchange import Exchange
+from aerodaas.environment.provider.exchange import ProviderConnection
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
@@ -25,7 +25,9 @@ _LARGEST = 64 << 20
 class WireConnection:
     """An open connection; one thread receives, any may send or close."""
 
-    def __init__(self, exchange: Exchange, connection: ClientConnection, stack: ExitStack) -> None:
+    def __init__(
+        self, exchange: ProviderConnection, connection: ClientConnection, stack: ExitStack
+    ) -> None:
         """Speak over `connection`, which `stack` closes; errors are worded by `exchange`."""
         self.exchange = exchange
         self._connection = connection
@@ -34,7 +36,7 @@ class WireConnection:
         self._sending = threading.Lock()
 
     @classmethod
-    def open(cls, exchange: Exchange, path: str) -> Self:
+    def open(cls, exchange: ProviderConnection, path: str) -> Self:
         """Connect.
 
         Raises ConfigError without the package for WebSockets, SourceError without a connection,

@@ -95,7 +95,7 @@ class OidcVerifier:
         try:
             claims = self._claims(token)
         except _InvalidError as error:
-            self._tell(str(error))
+            self._report(str(error))
             return None
         if claims is None:
             return None
@@ -115,7 +115,7 @@ class OidcVerifier:
             expires=float(claims["exp"]),
         )
 
-    def _tell(self, reason: str) -> None:
+    def _report(self, reason: str) -> None:
         """Log why a token is not valid, for the provider alone, at most once in a while."""
         with self._lock:
             now = time.monotonic()

@@ -27,7 +27,7 @@ from aerodaas.service.http.refusals import refuse
 if TYPE_CHECKING:
     from aerodaas.service.access.audit import Audit
 
-__all__ = ["SUBPROTOCOL", "Admission", "Gate", "Tokens", "bearer"]
+__all__ = ["SUBPROTOCOL", "Admission", "LimitsMiddleware", "Tokens", "bearer"]
 
 SUBPROTOCOL = "aerodaas"
 """Subprotocol of a browser's WebSocket, beside its token: a browser sets no further headers."""
@@ -188,7 +188,7 @@ class Admission:
 _READING = frozenset({"GET", "HEAD"})
 
 
-class Gate:
+class LimitsMiddleware:
     """ASGI middleware that applies a server's limits to each request, whoever sends it.
 
     The role comes first: who may only look sends no body. Roles with a reserve are never turned

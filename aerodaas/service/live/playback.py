@@ -88,7 +88,7 @@ class Player:
         try:
             # One that was cut off is scanned whole, which may take a while.
             recording = recording or Recording.open(self._path)
-            flight, film = read_flight(recording, self._tell)
+            flight, film = read_flight(recording, self._set_progress)
             text = PlaybackOut(read=1.0, flight=flight).model_dump_json().encode()
         except AeroDaaSError as error:
             # Where it lies at a provider is nobody else's business.
@@ -104,7 +104,7 @@ class Player:
             if self._closed and recording is not None:
                 recording.close()
 
-    def _tell(self, read: float) -> None:
+    def _set_progress(self, read: float) -> None:
         self._read = read
         if self._closed:
             # Nobody looks, and who goes from one to the next would have all of them read at once.

@@ -46,7 +46,7 @@ class SurveyPlanner:
             raise MissionError(f"{wanted.robot} does not fly in this mission")
         settings = _settings(robot, wanted)
         start, wind = _start(status, robot.start), np.array(config.simulation.wind)
-        with self._turn():
+        with self._waiting():
             survey = plan_survey(
                 robot, wanted.area, settings, start=np.array(start, dtype=np.float64), wind=wind
             )
@@ -67,7 +67,7 @@ class SurveyPlanner:
         )
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
+    def _waiting(self) -> Iterator[None]:
         """Wait for the requests before, if they are few; raises MissionError otherwise."""
         if not self._places.acquire(blocking=False):
             raise MissionError(_BUSY)

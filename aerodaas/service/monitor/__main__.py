@@ -40,7 +40,7 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     told = (out, watchers, changed, obeyed)
-    threading.Thread(target=_tell, args=told, daemon=True).start()
+    threading.Thread(target=_print_report, args=told, daemon=True).start()
     for line in sys.stdin.buffer:
         wanted = MonitorRequest.model_validate_json(line)
         for name, watcher in watchers.items():
@@ -52,7 +52,7 @@ def main() -> None:
     os._exit(0)
 
 
-def _tell(
+def _print_report(
     out: TextIO,
     watchers: dict[str, VehicleWatcher],
     changed: threading.Event,

@@ -46,16 +46,16 @@ class HereRoutes:
     async def here(self, socket: WebSocket, mission: str) -> None:
         """Carry questions and answers until the mission is over, or the user leaves or must go."""
 
-        def look(principal: Principal) -> None:
+        def require_user(principal: Principal) -> None:
             self._missions.require_users_side(principal, mission)
 
         def allowed() -> bool:
-            return self._admission.stays(socket, Role.PILOT, Scope.COMPUTE, look)
+            return self._admission.stays(socket, Role.PILOT, Scope.COMPUTE, require_user)
 
         try:
             principal = self._admission.require(socket, Role.PILOT, Scope.COMPUTE)
             with self._admission.auditing(principal, socket):
-                await asyncio.to_thread(look, principal)
+                await asyncio.to_thread(require_user, principal)
         except AeroDaaSError as error:
             await refuse(socket.scope, socket.send, error)
             return
