@@ -125,7 +125,9 @@ class Actuation:
     def step(self, now: int, *, home: bool) -> None:
         """Give its rest to all that has one, if the drone flies by no plan from now on.
 
-        That is what `home` says: it comes home, lands, or the mission is over.
+        Args:
+            now: Mission clock, nanoseconds.
+            home: Whether the drone comes home, lands, or the mission is over.
         """
         begins, self._home = home and not self._home, home
         if not begins:
@@ -181,10 +183,16 @@ class Actuation:
                 self._failure = text
 
     def attend(self, stop: QueuedWaypoint, position: Vector, now: int) -> bool:
-        """Do what is due for `stop`, at which the drone is; its `position` is ENU metres.
+        """Do what is due for `stop`, at which the drone is.
 
-        Returns whether the drone has to stay there for it; never for longer than the time-out of
-        each actuator.
+        Args:
+            stop: The stop whose moves are carried out.
+            position: Where the drone is, ENU metres.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            Whether the drone has to stay there for it; never for longer than the time-out of each
+            actuator.
         """
         if not stop.waypoint.actuate:
             return False

@@ -47,7 +47,16 @@ class ManualControl:
         return self._operator if now < self._expires else ""
 
     def handle(self, command: TakeControls | Steer | ReleaseControls, now: int) -> str:
-        """Execute a command at `now`; returns why not, or an empty text."""
+        """Execute a command of an operator.
+
+        Args:
+            command: The operator's request; its `session` tells whether the operator has the
+                controls.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            Why the command is not executed, or an empty text.
+        """
         holder, own = self.operator(now), command.session == self._session != 0
         match command:
             case TakeControls() if own or not holder:
@@ -104,7 +113,12 @@ class CommandHandler:
         return any(stream.feeds for stream in self._streams.values())
 
     def open(self, stream: OpenStream, now: int) -> None:
-        """Accept items of `stream` from `now` on, a time of the mission clock in nanoseconds."""
+        """Accept items of `stream` from `now` on.
+
+        Args:
+            stream: The stream, which replaces an open one of its name.
+            now: Mission clock, nanoseconds.
+        """
         self._streams[stream.name] = stream
         self.last_received = now
 
@@ -120,7 +134,12 @@ class CommandHandler:
     def navigate(
         self, command: AddNavigation | StreamItem | RearrangeNavigation, now: int
     ) -> Answer:
-        """Execute a command that changes the queue, at `now`, mission clock in nanoseconds."""
+        """Execute a command that changes the queue.
+
+        Args:
+            command: Navigation to add, an item of an open stream, or a new order of stops.
+            now: Mission clock, nanoseconds.
+        """
         match command:
             case AddNavigation():
                 return self.add(command, now)
@@ -130,7 +149,12 @@ class CommandHandler:
                 return self.rearrange(command)
 
     def add(self, command: AddNavigation, now: int) -> Answer:
-        """Add navigation of the application or a remote user."""
+        """Add navigation of the application or a remote user.
+
+        Args:
+            command: The navigation, where it is queued, and whether the queue is cleared first.
+            now: Mission clock, nanoseconds.
+        """
         if command.clear_first:
             self.clear(now)
             if command.navigation.stream is None and not len(command.navigation):
@@ -165,7 +189,13 @@ class CommandHandler:
         return f"the drone is at {key} by now" if stop.arrived else ""
 
     def receive(self, message: StreamItem, now: int) -> Answer:
-        """Add an item of an open stream."""
+        """Add an item of an open stream.
+
+        Args:
+            message: The item and the name of its stream; other items than navigation change
+                nothing.
+            now: Mission clock, nanoseconds.
+        """
         stream = self._streams.get(message.name)
         if stream is None:
             return Answer(accepted=False, text=f"no stream called {message.name!r} is open")

@@ -33,10 +33,15 @@ _ROUNDING = 1e-6
 
 
 def corner_speed(arriving: Vector, leaving: Vector, limits: LimitsConfig) -> float:
-    """m/s at which a drone may come to a waypoint along `arriving` and go on along `leaving`.
+    """Speed at which a drone may turn at a waypoint from `arriving` to `leaving`, m/s.
 
-    Both are unit vectors. The part across the next leg, or all of it at a right angle and more,
-    stops within the arrival radius; it is never faster than its position is looked at.
+    The part across the next leg, or all of it at a right angle and more, stops within the arrival
+    radius; it is never faster than its position is looked at.
+
+    Args:
+        arriving: Unit vector of the leg that ends at the waypoint, ENU.
+        leaving: Unit vector of the leg that begins there, ENU.
+        limits: Arrival radius, acceleration and reaction time of the drone.
     """
     radius = limits.arrival_radius
     onwards = float(arriving @ leaving)
@@ -47,9 +52,11 @@ def corner_speed(arriving: Vector, leaving: Vector, limits: LimitsConfig) -> flo
 
 
 def passing_speed(turning: float, limits: LimitsConfig) -> float:
-    """m/s at a waypoint so that a drone that brakes towards it turns at `turning` m/s.
+    """Speed at a waypoint so that a drone that brakes towards it turns at `turning`, m/s.
 
-    It turns where it arrives, that is at the arrival radius.
+    Args:
+        turning: Speed at which it turns where it arrives, that is at the arrival radius, m/s.
+        limits: Arrival radius, acceleration and reaction time of the drone.
     """
     a, t = limits.max_acceleration, limits.reaction_time
     return braking_speed(braking_distance(turning, a, t) - limits.arrival_radius, a, t)
@@ -67,10 +74,13 @@ class Cornering:
     _leaving: Vector | None = field(default=None, init=False)
 
     def passing_speed(self, leg: Leg, routed: Vector, place: Vector, odometry: Odometry) -> float:
-        """m/s at which `place` is passed, to which the drone flies now; 0 where it stops there.
+        """Speed at which the drone passes `place` on its way, m/s; 0 where it stops there.
 
-        The way leads to `routed`, the end of `leg` or a corner before it; `place` is that, or one
-        ahead on a line of pictures. Both are ENU metres.
+        Args:
+            leg: The leg under way.
+            routed: Where the way leads, the end of `leg` or a corner before it, ENU metres.
+            place: That, or one ahead on a line of pictures, ENU metres.
+            odometry: Where the drone is and how it moves.
         """
         stop, following = leg.stop, self.navigator.following
         way = stop.waypoint.position - odometry.position

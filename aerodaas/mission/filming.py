@@ -56,7 +56,12 @@ class Filming:
     def attend(self, stop: QueuedWaypoint, now: int) -> bool:
         """Tell the camera what `stop` asks, once the drone has arrived there.
 
-        Returns whether the drone has to stay there for it; never for longer than the time-out.
+        Args:
+            stop: The stop at which the drone is, or to which it flies.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            Whether the drone has to stay there for it; never for longer than the time-out.
         """
         on = stop.waypoint.video
         if on is None:

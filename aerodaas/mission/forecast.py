@@ -48,11 +48,17 @@ class BatteryForecast:
     def update(
         self, now: int, state: VehicleState, stops: Iterable[QueuedWaypoint], *, grounded: bool
     ) -> None:
-        """Look at the plan `stops` at `now`, mission clock in nanoseconds.
+        """Look at the plan `stops` at `now`.
 
-        On the ground a shortfall raises an alert at once. In the air it must last for
-        `_PATIENCE`: the battery gauge is coarse and a climb is expensive, so that a single
-        estimate is unreliable.
+        On the ground a shortfall raises an alert at once. In the air it must last for `_PATIENCE`:
+        the battery gauge is coarse and a climb is expensive, so that a single estimate is
+        unreliable.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            state: The vehicle's state; one without a position is passed over.
+            stops: The stops ahead, in the order flown.
+            grounded: Whether the drone is on the ground.
         """
         if now < self._due or not has_position(state):
             return

@@ -41,7 +41,14 @@ class LegPhase(enum.Enum):
 def setpoint_towards(
     place: Vector, position: Vector, yaw: float | None, speed: float
 ) -> PositionSetpoint:
-    """Return a setpoint to `place` (ENU metres), facing along the path if `yaw` is None."""
+    """Return a setpoint to `place`.
+
+    Args:
+        place: Where to fly, ENU metres.
+        position: Where the drone is, ENU metres.
+        yaw: Radians counter-clockwise from east; None faces along the path.
+        speed: Speed on the way, m/s.
+    """
     way = place - position
     if yaw is None and math.hypot(way[0], way[1]) > _TURNING_DISTANCE:
         yaw = math.atan2(way[1], way[0])
@@ -51,7 +58,14 @@ def setpoint_towards(
 def unreachable(
     stop: QueuedWaypoint, phase: LegPhase, state: VehicleState | None, limits: LimitsConfig
 ) -> str:
-    """Why a stop is given up in this phase of the flight to it, one sentence."""
+    """Why a stop is given up, one sentence.
+
+    Args:
+        stop: The stop that is given up.
+        phase: Phase of the flight to it.
+        state: The vehicle's state; None if it has never given one.
+        limits: Of the drone; its `rangefinder_clearance` may have kept it above the stop.
+    """
     why = "no way inside the geofence leads there"
     if phase is LegPhase.STALLED:
         why = "the drone comes no nearer"
@@ -70,7 +84,12 @@ def _kept_up(stop: QueuedWaypoint, state: VehicleState, limits: LimitsConfig) ->
 
 
 def velocity_setpoint(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
-    """Return a velocity command in the local frame, by the drone's yaw."""
+    """Return a velocity command in the local frame, by the drone's yaw.
+
+    Args:
+        command: Velocity in the body frame.
+        state: The vehicle's state, of which the yaw counts.
+    """
     velocity = body_to_enu(command.velocity, state.odometry.yaw)
     return VelocitySetpoint(velocity, command.yaw_rate, command.evasive)
 
@@ -100,7 +119,13 @@ class Leg:
         self._nearer_at = now
 
     def advance(self, odometry: Odometry, now: int, elapsed: float) -> LegPhase:
-        """Update with the odometry, `elapsed` seconds after the last call, and return the phase."""
+        """Update with the odometry, and return the phase.
+
+        Args:
+            odometry: Where the drone is and where it faces.
+            now: Mission clock, nanoseconds.
+            elapsed: Time since the last call, seconds.
+        """
         stop = self.stop
         distance = length(stop.waypoint.position - odometry.position)
         if stop.arrived:
@@ -123,10 +148,14 @@ class Leg:
         heading: float | None = None,
         passing_speed: float = 0.0,
     ) -> PositionSetpoint:
-        """Fly on to `place`, the waypoint or a corner before it, at the waypoint's speed.
+        """Fly on to `place`, at the waypoint's speed.
 
-        `heading` is for a waypoint without a yaw; None faces along the path. At `passing_speed`
-        (m/s) the place is passed.
+        Args:
+            place: The waypoint or a corner before it, ENU metres.
+            position: Where the drone is, ENU metres.
+            cruise_speed: Speed for a waypoint without one, m/s.
+            heading: Yaw for a waypoint without one, radians; None faces along the path.
+            passing_speed: Speed at which the place is passed, m/s.
         """
         waypoint = self.stop.waypoint
         yaw = heading if waypoint.yaw is None else waypoint.yaw

@@ -82,7 +82,12 @@ class MissionLog:
     def alert(self, now: int, kind: str, text: str, about: str = "") -> None:
         """Raise an alert; a repetition that differs only in its figures waits for `_AGAIN`.
 
-        With `about` it is one about the same, whatever it says.
+        Args:
+            now: Mission clock, nanoseconds.
+            kind: Kind of the alert.
+            text: What the alert says.
+            about: Alerts of one kind about the same are repetitions, whatever they say; by default
+                the words of `text`.
         """
         subject = kind, about or words(text)
         told_at = self._told.get(subject)
@@ -93,7 +98,13 @@ class MissionLog:
         self.alerts.append(Alert(header, kind, text))
 
     def give_up(self, now: int, waypoint_id: str, reason: str) -> None:
-        """Record that a waypoint will not be visited, and raise an alert."""
+        """Record that a waypoint will not be visited, and raise an alert.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            waypoint_id: Id of the waypoint.
+            reason: Why, as the alert says it.
+        """
         self.given_up[waypoint_id] = reason
         self.alert(now, "given_up", reason)
 
@@ -104,5 +115,11 @@ def words(text: str) -> str:
 
 
 def subject(kind: str, text: str, about: str = "") -> tuple[str, str]:
-    """Key by which faults are the same: several of the vehicle share one kind, and of traffic."""
+    """Key by which faults are the same: several of the vehicle share one kind, and of traffic.
+
+    Args:
+        kind: Kind of the fault.
+        text: What the fault says; its words are the key for a fault of the vehicle.
+        about: What any other fault is about.
+    """
     return kind, words(text) if kind == "vehicle" else about

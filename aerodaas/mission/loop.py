@@ -70,10 +70,17 @@ class SetpointLoop:
         self._asked_at = 0
 
     def step(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
-        """Take one turn at mission time `now` (ns); returns the setpoints requested and sent.
+        """Take one turn of the loop.
 
-        `neighbours` are the other drones to keep away from. Raises VehicleError only if the vehicle
-        has never given a state.
+        Args:
+            now: Mission clock, nanoseconds.
+            neighbours: The other drones to keep away from.
+
+        Returns:
+            The setpoints requested and sent.
+
+        Raises:
+            VehicleError: The vehicle has never given a state.
         """
         state = self._read()
         items = self._examined(state, now)

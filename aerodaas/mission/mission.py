@@ -206,10 +206,14 @@ class Mission:
         )
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Execute `command` at `now` (mission clock, ns) or answer why not; raises nothing.
+        """Execute `command` or answer why not.
 
         An exception from a command or a stream's item fails that command alone, and raises an
         alert.
+
+        Args:
+            command: The command.
+            now: Mission clock, nanoseconds.
         """
         self._now = max(self._now, now)
         try:
@@ -328,8 +332,11 @@ class Mission:
     def update(self, state: VehicleState, now: int, objections: Sequence[str] = ()) -> Action:
         """Take one turn of the loop and return the action to carry out.
 
-        `objections` are the vehicle's own reasons against a take-off (`Vehicle.preflight`); they
-        matter in the PREFLIGHT state only.
+        Args:
+            state: The vehicle's state.
+            now: Mission clock, nanoseconds.
+            objections: The vehicle's own reasons against a take-off (`Vehicle.preflight`); they
+                matter in the PREFLIGHT state only.
         """
         self._observe(state, now)
         if self.state is MissionState.IDLE or self.finished:
@@ -353,7 +360,12 @@ class Mission:
         return turns.get(self.state, self._fly)(state)
 
     def command_sent(self, action: Action, setpoint: Setpoint | None) -> None:
-        """Compare the motion with `action` from now on, sent as `setpoint` if as one."""
+        """Compare the motion with `action` from now on.
+
+        Args:
+            action: The action that was carried out.
+            setpoint: The setpoint as which it was sent; None if as none.
+        """
         if self._obeyed:
             self._supervisor.motion.command(action, setpoint)
 

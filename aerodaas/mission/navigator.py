@@ -69,9 +69,16 @@ class Navigator:
     def admit(
         self, waypoints: Iterable[Waypoint], now: float, deadline: float | None, source: str
     ) -> tuple[list[Waypoint], dict[str, str]]:
-        """Resolve waypoints to local ENU; returns the flyable ones, and the reasons for the others.
+        """Resolve waypoints to local ENU.
 
-        `now` and `deadline` are seconds of mission time; raises nothing.
+        Args:
+            waypoints: Waypoints in any of their frames.
+            now: Mission time, seconds.
+            deadline: Mission time by which all are to be reached, seconds; None for their own only.
+            source: Who queues them; empty for the application.
+
+        Returns:
+            The flyable waypoints, and the reasons for the others by id.
         """
         taken: list[Waypoint] = []
         refused: dict[str, str] = {}
@@ -116,9 +123,19 @@ class Navigator:
         cause: Header | None = None,
         above_ground: Mapping[str, float],
     ) -> None:
-        """Queue admitted waypoints and request a plan; raises InvalidWaypointError.
+        """Queue admitted waypoints and request a plan.
 
-        `above_ground`, by id, are metres to keep above the ground on the way there.
+        Args:
+            waypoints: Waypoints in local ENU, as `admit` returns them.
+            group: Key of the group whose order is kept; None for none.
+            index: Number of stops of their list that they follow; None for the end, to be planned.
+            source: Who queues them; empty for the application.
+            cause: Header of the item from which they were generated.
+            above_ground: Metres to keep above the ground on the way to a waypoint, by its id.
+
+        Raises:
+            InvalidWaypointError: An id is already queued by another source, or the index is
+                negative.
         """
         self.queue.add(
             waypoints,
@@ -132,7 +149,13 @@ class Navigator:
             self._unplanned |= {waypoint.priority for waypoint in waypoints}
 
     def obey(self, command: VelocityCommand, now: int, cause: Header | None) -> None:
-        """Store a velocity command, unless a more urgent one has not expired."""
+        """Store a velocity command, unless a more urgent one has not expired.
+
+        Args:
+            command: Velocity in the body frame, with its priority and how long it is valid.
+            now: Mission clock, nanoseconds.
+            cause: Header of the item from which it was generated.
+        """
         present = self.command
         if present and now < present.expires and present.command.priority < command.priority:
             return

@@ -90,7 +90,12 @@ class PhotoTrigger:
         """Where to fly so that the drone is on the line, ENU metres; None for straight to its end.
 
         At first that is the line itself: a drone that comes round a corner has slid beside it, and
-        its nose, where it `turns` along the line, is not there yet.
+        its nose is not there yet.
+
+        Args:
+            odometry: Where the drone is, how it moves and where it faces.
+            now: Mission clock, nanoseconds.
+            turns: Whether its nose turns along the line.
         """
         if self.distance is None or self._length < _ROUNDING or not _is_finite(odometry):
             return None
@@ -143,7 +148,10 @@ class PhotoTrigger:
     def passed(self, odometry: Odometry, now: int, arrived_at: int | None) -> int:
         """How many pictures have become due since the last call; more than one is too late.
 
-        `arrived_at` (ns) is when the drone arrived at the leg's end; None before.
+        Args:
+            odometry: Where the drone is.
+            now: Mission clock, nanoseconds.
+            arrived_at: Mission clock at arrival at the leg's end, nanoseconds; None before.
         """
         if self.interval is not None:
             return self._by_time(now)

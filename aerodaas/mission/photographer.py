@@ -83,9 +83,15 @@ class PhotoCapture:
         return bool(self._awaited)
 
     def request(self, label: str, now: int, *, on_the_way: bool = False) -> PhotoRequest:
-        """Ask for a picture, for which a waypoint waits or, `on_the_way`, nobody.
+        """Ask for a picture, and await it.
 
-        Raises VehicleError and what cameras do.
+        Args:
+            label: Name of the picture, by which the camera and alerts know it.
+            now: Mission clock, nanoseconds.
+            on_the_way: Whether no waypoint waits for it.
+
+        Raises:
+            VehicleError: There is no camera; beside it comes what cameras raise.
         """
         camera = self.camera
         if camera is None:
@@ -95,7 +101,13 @@ class PhotoCapture:
         return request
 
     def trigger(self, label: str, count: int, now: int) -> None:
-        """Take one picture on the way, where `count` became due; the others are lost and told."""
+        """Take one picture on the way, where `count` became due; the others are lost and told.
+
+        Args:
+            label: Name of the picture.
+            count: Pictures that became due.
+            now: Mission clock, nanoseconds.
+        """
         if count > 1:
             self._miss(label, count - 1, _LATE, now)
         if self.busy:
@@ -122,7 +134,13 @@ class PhotoCapture:
                 self._fail(number, request, reason, now)
 
     def lose(self, label: str, reason: str, now: int) -> None:
-        """Count and tell a waypoint's picture that is not taken."""
+        """Count and tell a waypoint's picture that is not taken.
+
+        Args:
+            label: Name of the picture.
+            reason: Why it is not taken, as the alert says it.
+            now: Mission clock, nanoseconds.
+        """
         self.lost += 1
         self._log.alert(now, "photo", f"{label}: no picture: {reason}")
 
@@ -211,8 +229,14 @@ class Photographer:
     def steer(self, place: Vector, odometry: Odometry, now: int) -> tuple[Vector, float | None]:
         """Where to fly for the pictures' sake on the way to `place`, and where the nose looks.
 
-        Metres ENU, and radians counter-clockwise from east; None as the drone flies. `place` stays
-        unless it is the waypoint's own, to which the way is straight.
+        Args:
+            place: Where the way leads, ENU metres; stays unless it is the waypoint's own.
+            odometry: Where the drone is, how it moves and where it faces.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            The place in ENU metres, and the heading in radians counter-clockwise from east; None as
+            the drone flies.
         """
         task, heading = self._served, self._gaze.heading
         if task is None:
@@ -230,7 +254,12 @@ class Photographer:
         return trigger is not None and trigger.aligned
 
     def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
-        """Whether a picture by distance is due within `radius` metres of the end of its leg."""
+        """Whether a picture by distance is due near the end of the leg to `stop`.
+
+        Args:
+            stop: The stop where the leg ends.
+            radius: Distance from its end, metres.
+        """
         trigger = self._trigger_of(stop)
         return trigger is not None and trigger.ends_with_place(radius)
 
@@ -250,8 +279,14 @@ class Photographer:
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, to which the drone flies or at which it is.
 
-        Returns whether the drone has to stay there for it; never for longer than the time-out, and
-        then as long again for a video.
+        Args:
+            stop: The stop whose pictures and video are due.
+            odometry: Where the drone is.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            Whether the drone has to stay there for it; never for longer than the time-out, and then
+            as long again for a video.
         """
         return self._photograph(stop, odometry, now) or self._filming.attend(stop, now)
 

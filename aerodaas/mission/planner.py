@@ -67,6 +67,13 @@ def solve(scheduler: TrajectoryScheduler, request: PlanRequest) -> Plan:
     """Call the scheduler; any error becomes the plan's fault, never an exception.
 
     A scheduler is a plug-in that runs in flight: its failure must not endanger the drone.
+
+    Args:
+        scheduler: The plug-in that plans.
+        request: The waypoints to plan, and the situation.
+
+    Returns:
+        The plan; after a fault it keeps the order of the request.
     """
     try:
         answer = scheduler.plan(request.pending, request.situation)

@@ -30,7 +30,12 @@ class Planning:
     log: MissionLog
 
     def plan(self, state: VehicleState, now: int) -> None:
-        """Request a plan if one is due, and apply one that has come; `now` is the mission clock."""
+        """Request a plan if one is due, and apply one that has come.
+
+        Args:
+            state: The vehicle's state; nothing is planned for one without a position.
+            now: Mission clock, nanoseconds.
+        """
         if not has_position(state):
             return
         limits, navigator = self.robot.limits, self.navigator
@@ -55,7 +60,10 @@ class Planning:
     def awaited(self, stop: QueuedWaypoint, held_since: int | None, now: int) -> bool:
         """Whether to hold for the plan under way rather than set out for `stop`.
 
-        `held_since` is the mission clock since which the drone holds; None if it does not.
+        Args:
+            stop: The next stop.
+            held_since: Mission clock since which the drone holds, nanoseconds; None if it does not.
+            now: Mission clock, nanoseconds.
         """
         if not self.navigator.waits_for_plan or stop.under_way:
             return False

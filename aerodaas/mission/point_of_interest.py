@@ -41,10 +41,17 @@ _FACING = 0.1
 def direction_to(
     place: Vector, position: Vector, bearing: float | None
 ) -> tuple[float, float | None] | None:
-    """Pitch, and bearing counter-clockwise from east, of `place` from `position`, in radians.
+    """Direction of `place` from `position`.
 
-    `bearing` is the one before, which stays where the place is straight below or above; None if
-    there was none. Returns None where the place has no direction: at it, or for what is not finite.
+    Args:
+        place: What is looked at, ENU metres.
+        position: Where the drone is, ENU metres.
+        bearing: The one before, radians, which stays where the place is straight below or above;
+            None if there was none.
+
+    Returns:
+        Pitch, and bearing counter-clockwise from east, radians; None where the place has no
+        direction: at it, or for what is not finite.
     """
     east, north, up = (float(axis) for axis in place - position)
     across = math.hypot(east, north)
@@ -56,14 +63,27 @@ def direction_to(
 
 
 def fresh(attitude: GimbalAttitude | None, now: int) -> GimbalAttitude | None:
-    """An attitude that is new and finite; a gimbal may say anything."""
+    """An attitude that is new and finite; a gimbal may say anything.
+
+    Args:
+        attitude: The gimbal's last attitude; None if it has told none.
+        now: Mission clock, nanoseconds.
+
+    Returns:
+        The attitude, or None for one that is old or not finite.
+    """
     if attitude is None or now - attitude.stamp > _FRESH:
         return None
     return attitude if math.isfinite(attitude.pitch) and math.isfinite(attitude.yaw) else None
 
 
 def near(attitude: GimbalAttitude, aim: GimbalTarget) -> bool:
-    """Whether a gimbal looks where it is to."""
+    """Whether a gimbal looks where it is to.
+
+    Args:
+        attitude: Where the gimbal looks.
+        aim: Where it is to look.
+    """
     pitch = abs(wrap_angle(attitude.pitch - aim.pitch))
     return max(pitch, abs(wrap_angle(attitude.yaw - aim.yaw))) <= AIMED
 
@@ -92,10 +112,14 @@ class PointOfInterest:
         self._by_nose = False
 
     def aim(self, gimbal: Gimbal | None, odometry: Odometry, now: int, yaw: float | None) -> None:
-        """Aim `gimbal` and the nose from where the drone is, at `now` (ns).
+        """Aim `gimbal` and the nose from where the drone is; raises what the gimbal raises.
 
-        `yaw` is a heading that is asked for otherwise, which the nose keeps. Raises what the gimbal
-        raises.
+        Args:
+            gimbal: The gimbal; None aims by the nose alone.
+            odometry: Where the drone is and where it faces.
+            now: Mission clock, nanoseconds.
+            yaw: A heading that is asked for otherwise, which the nose keeps, radians; None for
+                none.
         """
         if self.place is None:
             return

@@ -69,12 +69,22 @@ class WaypointQueue:
         cause: Header | None = None,
         above_ground: Mapping[str, float] = _STRAIGHT,
     ) -> None:
-        """Queue `waypoints`, each in the list of its priority; `above_ground` is by their id.
+        """Queue `waypoints`, each in the list of its priority; nothing is queued after an error.
 
-        With `index`, they follow that many stops of their list, and stay there. A waypoint with the
-        id of one that the same `source` (not the empty one) queued replaces it: its target has
-        moved. Raises InvalidWaypointError for an id that is already queued by another source and
-        for a negative index; nothing is queued then.
+        A waypoint with the id of one that the same `source` (not the empty one) queued replaces it:
+        its target has moved.
+
+        Args:
+            waypoints: Waypoints in local ENU.
+            group: Key of the group whose order plans keep; None for none.
+            index: Number of stops of their list that they follow, and stay there; None for the end.
+            source: Who queues them; empty for the application.
+            cause: Header of the item from which they were generated.
+            above_ground: Metres to keep above the ground on the way to a waypoint, by its id.
+
+        Raises:
+            InvalidWaypointError: An id is already queued by another source, or the index is
+                negative.
         """
         arriving = list(waypoints)
         self._check(arriving, index, source)
@@ -183,11 +193,18 @@ class WaypointQueue:
         return [stop for stop in level if not (stop.pinned or stop.arrived)]
 
     def reorder(self, level: int, asked: Iterable[str], order: Sequence[str]) -> list[str]:
-        """Put the `level` list into the planned `order`; returns the ids given up.
+        """Put the `level` list into the planned `order`.
 
-        `asked` are the ids that the plan was made for: one that `order` leaves out is given up,
-        while stops queued since follow behind. Groups keep their internal order in the places that
-        the plan gives to the group; pinned stops keep their index.
+        Groups keep their internal order in the places that the plan gives to the group; pinned
+        stops keep their index.
+
+        Args:
+            level: Priority of the list.
+            asked: Ids that the plan was made for; stops queued since follow behind.
+            order: Ids in the planned order; one of `asked` that it leaves out is given up.
+
+        Returns:
+            The ids given up.
         """
         stops = self._levels.get(level, [])
         free = {stop.id: stop for stop in stops if not (stop.pinned or stop.arrived)}
@@ -213,8 +230,12 @@ class WaypointQueue:
     def rearrange(self, order: Sequence[str], remove: Iterable[str]) -> None:
         """Have stops change places among themselves, and remove others; all or nothing.
 
-        Those of `order` stay in their new places, around which plans move the others. Raises
-        InvalidWaypointError for an order that priorities contradict.
+        Args:
+            order: Ids of stops, which stay in their new places, around which plans move the others.
+            remove: Ids of stops to remove.
+
+        Raises:
+            InvalidWaypointError: Priorities contradict the order.
         """
         stops = [stop for key in order if (stop := self.find(key)) is not None]
         for before, after in pairwise(stops):

@@ -32,7 +32,13 @@ _ENDLESS = 1e6
 def give(robot: str, commands: Iterable[Command], handle: Callable[[Command], Answer]) -> None:
     """Hand `commands` to a robot's mission.
 
-    Raises InvalidWaypointError for the first one refused.
+    Args:
+        robot: Id of the robot, for the error.
+        commands: The commands, in order.
+        handle: The mission's answer to a command.
+
+    Raises:
+        InvalidWaypointError: The mission refuses a command; the others are not tried.
     """
     for command in commands:
         answer = handle(command)
@@ -51,8 +57,17 @@ def rehearse(
     """Refuse navigation that the mission would refuse, or that the battery cannot cover.
 
     A real vehicle may stand elsewhere than the environment says: whether waypoints relative to it
-    lie within the fence is checked by its node. Raises InvalidWaypointError, and ConfigError for
-    an invalid fence.
+    lie within the fence is checked by its node.
+
+    Args:
+        robot: The robot that would fly.
+        commands: The commands before take-off, in order.
+        environment: Home, terrain and simulated wind.
+        scheduler: The scheduler that orders the waypoints.
+
+    Raises:
+        InvalidWaypointError: The mission refuses a command, or the battery does not suffice.
+        ConfigError: The fence is invalid.
     """
     commands = list(commands)
     home = environment.home

@@ -35,8 +35,15 @@ class Detour:
     def towards(self, target: Vector, position: Vector) -> Vector | None:
         """The next point to fly to on the route from `position` to `target`, ENU metres.
 
-        The target itself if the straight line is free, or if there is no fence. None if no route
-        inside the fence leads there. Corners are flown at the target's height.
+        Corners are flown at the target's height.
+
+        Args:
+            target: Where the route ends, ENU metres.
+            position: Where the drone is, ENU metres.
+
+        Returns:
+            The target itself if the straight line is free, or if there is no fence; None if no
+            route inside the fence leads there.
         """
         if self._corners is None:
             return target
@@ -108,8 +115,11 @@ class Route:
     ) -> Vector | None:
         """The next point to fly to from `position`, ENU metres; None if no way leads to `target`.
 
-        With `above_ground` metres, the way follows the ground: the point lies ahead, at the end of
-        the lowest straight line that keeps this height all along.
+        Args:
+            target: Where the way ends, ENU metres.
+            position: Where the drone is, ENU metres.
+            above_ground: Metres to keep above the ground: the point lies ahead, at the end of the
+                lowest straight line that keeps them all along; None does not follow the ground.
         """
         place = self._detour.towards(target, position)
         if place is None or above_ground is None or self._clearance is None:

@@ -51,10 +51,18 @@ class MissionStateMachine:
         """Mission clock of the last change, nanoseconds."""
 
     def to(self, state: MissionState, now: int, reason: str = "") -> bool:
-        """Change to `state`; returns False if the mission is in it already.
+        """Change to `state`.
 
-        A reason for the current state replaces the old one. Raises MissionError for a transition
-        that is not in TRANSITIONS.
+        Args:
+            state: The new state, or the current one.
+            now: Mission clock, nanoseconds.
+            reason: Why; a reason for the current state replaces the old one.
+
+        Returns:
+            False if the mission is in the state already.
+
+        Raises:
+            MissionError: The transition is not in TRANSITIONS.
         """
         if state is self.state:
             self.reason = reason or self.reason

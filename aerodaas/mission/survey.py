@@ -167,9 +167,16 @@ def _lies_sideways(sensor: SensorConfig, settings: CameraConfig) -> bool:
 def planned_photos(
     waypoints: Sequence[Waypoint], camera: SurveyCamera, *, height: float, speed: float
 ) -> SurveyPhotos:
-    """Pictures that `camera` takes on the lines of a survey at `height` metres and `speed` m/s.
+    """Pictures that `camera` takes on the lines of a survey.
 
-    Raises SchedulerError for more than `MOST_PHOTOS`.
+    Args:
+        waypoints: The survey's path, in local ENU.
+        camera: The camera, which looks straight down.
+        height: Height above the ground, metres.
+        speed: Speed on the lines, m/s.
+
+    Raises:
+        SchedulerError: More than `MOST_PHOTOS` are taken.
     """
     gaps: list[float] = []
     places: list[Place] = []
@@ -251,9 +258,19 @@ class SurveySettings:
         speed: float | None = None,
         around: bool = False,
     ) -> SurveySettings:
-        """Survey with `camera` from `height`, or from where a pixel is `ground_resolution` metres.
+        """Survey with `camera` from a height, or from where a pixel is as large as asked.
 
-        Raises SchedulerError unless one of the two is given, and for a resolution that is none.
+        Args:
+            camera: The camera, which gives strips and distances of pictures.
+            height: Height to fly at, metres; or `ground_resolution`.
+            ground_resolution: Size of a pixel on the ground, metres; or `height`.
+            angle: Of the sweeps, radians counter-clockwise from east; None for the shortest path.
+            speed: Speed on the strips, m/s; None for the robot's cruise speed.
+            around: Fly around no-fly zones within the area instead of refusing them.
+
+        Raises:
+            SchedulerError: Not exactly one of height and resolution is given, or the resolution is
+                none.
         """
         if (height is None) == (ground_resolution is None):
             raise SchedulerError("a survey needs a height or a ground resolution: give it one")

@@ -44,7 +44,13 @@ _NAMED = 3
 def planned_places(
     stops: Sequence[QueuedWaypoint], limits: LimitsConfig, fastest: float
 ) -> list[PlannedPlace]:
-    """The places of `stops`; `fastest` is what the vehicle can do, m/s."""
+    """The places of `stops`, as an autopilot is told them.
+
+    Args:
+        stops: The stops, in the order flown.
+        limits: Of the drone; its cruise speed is for stops without a speed.
+        fastest: The most that the vehicle can do, m/s.
+    """
     most = min(limits.max_speed, fastest)
     return [
         PlannedPlace(
@@ -64,7 +70,15 @@ def unflyable(
     route: Route,
     clearance: GroundClearance | None,
 ) -> str:
-    """Why an autopilot cannot fly from `position` (ENU metres) by `stops`; empty if it can."""
+    """Why an autopilot cannot fly by `stops`; empty if it can.
+
+    Args:
+        stops: The stops, in the order flown.
+        position: Where the flight to the first of them begins, ENU metres.
+        limits: Of the drone.
+        route: Ways around no-fly zones and the geofence.
+        clearance: The height to keep above the ground; None without a terrain.
+    """
     reasons = []
     if limits.rangefinder_clearance > 0.0:
         reasons.append("rangefinder_clearance is kept by setpoints alone")
@@ -162,7 +176,13 @@ class Handover:
     ) -> Answer:
         """Begin to hand `stops` over, or take them back; the latter takes effect with this turn.
 
-        `objection` is what the mission itself has against it.
+        Args:
+            command: What is asked for.
+            mission: The mission's state; only in flight to a stop are stops handed over.
+            stops: The stops ahead, in the order flown.
+            state: The vehicle's state; None if it has never given one.
+            now: Mission clock, nanoseconds.
+            objection: What the mission itself has against it.
         """
         if isinstance(command, TakeBack):
             if not self.active:
@@ -211,7 +231,12 @@ class Handover:
         return ""
 
     def take_back(self, reason: str, now: int) -> None:
-        """Let the drone fly by setpoints again, if the autopilot flies or is about to."""
+        """Let the drone fly by setpoints again, if the autopilot flies or is about to.
+
+        Args:
+            reason: Why, as the alert says it.
+            now: Mission clock, nanoseconds.
+        """
         if not self._stops:
             return
         if mode := self._mode():
@@ -222,9 +247,15 @@ class Handover:
         self.flies = self._hovers = False
 
     def step(self, stops: Sequence[QueuedWaypoint], state: VehicleState, now: int) -> bool:
-        """Take note of how far it is, with `stops` as they are queued; whether the autopilot flies.
+        """Follow how far the hand-over is; a plan that has changed on the way is taken back.
 
-        A plan that has changed on the way is taken back.
+        Args:
+            stops: The stops as they are queued.
+            state: The vehicle's state.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            Whether the autopilot flies.
         """
         mode = self._mode()
         if not self._stops or mode is None:
@@ -261,9 +292,14 @@ class Handover:
             self.take_back("it has left its mission mode", now)
 
     def follow(self, state: VehicleState, now: int, elapsed: float) -> list[QueuedWaypoint]:
-        """The stops that were reached since the last turn, `elapsed` seconds ago, in order.
+        """The stops that were reached since the last turn, in order.
 
         Takes back what is not flown as it should be.
+
+        Args:
+            state: The vehicle's state; one without a position reaches nothing.
+            now: Mission clock, nanoseconds.
+            elapsed: Time since the last turn, seconds.
         """
         mode = self._mode()
         if mode is None or not self.flies or not has_position(state):

@@ -33,9 +33,13 @@ _J2000 = 946_728_000.0
 def sun_elevation(latitude: float, longitude: float, clock: float) -> float:
     """Degrees of the sun above the horizon, without refraction.
 
-    `latitude` and `longitude` are degrees, `clock` seconds since the Unix epoch. Accurate to 0.02
-    degrees between 1950 and 2050: the low-precision formulas of the Astronomical Almanac (US Naval
-    Observatory, "Computing approximate solar coordinates").
+    Accurate to 0.02 degrees between 1950 and 2050: the low-precision formulas of the Astronomical
+    Almanac (US Naval Observatory, "Computing approximate solar coordinates").
+
+    Args:
+        latitude: Degrees, north positive.
+        longitude: Degrees, east positive.
+        clock: Seconds since the Unix epoch.
     """
     days = (clock - _J2000) / _DAY
     anomaly = math.radians(357.529 + 0.98560028 * days)

@@ -106,7 +106,13 @@ class Geofence:
         return np.array([east, north, up])
 
     def nearest_within(self, position: Vector, centre: Vector, reach: float) -> Vector | None:
-        """As `nearest_allowed`, at most `reach` metres from `centre`; None if there is none."""
+        """As `nearest_allowed`, within a distance of `centre`; None if there is none.
+
+        Args:
+            position: The place sought, ENU metres.
+            centre: Centre of the sphere, ENU metres.
+            reach: Its radius, metres.
+        """
         nearest = self.nearest_allowed(position)
         rounding = 1e-9
         if length(nearest - centre) <= reach + rounding:
@@ -130,7 +136,15 @@ class Geofence:
     def edges_near(
         self, position: Vector, reach: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Edges within `reach` metres: unit vectors towards them (N, 2) and distances (N,)."""
+        """Edges of the fence near `position`.
+
+        Args:
+            position: ENU metres, of which the height does not count.
+            reach: Distance within which edges are returned, metres.
+
+        Returns:
+            Unit vectors towards them (N, 2), and distances (N,) in metres.
+        """
         point = np.asarray(position[:2])
         share = np.einsum("ij,ij->i", point - self._starts, self._along) / self._squared
         within = np.minimum(np.maximum(share, 0.0), 1.0)

@@ -54,9 +54,16 @@ class GroundClearance:
         takeoff: Vector,
         sea_level: float | None,
     ) -> GroundClearance | None:
-        """That of a drone which stands at `takeoff` (ENU metres); None without a terrain.
+        """That of a drone which stands at `takeoff`; None without a terrain.
 
-        Raises ConfigError as `Ground.of`.
+        Args:
+            environment: Home and terrain.
+            limits: Of the drone; `max_range` bounds the ground that is read.
+            takeoff: Where the drone stands, ENU metres.
+            sea_level: Height of the local frame's zero above the sea, metres; None if not known.
+
+        Raises:
+            ConfigError: As `Ground.of`.
         """
         home, terrain = environment.home, environment.terrain
         if home is None or terrain is None:
@@ -66,7 +73,12 @@ class GroundClearance:
         return cls(ground, terrain.clearance, limits)
 
     def needed(self, east: float, north: float) -> float:
-        """The lowest height to fly at over a place, local metres; NaN over unknown ground."""
+        """The lowest height to fly at over a place, metres; NaN over unknown ground.
+
+        Args:
+            east: Metres in the local frame.
+            north: Metres in the local frame.
+        """
         return self.ground.height(east, north) + self.clearance
 
     def raised(self, target: Vector) -> Vector:
@@ -84,7 +96,13 @@ class GroundClearance:
         return f"{above:.1f} m above the ground is less than terrain.clearance {self.clearance:g} m"
 
     def view(self, position: Vector, velocity: Vector, asked: Vector) -> GroundView:
-        """Look at the ground around `position`, at the measured and the `asked` velocity."""
+        """Look at the ground around `position`.
+
+        Args:
+            position: Where the drone is, ENU metres.
+            velocity: As measured, ENU m/s.
+            asked: As requested, ENU m/s.
+        """
         rays = _rays(velocity, asked)
         east = position[0] + rays[:, :1] * self._distances
         north = position[1] + rays[:, 1:] * self._distances
@@ -152,7 +170,12 @@ class GroundView:
 
 
 def climb_speed(missing: float, limits: LimitsConfig) -> float:
-    """Speed at which a drone climbs that flies `missing` metres too low, m/s."""
+    """Speed at which a drone climbs that flies too low, m/s.
+
+    Args:
+        missing: Height that it lacks, metres.
+        limits: Climb speed, acceleration and reaction time of the drone.
+    """
     speed = braking_speed(missing + _ABOVE, limits.max_acceleration, limits.reaction_time)
     return min(limits.max_climb, speed)
 

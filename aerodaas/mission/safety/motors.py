@@ -89,7 +89,12 @@ class MotorWatch:
         """Time (ns) and sink rate in m/s, newest last."""
 
     def observe(self, state: VehicleState, now: int) -> Motors:
-        """Classify `state`, read at `now` (mission clock, nanoseconds)."""
+        """Classify `state`.
+
+        Args:
+            state: The vehicle's state.
+            now: Mission clock at which it was read, nanoseconds.
+        """
         if state.mode is VehicleMode.LOST:
             self._unheard = True
         elif self._state is not Motors.IDLE and _stands(state) and state.ended is not None:
@@ -103,10 +108,13 @@ class MotorWatch:
     def judge(
         self, state: VehicleState, now: int, *, leaving: str | None, obeyed: bool
     ) -> MotorsOffRule | None:
-        """Consequence of `state`, read at `now` (ns); None while the motors run.
+        """Consequence of `state`; None while the motors run.
 
-        `leaving` is the reason for which it returns or lands, None if it does not. `obeyed` is
-        False for a recorded vehicle.
+        Args:
+            state: The vehicle's state.
+            now: Mission clock at which it was read, nanoseconds.
+            leaving: Reason for which the drone returns or lands; None if it does not.
+            obeyed: Whether the vehicle follows commands; False for a recorded one.
         """
         motors = self.observe(state, now)
         if motors is Motors.RUNNING:

@@ -68,7 +68,12 @@ class Neighbours:
         drones of one node ask at one moment."""
 
     def update(self, name: str, where: Whereabouts | None) -> None:
-        """Take what the drone `name` tells; None, a place unknown to it, leaves the last."""
+        """Take what the drone `name` tells; None, a place unknown to it, leaves the last.
+
+        Args:
+            name: Id of the drone.
+            where: What it tells; None, a place unknown to it, leaves the last.
+        """
         if where is not None:
             self._known[name] = where
 
@@ -77,10 +82,15 @@ class Neighbours:
         return {name: self._known[name] for name in names if name in self._known}
 
     def around(self, name: str, now: int, separation: float) -> list[Neighbour]:
-        """All but the drone `name`, which keeps `separation` metres, where they are by now.
+        """All drones but `name`, where they are by now.
 
         Each is where its velocity has taken it since it told. After `SILENT` seconds that is a
         guess: it is kept away from like an aircraft that flies on and does not give way.
+
+        Args:
+            name: Id of the drone that keeps away.
+            now: Mission clock, nanoseconds.
+            separation: Distance that it keeps, metres; 0 returns none.
         """
         if separation <= 0.0:
             return []
@@ -101,7 +111,12 @@ class Neighbours:
         return neighbour
 
     def newly_silent(self, now: int, own: Collection[str]) -> list[str]:
-        """Drones other than our `own` that have told nothing for `SILENT` s; each silence once."""
+        """Drones other than our `own` that have told nothing for `SILENT` s; each silence once.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            own: Ids of the drones that are not reported.
+        """
         silent = {
             name
             for name, where in self._known.items()

@@ -49,7 +49,12 @@ class Reconciler:
         self._status = status
 
     def observe_gps(self, fix: GpsFix, odometry: Odometry) -> None:
-        """Compare the displacements of GPS and odometry since the first fix."""
+        """Compare the displacements of GPS and odometry since the first fix.
+
+        Args:
+            fix: Latitude and longitude in degrees, altitude in metres.
+            odometry: Where the vehicle believes to be at that time.
+        """
         if self._pinned is None:
             origin = GeodeticOrigin(fix.latitude, fix.longitude, fix.altitude)
             self._pinned = origin, odometry.position.copy()
@@ -59,7 +64,12 @@ class Reconciler:
         self._gps_error = float(np.linalg.norm(moved[:2] - (odometry.position - start)[:2]))
 
     def observe_odometry(self, odometry: Odometry, now: int) -> dict[str, str]:
-        """Return the contradictions that have lasted at `now` (ns): a sentence by kind."""
+        """Return the contradictions that have lasted: a sentence by kind.
+
+        Args:
+            odometry: The vehicle's odometry.
+            now: Mission clock, nanoseconds.
+        """
         if self._ground is None:
             self._ground = odometry.height
         found = {

@@ -87,10 +87,16 @@ class SetpointFilter:
         *,
         below: float | None = None,
     ) -> FilteredSetpoint:
-        """Make `setpoint` safe to follow for `duration` seconds from the drone's odometry.
+        """Make `setpoint` safe to follow for `duration` from the drone's odometry.
 
-        `below` are metres down to what a rangefinder sees there, None where it sees nothing.
         A setpoint with a number that is not finite becomes standing still (`not_finite`).
+
+        Args:
+            setpoint: As requested.
+            odometry: Where the drone is and how it moves.
+            duration: Seconds.
+            neighbours: The other drones and aircraft to keep away from.
+            below: Metres down to what a rangefinder sees there; None where it sees nothing.
         """
         if not _finite(setpoint):
             self._last = np.zeros(3)
@@ -122,7 +128,15 @@ class SetpointFilter:
     ) -> tuple[str, ...]:
         """Boundaries before which a drone that flies on as it does may not stop in time.
 
-        It is for a drone that follows no setpoints; empty if all is well.
+        It is for a drone that follows no setpoints.
+
+        Args:
+            odometry: Where the drone is and how it moves.
+            neighbours: The other drones and aircraft to keep away from.
+            below: Metres down to what a rangefinder sees there; None where it sees nothing.
+
+        Returns:
+            Their names; empty if all is well.
         """
         self.forget()
         onwards = VelocitySetpoint(odometry.velocity, evasive=True)

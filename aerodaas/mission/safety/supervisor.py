@@ -106,7 +106,12 @@ class Supervisor:
         self._assessed_at: int | None = None
 
     def assess(self, state: VehicleState, now: int) -> Assessment:
-        """Assess `state`, read at `now` (mission clock, nanoseconds)."""
+        """Assess `state`.
+
+        Args:
+            state: The vehicle's state.
+            now: Mission clock at which it was read, nanoseconds.
+        """
         lost, located = self._is_lost(state, now), has_position(state)
         checks = (
             self._mode(state),
@@ -293,7 +298,12 @@ class Supervisor:
 
 
 def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:
-    """Why the battery's charge allows no take-off; empty if it does, or is not known."""
+    """Why the battery's charge allows no take-off; empty if it does, or is not known.
+
+    Args:
+        state: The vehicle's state, of which the battery counts.
+        limits: `battery_return` is the charge that take-off needs more than, 0 to 1.
+    """
     charge = state.battery.fraction
     if not math.isfinite(charge) or charge > limits.battery_return:
         return ""
@@ -304,7 +314,13 @@ def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:
 
 
 def place_objections(state: VehicleState, limits: LimitsConfig, fence: Geofence) -> list[str]:
-    """Why nothing may take off where the drone stands; empty if it may."""
+    """Why nothing may take off where the drone stands; empty if it may.
+
+    Args:
+        state: The vehicle's state, of which the position counts.
+        limits: `takeoff_height` is to lie within the fence's heights.
+        fence: The drone's geofence.
+    """
     if not has_position(state):
         return ["the vehicle does not know its position"]
     reasons, position = list[str](), state.odometry.position

@@ -72,7 +72,12 @@ class TrafficWatch:
         """When each aircraft was last too near (mission clock, ns), and what was said of it."""
 
     def assess(self, state: VehicleState, now: int) -> list[Fault]:
-        """A fault for each aircraft that is too near to `state`, or was until a moment ago."""
+        """A fault for each aircraft that is too near to `state`, or was until a moment ago.
+
+        Args:
+            state: The vehicle's state with the traffic that it sees.
+            now: Mission clock, nanoseconds.
+        """
         demand = DEMANDS.get(self._config.action, FailsafeAction.NOTHING)
         known = [one for one in state.traffic if one.address in self._near]
         for one in (
@@ -92,7 +97,13 @@ class TrafficWatch:
 def encounters(
     state: VehicleState, traffic: Sequence[Traffic], config: TrafficConfig
 ) -> list[Encounter]:
-    """Aircraft that are too near to the vehicle, or will be within the time looked ahead."""
+    """Aircraft that are too near to the vehicle, or will be within the time looked ahead.
+
+    Args:
+        state: The vehicle's state; none without a finite position and velocity.
+        traffic: The aircraft to compare with.
+        config: Distance, height and time looked ahead; none for the action `ignore`.
+    """
     odometry = state.odometry
     known = is_finite(odometry.position) and is_finite(odometry.velocity)
     if config.action == "ignore" or not known:
@@ -109,8 +120,12 @@ def encounters(
 def meets_in(way: Vector, closing: Vector, config: TrafficConfig) -> float | None:
     """Seconds until an aircraft is within distance and height; 0 if it is, None if it will not be.
 
-    It is `way` from the drone (ENU metres, `up` NaN where that is not known) and moves against it
-    by `closing` (ENU m/s), both straight on. Exactly at distance and height is within.
+    Both fly straight on. Exactly at distance and height is within.
+
+    Args:
+        way: From the drone to the aircraft, ENU metres; `up` is NaN where it is not known.
+        closing: Velocity of the aircraft against the drone, ENU m/s.
+        config: Distance and height in metres, and seconds looked ahead.
     """
     level = _within(way[:2], closing[:2], config.distance)
     upright = (-math.inf, math.inf)
@@ -139,7 +154,12 @@ def _within(way: Vector, closing: Vector, reach: float) -> tuple[float, float]:
 
 
 def traffic_neighbours(state: VehicleState, config: TrafficConfig) -> list[Neighbour]:
-    """The aircraft to keep away from, where the drone does more than tell of them."""
+    """The aircraft to keep away from, where the drone does more than tell of them.
+
+    Args:
+        state: The vehicle's state with the traffic that it sees.
+        config: Distance and height to keep, metres; an action that only tells returns none.
+    """
     if config.action not in DEMANDS:
         return []
     apart = config.distance, config.height
