@@ -13,9 +13,16 @@ __all__ = ["run_file"]
 
 
 def run_file(application: Path, words: list[str], options: RunOptions) -> None:
-    """Run the file as `__main__`, with the arguments `words` and its folder on the path.
+    """Run the file as `__main__`, with its folder on the path.
 
-    Raises the application's own exceptions, and GraphError if it starts no environment of its own.
+    Args:
+        application: Path of the Python file.
+        words: Arguments that follow it in `sys.argv`.
+        options: Options of the run, current for all that the file starts.
+
+    Raises:
+        GraphError: If it starts no environment of its own.
+        Exception: The application's own.
     """
     current_options.set(options)
     sys.argv = [str(application), *words]

@@ -403,7 +403,15 @@ class Environment(PaperNames, IEnvironment):
             )
 
     def command(self, robot: str, command: Command) -> None:
-        """Send a flying robot a command; raises MissionError if it does not fly or refuses."""
+        """Send a flying robot a command.
+
+        Args:
+            robot: Id of the robot.
+            command: The command, carried out as a whole.
+
+        Raises:
+            MissionError: If the robot does not fly or refuses.
+        """
         mission = self._mission
         if mission is None or robot not in {one.robot for one in self.graph.navigation}:
             raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")

@@ -23,7 +23,19 @@ def shared_waypoints(
     objective: Literal["energy", "time"],
     budget: float,
 ) -> dict[str, list[Waypoint]]:
-    """Tours for the robots of `config`, by id, as `Environment.share_out` describes them."""
+    """Tours for the robots of `config`, by id, as `Environment.share_out` describes them.
+
+    Args:
+        config: Environment, whose robots start where it places them.
+        waypoints: Local or global waypoints.
+        objective: `energy` for the least of all robots together, `time` for the earliest last
+            return.
+        budget: Seconds to search for.
+
+    Raises:
+        InvalidWaypointError: For a relative waypoint, or a global one without a `home`.
+        SchedulerError: Without PyVRP (on Python 3.10).
+    """
     for waypoint in waypoints:
         if waypoint.waypoint_type is WaypointType.RELATIVE:
             raise InvalidWaypointError(

@@ -35,7 +35,18 @@ class MissionRun(Protocol):
         ...
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Send a robot's mission a command; raises MissionError once the run is over."""
+        """Send a robot's mission a command.
+
+        Args:
+            robot: Id of the robot.
+            command: The command, carried out as a whole.
+
+        Returns:
+            The robot's answer.
+
+        Raises:
+            MissionError: Once the run is over.
+        """
         ...
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
@@ -48,7 +59,16 @@ class MissionRun(Protocol):
 
 
 def recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
-    """Path of the recording of an environment's flight `number`; None if it is not recorded."""
+    """Path of the recording of one flight of an environment.
+
+    Args:
+        options: Options of the run, whose `record` goes before the environment's path.
+        config: Environment that flies.
+        number: Number of its flight, from 1; a later flight's number ends the file's name.
+
+    Returns:
+        The path, or None if the flight is not recorded.
+    """
     if not config.recording.enabled:
         return None
     wanted = options.record or (Path(config.recording.path) if config.recording.path else None)

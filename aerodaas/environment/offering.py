@@ -141,7 +141,12 @@ class BuildOnlyMission(MissionRun):
         raise BuildEndedError
 
     def command(self, robot: str, command: Command) -> NoReturn:
-        """Refuse a command."""
+        """Refuse a command.
+
+        Args:
+            robot: Ignored.
+            command: Ignored.
+        """
         del robot, command
         self.refuse()
 

@@ -145,10 +145,17 @@ class Robot(PaperNames, IRobot):
     ) -> None:
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
-        With `wait=False`, return as soon as it flies. While the mission flies, this waits for it;
-        after its end, it flies again: the navigation given to `navigate` since, or else the same.
-        `speed` is that of `Environment.start_mission`. Raises the project's errors; whatever
-        happens, the drone is landed and the recording closed first.
+        While the mission flies, this waits for it; after its end, it flies again: the navigation
+        given to `navigate` since, or else the same.
+
+        Args:
+            hook: Called before the flight, after the hooks of all robots' `on_start`.
+            wait: Return when the mission has ended; if False, as soon as it flies.
+            speed: Mission seconds per wall second, or `"max"`, as for `Environment.start_mission`.
+
+        Raises:
+            AeroDaaSError: What the mission ended with; the drone is landed and the recording is
+                closed first.
         """
         self._environment.start_mission(hook, wait=wait, speed=speed)
 
@@ -183,9 +190,16 @@ class Robot(PaperNames, IRobot):
     def actuate(self, actuator: str, position: str) -> None:
         """Have an actuator of the environment file take a position now, wherever the drone is.
 
-        It returns once the mission has taken the command; a failure is an alert of the kind
-        `actuator`. Raises GraphError for an unknown actuator or position, and MissionError if the
-        robot does not fly or refuses.
+        It returns once the mission has accepted the command; a failure is an alert of the kind
+        `actuator`.
+
+        Args:
+            actuator: Id of an actuator of the environment file.
+            position: One of its positions.
+
+        Raises:
+            GraphError: For an unknown actuator or position.
+            MissionError: If the robot does not fly or refuses.
         """
         wanted = {actuator: position}
         if text := actuator_objection(self.config.actuators, wanted, by_waypoint=False):

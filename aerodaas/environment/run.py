@@ -267,9 +267,18 @@ class Run:
             server.close()
 
     def console(self, address: str, *, viewer: bool) -> str:
-        """Serve the console from now on, unless it is served already; returns its address.
+        """Serve the console from now on, unless it is served already.
 
-        Raises MissionError once the run is over, ConfigError for what cannot be listened on.
+        Args:
+            address: Host and port to listen on; ignored if the console is served already.
+            viewer: Return the address of those who may watch but not command.
+
+        Returns:
+            The address of its page.
+
+        Raises:
+            MissionError: Once the run is over.
+            ConfigError: For what cannot be listened on.
         """
         self._flying("there is nothing to be watched")
         require_extra("remote", "the console")
@@ -289,12 +298,28 @@ class Run:
             self._flight.end_sensing()
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert of this process; nothing once the run is over."""
+        """Publish an alert of this process; nothing once the run is over.
+
+        Args:
+            kind: Kind of the alert.
+            text: Its text.
+        """
         if self._flight is not None and not self._finished.is_set():
             self._flight.publish_alert(kind, text)
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Send a robot's mission a command; raises MissionError once the run is over."""
+        """Send a robot's mission a command.
+
+        Args:
+            robot: Id of the robot.
+            command: The command, carried out as a whole.
+
+        Returns:
+            The robot's answer.
+
+        Raises:
+            MissionError: Once the run is over.
+        """
         if self._flight is None or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)

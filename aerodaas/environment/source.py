@@ -42,7 +42,16 @@ class EnvironmentSource:
     ) -> EnvironmentSource:
         """Find what an application's `path` means under the run's `options`.
 
-        Raises ConfigError for a file that is missing or malformed, and the errors of a provider.
+        Args:
+            path: Environment file, or a provider's address.
+            overrides: Settings by dotted path that replace the file's; those of `options` go before
+                them.
+            token: Token for a provider's address; None for the stored one.
+            options: Options of the run.
+
+        Raises:
+            ConfigError: For a file that is missing or malformed, and for a token with a file.
+            AeroDaaSError: The errors of a provider.
         """
         url = _url(path, options)
         if url is not None:

@@ -60,7 +60,13 @@ def write_mission(environment: Environment, name: str, *, here: bool = False) ->
 def compile_mission(environment: Environment, name: str, *, here: bool = False) -> WrittenMission:
     """The graph of an application as a document, with the models that it names.
 
-    It takes the arguments of `write_mission`, and raises what that raises.
+    Args:
+        environment: The application's, ready to start.
+        name: Name of the application.
+        here: Whether the user's side is there in flight, as for `write_mission`.
+
+    Raises:
+        GraphError: For what no document can hold, by name and with the remedy.
     """
     compiler = _Compiler(environment, here=here)
     return WrittenMission(compiler.document(name), compiler.models)

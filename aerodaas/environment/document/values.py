@@ -77,7 +77,16 @@ class ValueWriter:
     def settings(
         self, given: Mapping[str, Any], bound: Mapping[str, ResourceUse], owner: str
     ) -> dict[str, Any]:
-        """The arguments of a constructor; raises GraphError for one that is no data."""
+        """The arguments of a constructor as data.
+
+        Args:
+            given: Arguments by name.
+            bound: Resources of the environment that arguments name, by the argument's name.
+            owner: Name of the class, for errors.
+
+        Raises:
+            GraphError: For an argument that is no data.
+        """
         return {
             name: self._resource(value, bound[name], f"{owner}({name}=…)")
             if name in bound and value is not None
@@ -86,7 +95,15 @@ class ValueWriter:
         }
 
     def value(self, value: object, place: str) -> Any:  # noqa: ANN401 - any JSON
-        """Any value; raises GraphError, with its `place`, for one that is no data."""
+        """Any value as data; tuples become lists, and references objects.
+
+        Args:
+            value: Argument, or a part of one.
+            place: Where it stands, for errors.
+
+        Raises:
+            GraphError: With its `place`, for a value that is no data.
+        """
         if value is self._environment.env_data:
             raise GraphError(
                 f"{place}: no document holds the environment's data, which may be secret; an "
@@ -168,7 +185,15 @@ class ValueReader:
         """SHA-256 of the models that were read so far."""
 
     def analysis(self, name: str, settings: Mapping[str, Any]) -> Analytics[Any]:
-        """Make a registered analysis; raises GraphError for a setting that it does not take."""
+        """Make a registered analysis.
+
+        Args:
+            name: Its registered name.
+            settings: Arguments of its constructor by name, as the document has them.
+
+        Raises:
+            GraphError: For a setting that it does not take, and if the name is that of no analysis.
+        """
         kind = load_plugin("analytics", name)
         made = self.made(kind, settings, name)
         if not isinstance(made, Analytics):
@@ -176,7 +201,16 @@ class ValueReader:
         return made
 
     def made(self, kind: Any, settings: Mapping[str, Any], owner: str) -> Any:  # noqa: ANN401 - any class
-        """An instance of `kind`; raises GraphError for settings that it does not take."""
+        """An instance of `kind`.
+
+        Args:
+            kind: Class, with the `resources` of its arguments if it has any.
+            settings: Arguments of its constructor by name, as the document has them.
+            owner: Name of the class, for errors.
+
+        Raises:
+            GraphError: For settings that it does not take.
+        """
         bound: Mapping[str, ResourceUse] = getattr(kind, "resources", {})
         found = {
             name: self._resource(value, bound[name], f"{owner}.{name}")
@@ -192,7 +226,15 @@ class ValueReader:
             raise GraphError(f"{owner} does not take these settings: {error}"[:300]) from None
 
     def value(self, content: Any, place: str) -> Any:  # noqa: ANN401 - any value
-        """Any value; raises GraphError, with its `place`, for one of an unknown kind."""
+        """Any value from its data; lists become tuples.
+
+        Args:
+            content: Data of the document.
+            place: Where it stands, for errors.
+
+        Raises:
+            GraphError: With its `place`, for a value of an unknown kind.
+        """
         if isinstance(content, list):
             return tuple(self.value(one, place) for one in content)
         if not isinstance(content, dict):
@@ -264,7 +306,15 @@ def _is_plain(name: str) -> bool:
 def registered_name(
     kind: Literal["analytics", "trajectory_schedulers"], wanted: type
 ) -> str | None:
-    """Name by which the class `wanted` is registered; None if it is not."""
+    """Name by which a class is registered.
+
+    Args:
+        kind: Kind of plug-in.
+        wanted: The class.
+
+    Returns:
+        The name, or None if the class is not registered.
+    """
     names = plugin_names(kind)
     first = [wanted.__name__] if wanted.__name__ in names else names
     return next((name for name in first if load_plugin(kind, name) is wanted), None)

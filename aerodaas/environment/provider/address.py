@@ -35,8 +35,12 @@ class ServiceAddress:
     def parse(cls, url: str, *, insecure: bool = False) -> ServiceAddress:
         """Read an address such as `https://provider.example/fields/campus`.
 
-        Raises ConfigError for any other form, and for http to another machine unless `insecure`:
-        the token and the pictures would travel in clear.
+        Args:
+            url: The address; https, or http to this machine.
+            insecure: Allow http to another machine, which shows token and pictures on the way.
+
+        Raises:
+            ConfigError: For any other form, and for http to another machine unless `insecure`.
         """
         try:
             parts = urlsplit(url)

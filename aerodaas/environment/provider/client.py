@@ -118,7 +118,12 @@ class ProviderClient:
         return self._ask(LeaseOut, "GET", f"/v1/leases/{_part(lease)}")
 
     def extend_lease(self, lease: str, minutes: float) -> LeaseOut:
-        """Have a lease end `minutes` later."""
+        """Extend a lease.
+
+        Args:
+            lease: Id of the lease.
+            minutes: Minutes by which it ends later.
+        """
         path = f"/v1/leases/{_part(lease)}/extend"
         return self._ask(LeaseOut, "POST", path, {"minutes": minutes})
 
@@ -178,12 +183,23 @@ class ProviderClient:
         return self._ask(MissionOut, "DELETE", f"/v1/missions/{_part(mission)}")
 
     def grant(self, mission: str, tenant: str, sensors: Sequence[str] = ()) -> MissionOut:
-        """Let a tenant attach missions to a mission's cameras; to all of them without a name."""
+        """Let a tenant attach missions to a mission's cameras.
+
+        Args:
+            mission: Id of the mission.
+            tenant: Name of the tenant.
+            sensors: Cameras by full id; none for all of the mission's.
+        """
         path = f"/v1/missions/{_part(mission)}/grants/{_part(tenant)}"
         return self._ask(MissionOut, "PUT", path, GrantIn(sensors=list(sensors)))
 
     def withdraw(self, mission: str, tenant: str) -> MissionOut:
-        """Withdraw what a tenant was granted; what it has attached ends."""
+        """Withdraw what a tenant was granted; what it has attached ends.
+
+        Args:
+            mission: Id of the mission.
+            tenant: Name of the tenant.
+        """
         path = f"/v1/missions/{_part(mission)}/grants/{_part(tenant)}"
         return self._ask(MissionOut, "DELETE", path)
 
@@ -192,25 +208,62 @@ class ProviderClient:
         return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/approve")
 
     def command(self, mission: str, command: CommandIn) -> Answer:
-        """Give a robot of a flying mission a command; the answer is its own."""
+        """Give a robot of a flying mission a command.
+
+        Args:
+            mission: Id of the mission.
+            command: The robot and the command's word.
+
+        Returns:
+            The robot's own answer.
+        """
         path = f"/v1/missions/{_part(mission)}/commands"
         return self._ask(Answer, "POST", path, command)
 
     def add_navigation(self, mission: str, navigation: NavigationIn) -> Answer:
-        """Add waypoints to the queue of a robot, or take its place; the answer is its own."""
+        """Add waypoints to the queue of a robot, or replace the queue.
+
+        Args:
+            mission: Id of the mission, which flies.
+            navigation: The robot, its waypoints and their place in the queue.
+
+        Returns:
+            The robot's own answer.
+        """
         path = f"/v1/missions/{_part(mission)}/navigation"
         return self._ask(Answer, "POST", path, navigation)
 
     def rearrange(self, mission: str, change: RearrangeIn) -> Answer:
-        """Change the order of a robot's coming waypoints, or remove some, as a whole."""
+        """Change the order of a robot's coming waypoints, or remove some, as a whole.
+
+        Args:
+            mission: Id of the mission, which flies.
+            change: The robot, the waypoints that change places, and those that are removed.
+
+        Returns:
+            The robot's own answer.
+        """
         return self._ask(Answer, "POST", f"/v1/missions/{_part(mission)}/plan", change)
 
     def actuate(self, mission: str, wanted: ActuateIn) -> Answer:
-        """Move an actuator of a robot; the answer is its own."""
+        """Move an actuator of a robot.
+
+        Args:
+            mission: Id of the mission, which flies.
+            wanted: The robot, the actuator and its new position.
+
+        Returns:
+            The robot's own answer.
+        """
         return self._ask(Answer, "POST", f"/v1/missions/{_part(mission)}/actuators", wanted)
 
     def plan_survey(self, mission: str, wanted: SurveyIn) -> SurveyOut:
-        """Plan the survey of an area; `add_navigation` with its waypoints flies it."""
+        """Plan the survey of an area; `add_navigation` with its waypoints flies it.
+
+        Args:
+            mission: Id of the mission.
+            wanted: The area in metres east and north, and how to fly it.
+        """
         return self._ask(SurveyOut, "POST", f"/v1/missions/{_part(mission)}/survey", wanted)
 
     def recording(
@@ -221,8 +274,13 @@ class ProviderClient:
     ) -> None:
         """Fetch the recording of a mission that is over into the file `target`.
 
-        `progress` is called with the bytes that are there, and all of them if that is known.
-        Raises OSError if the file cannot be written.
+        Args:
+            mission: Id of the mission.
+            target: The file, which is replaced.
+            progress: Called with the bytes that are there, and all of them if that is known.
+
+        Raises:
+            OSError: If the file cannot be written.
         """
         self._exchange.download(f"/v1/missions/{_part(mission)}/recording", target, progress)
 
@@ -231,7 +289,15 @@ class ProviderClient:
         self._exchange.send("DELETE", f"/v1/missions/{_part(mission)}/recording")
 
     def rehearsal_picture(self, mission: str, target: Path) -> None:
-        """Fetch the picture of a rehearsed flight, a PNG; raises OSError as `recording`."""
+        """Fetch the picture of a rehearsed flight, a PNG.
+
+        Args:
+            mission: Id of the mission.
+            target: The file, which is replaced.
+
+        Raises:
+            OSError: If the file cannot be written.
+        """
         path = f"/v1/missions/{_part(mission)}/rehearsal.png"
         self._exchange.download(path, target, _nothing)
 
@@ -242,9 +308,17 @@ class ProviderClient:
         *streams: str,
         pictures: PictureForm = PictureForm.WHOLE,
     ) -> LiveConnection:
-        """Connect to a mission's state, `rate` times a second at most, and items of `streams`.
+        """Connect to a mission's state and to items of its streams.
 
-        Raises SourceError if there is no connection, else what `mission` raises.
+        Args:
+            mission: Id of the mission.
+            rate: States per second at most.
+            *streams: Names of the streams whose items are sent.
+            pictures: Form in which pictures are sent.
+
+        Raises:
+            SourceError: If there is no connection.
+            AeroDaaSError: What `mission` raises.
         """
         query = urlencode(
             {"rate": f"{rate:g}", "streams": ",".join(streams), "pictures": pictures.value}
@@ -276,7 +350,14 @@ class ProviderClient:
         scopes: list[Scope] | None = None,
         disabled: bool | None = None,
     ) -> AccountOut:
-        """Change an account, as an administrator; None keeps what is."""
+        """Change an account, as an administrator.
+
+        Args:
+            name: Name of the account.
+            role: New role; None keeps it.
+            scopes: New scopes; None keeps them.
+            disabled: Whether the account is disabled; None keeps it.
+        """
         content = {"role": role, "scopes": scopes, "disabled": disabled}
         return self._ask(AccountOut, "PATCH", f"/v1/accounts/{_part(name)}", content)
 
@@ -285,7 +366,12 @@ class ProviderClient:
         return self._ask(list[TenantOut], "GET", "/v1/tenants")
 
     def change_tenant(self, name: str, change: TenantChange) -> TenantOut:
-        """Change what a tenant may use, as an administrator; what is not given stays."""
+        """Change what a tenant may use, as an administrator.
+
+        Args:
+            name: Name of the tenant.
+            change: New limits; a field that is not set stays as it is.
+        """
         content = change.model_dump(mode="json", exclude_unset=True)
         return self._ask(TenantOut, "PATCH", f"/v1/tenants/{_part(name)}", content)
 

@@ -28,8 +28,16 @@ __all__ = ["send_command"]
 def send_command(client: ProviderClient, mission: str, robot: str, command: Command) -> Answer:
     """Send a command over the wire and return the drone's answer.
 
-    Raises GraphError for one that cannot be given from afar, InvalidWaypointError for waypoints
-    that the wire cannot hold, and the client's errors.
+    Args:
+        client: Client of the provider.
+        mission: Id of the mission.
+        robot: Id of the robot.
+        command: The command.
+
+    Raises:
+        GraphError: For a command that cannot be given from afar.
+        InvalidWaypointError: For waypoints that the wire cannot hold.
+        AeroDaaSError: The client's errors.
     """
     if isinstance(command, AddNavigation):
         if command.navigation:

@@ -61,7 +61,16 @@ class ProviderConnection:
         content: Any = None,  # noqa: ANN401 - JSON
         headers: Mapping[str, str] | None = None,
     ) -> Any:  # noqa: ANN401 - JSON
-        """Send a request with JSON, and return the JSON of its answer, its texts printable.
+        """Send a request with JSON.
+
+        Args:
+            method: HTTP method.
+            path: Path of the resource, with its query.
+            content: JSON of the request; None for none.
+            headers: Further headers, sent only with content.
+
+        Returns:
+            The JSON of the answer, its texts printable.
 
         Raises:
             ConfigError: With the service's text, for a request that it refuses as such.
@@ -86,10 +95,22 @@ class ProviderConnection:
         allowed: frozenset[int] = frozenset(),
         patience: float | None = None,
     ) -> tuple[int, bytes]:
-        """Send a request; returns status and content of a success, or of an `allowed` status.
+        """Send a request.
 
-        `patience` is in seconds, for an answer that takes longer than others. Raises what `ask`
-        raises.
+        Args:
+            method: HTTP method.
+            path: Path of the resource, with its query.
+            data: Body of the request; None for none.
+            headers: Further headers, sent only with a body.
+            allowed: Statuses that count as success, too.
+            patience: Seconds to wait for an answer that takes longer than others; None for the
+                usual time.
+
+        Returns:
+            Status and content of a success, or of an `allowed` status.
+
+        Raises:
+            AeroDaaSError: What `ask` raises.
         """
         own = self.headers | (dict(headers or {}) if data is not None else {})
         with self._asked(method, path, data, own, patience) as response:
@@ -145,7 +166,16 @@ class ProviderConnection:
         )
 
     def refusal(self, status: int, answer: bytes) -> AeroDaaSError:
-        """The error of a refusal, with the text of its answer."""
+        """The error of a refusal, with the text of its answer.
+
+        Args:
+            status: HTTP status of the answer.
+            answer: Content of the answer.
+
+        Returns:
+            UnreachableError for a gateway's status, ConfigError for a refused request, else
+            MissionError.
+        """
         text = _text(answer) or f"it answered with status {status}"
         if status in _GATEWAYS:
             return self.unreachable(ConnectionError(text))

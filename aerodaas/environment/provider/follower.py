@@ -74,9 +74,17 @@ class MissionFollower:
         return self._changes
 
     def await_change(self, seen: int, timeout: float) -> MissionOut:
-        """Return the newest state, once more than `seen` have arrived, or after `timeout` seconds.
+        """Wait for a state that is newer than those seen.
 
-        Raises ConfigError if the provider refuses to tell any more.
+        Args:
+            seen: Number of states that the caller has seen, a former value of `changes`.
+            timeout: Seconds to wait at most.
+
+        Returns:
+            The newest state, also after the timeout.
+
+        Raises:
+            ConfigError: If the provider refuses to tell any more.
         """
         with self._changed:
             self._changed.wait_for(

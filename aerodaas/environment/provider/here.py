@@ -82,6 +82,10 @@ class HereServer:
 
         Questions for one analysis are answered in turn; several threads may ask for several.
 
+        Args:
+            request: Question as JSON, with its `number`.
+            blob: Bytes of the item that come beside the JSON.
+
         Returns:
             The answer, which goes back as it is, and an empty blob. It has the result as JSON
             (`item`), the numbers of the conditions that it meets (`fired`) and `alerts`; or how

@@ -43,7 +43,15 @@ class Logins:
         return None if entry is None else str(entry["token"])
 
     def store(self, address: ServiceAddress, token: str) -> None:
-        """Store a token in the place of an earlier one; raises ConfigError if that fails."""
+        """Store a token in the place of an earlier one.
+
+        Args:
+            address: Address of the provider.
+            token: Token of the account.
+
+        Raises:
+            ConfigError: If the token cannot be stored.
+        """
         content = self._read()
         content.pop(address.base, None)
         self._write({**content, address.base: {"token": token}})
@@ -81,7 +89,12 @@ class Logins:
 def client_for(url: str, token: str | None = None) -> ProviderClient:
     """A client with the token that is given, or else found.
 
-    Raises ConfigError for a malformed address, and if there is no token.
+    Args:
+        url: Address of the provider.
+        token: Token of the account; None for the environment variable's, else the stored one.
+
+    Raises:
+        ConfigError: For a malformed address or token, and if there is no token.
     """
     insecure = os.environ.get(INSECURE_VARIABLE) == "1"
     address = ServiceAddress.parse(url, insecure=insecure)

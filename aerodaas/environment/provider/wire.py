@@ -37,10 +37,16 @@ class WireConnection:
 
     @classmethod
     def open(cls, exchange: ProviderConnection, path: str) -> Self:
-        """Connect.
+        """Connect by a WebSocket.
 
-        Raises ConfigError without the package for WebSockets, SourceError without a connection,
-        what the exchange raises for the status and text of a refusal.
+        Args:
+            exchange: Connection to the provider, with its address and headers.
+            path: Path of the resource, with its query.
+
+        Raises:
+            ConfigError: Without the package for WebSockets.
+            SourceError: Without a connection.
+            AeroDaaSError: The refusal, with its status and text.
         """
         require_extra("remote", "following a provider's mission")
         from websockets.exceptions import (  # noqa: PLC0415 - only to follow
@@ -84,7 +90,15 @@ class WireConnection:
         self._stack.close()
 
     def send(self, content: dict[str, Any], blob: bytes = b"") -> None:
-        """Send a message; raises SourceError if the connection is lost."""
+        """Send a message.
+
+        Args:
+            content: JSON of the message.
+            blob: Bytes that follow it; none if empty.
+
+        Raises:
+            SourceError: If the connection is lost.
+        """
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - only to follow
 
         try:
