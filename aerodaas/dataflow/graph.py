@@ -161,7 +161,12 @@ class Graph:
 
     @contextlib.contextmanager
     def calling(self, work: Any, stream: str | None) -> Iterator[None]:  # noqa: ANN401 - an analysis
-        """Record a call of the application; calls by an analysis within it are not its own."""
+        """Record a call of the application; calls by an analysis within it are not its own.
+
+        Args:
+            work: The analysis that is called.
+            stream: Name of the analysed stream; None for `instantiate`.
+        """
         outer, self._calling = self._calling, True
         try:
             yield
@@ -204,7 +209,15 @@ class Graph:
             raise
 
     def require_idle(self, node: Node, what: str) -> None:
-        """Raise GraphError, with the line, if `node` runs already, so that `what` is too late."""
+        """Require that a node does not run yet.
+
+        Args:
+            node: The node.
+            what: What is too late once it runs, for the error.
+
+        Raises:
+            GraphError: With the application's line, if it runs already.
+        """
         if self.flying and node.id in self.nodes:
             message = (
                 f"{node.id} runs already, too late to {what}; do that before analyse(), or with a "
@@ -213,7 +226,16 @@ class Graph:
             raise refusal(message)
 
     def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
-        """Draw an edge; raises GraphError for a wrong type, a foreign graph or a cycle."""
+        """Draw an edge.
+
+        Args:
+            source: Stream that is read.
+            target: Node that reads it.
+            accepts: Classes of items that the node takes.
+
+        Raises:
+            GraphError: For a wrong type, a foreign graph or a cycle.
+        """
         if source.graph is not self:
             message = f"{source.name} belongs to another Environment than {target.id}"
             raise refusal(message)

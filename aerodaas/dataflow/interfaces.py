@@ -121,7 +121,12 @@ class IAnalyse(IDeployable, Generic[O_co]):
         target: IAnalyse[Any] | Callable[[], None],
         when: Callable[[Any], bool] | None = None,
     ) -> Self:
-        """Wake another analysis, or command a robot, `when` a result says so."""
+        """Wake another analysis, or command a robot, when a result says so.
+
+        Args:
+            target: Another analysis, or a robot's method.
+            when: Condition on each result; None for every result that is not None.
+        """
 
 
 class IMonitoringAnalytics(IAnalyse[O_co]):
@@ -145,13 +150,26 @@ class INavigate(ABC):
         deadline: float | None = None,
         robot: IRobot | str | None = None,
     ) -> None:
-        """Add navigation to a robot's queue: at an index, with a priority, with a deadline."""
+        """Add navigation to a robot's queue.
+
+        Args:
+            data: Waypoints, or a stream of them.
+            index: Number of waypoints of the same priority to visit before these.
+            priority: Priority of the waypoints; None for their own.
+            deadline: Mission time in seconds for waypoints with no deadline, or a later one.
+            robot: Robot, or its id; None where only one flies.
+        """
 
     @abstractmethod
     def clear_navigation(
         self, *, on: AeroStreamData[Any] | None = None, robot: IRobot | str | None = None
     ) -> None:
-        """Empty a robot's queue: now, or when `on` first yields something."""
+        """Empty a robot's queue.
+
+        Args:
+            on: Stream whose first item empties it; None for now.
+            robot: Robot, or its id; None where only one flies.
+        """
 
 
 class INavigableAnalyse(IAnalyse["AeroNavigation"]):

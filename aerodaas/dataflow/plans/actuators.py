@@ -24,7 +24,15 @@ _RELAY = ("off", "on")
 
 
 def move_of(item: PlanItem, actuators: Sequence[ActuatorConfig]) -> tuple[str, str] | str:
-    """The actuator and position that one of `MOVES` means; or why there is none, in words."""
+    """The move of an actuator that an item of a plan means.
+
+    Args:
+        item: Item of one of the commands `MOVES`.
+        actuators: Those of the robot.
+
+    Returns:
+        Actuator and position; or why there is none, in words.
+    """
     number, value = item.values[0], item.values[1]
     for one in actuators:
         positions = _positions(one, item.command)
@@ -40,7 +48,17 @@ def move_of(item: PlanItem, actuators: Sequence[ActuatorConfig]) -> tuple[str, s
 def move_item(
     number: int, actuator: str, position: str, actuators: Sequence[ActuatorConfig]
 ) -> PlanItem:
-    """The item by which a plan moves an actuator; raises ConfigError for one that is not there."""
+    """The item by which a plan moves an actuator.
+
+    Args:
+        number: Number of the item in the plan.
+        actuator: Id of the actuator.
+        position: One of its positions.
+        actuators: Those of the robot.
+
+    Raises:
+        ConfigError: For an actuator or position that is not there.
+    """
     for one in actuators:
         for command in MOVES:
             positions = _positions(one, command)

@@ -24,6 +24,10 @@ def geofence_of(
     A circle becomes a polygon of 64 corners: within it where the drone stays in, around it where
     it stays out. Floor and ceiling, of which a plan has none, keep their defaults.
 
+    Args:
+        fence: Polygons and circles of the plan.
+        home: Origin of the local frame.
+
     Raises:
         ConfigError: If there is more than one area to stay within.
     """

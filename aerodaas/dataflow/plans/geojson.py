@@ -15,6 +15,10 @@ _WGS84 = ("CRS84", "EPSG::4326", "EPSG:4326")
 def parse_geojson(content: object, reader: AreaReader) -> None:
     """Hand the polygons of parsed GeoJSON to `reader`.
 
+    Args:
+        content: Parsed JSON.
+        reader: Receives the polygons with their names, and counts other shapes.
+
     Raises:
         ConfigError: If it is no GeoJSON, or in other coordinates than WGS84's.
     """

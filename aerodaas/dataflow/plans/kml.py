@@ -24,6 +24,10 @@ _WHOLE_DEGREES = re.compile(r"[+-]?\d{1,40},\d{1,40}")
 def parse_kml(text: str, reader: AreaReader) -> None:
     """Hand the polygons of a KML text to `reader`.
 
+    Args:
+        text: Content of the file.
+        reader: Receives the polygons with their names, and counts other shapes.
+
     Raises:
         ConfigError: If it is no KML, declares entities, or is nested too deep.
     """

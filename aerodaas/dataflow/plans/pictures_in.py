@@ -58,7 +58,12 @@ _NOT_HERE = "no waypoint comes before it"
 
 
 def same_place(waypoint: Waypoint, item: PlanItem) -> Waypoint:
-    """Another waypoint there, for what `item` says, with nothing of what is done at the first."""
+    """Another waypoint there, for what `item` says, with nothing of what is done at the first.
+
+    Args:
+        waypoint: Waypoint at the place.
+        item: Item of the plan, whose number is the new waypoint's id.
+    """
     return replace(
         waypoint,
         id=f"item{item.number}",
@@ -146,7 +151,15 @@ class PictureItems:
         }
 
     def add_item(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
-        """Take in an item of `commands`, behind `waypoints`; returns why it is not done, or ""."""
+        """Add an item of `commands` to the waypoint before it.
+
+        Args:
+            item: Item of the plan.
+            waypoints: Waypoints so far; the last ones are changed or added to.
+
+        Returns:
+            Why the item is not done, or an empty text.
+        """
         try:
             return self._does[item.command](item, waypoints)
         except (ConfigError, InvalidWaypointError) as error:

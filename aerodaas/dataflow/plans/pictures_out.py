@@ -40,7 +40,14 @@ class PictureWriter:
     def before(
         self, waypoint: Waypoint, frame: int, spot: tuple[float, float, float] | None
     ) -> Iterator[PlanItem]:
-        """Plan items on the way to `waypoint`; `spot` is the place to look at, in its `frame`."""
+        """Plan items on the way to `waypoint`.
+
+        Args:
+            waypoint: The waypoint.
+            frame: MAVLink frame of `spot`.
+            spot: Place to look at, by latitude and longitude in degrees and height in metres; None
+                for none.
+        """
         yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
         if waypoint.zoom is not None:
             yield _item(SET_CAMERA_ZOOM, OF_RANGE, waypoint.zoom)

@@ -51,6 +51,11 @@ class PlanHome:
         Writers that know no home, or not its altitude, put null or zeros, which would lift what is
         above the sea by as much as the ground lies above it.
 
+        Args:
+            latitude: Degrees north.
+            longitude: Degrees east.
+            altitude: Metres above the sea.
+
         Raises:
             ConfigError: If it is no place, or its altitude no finite number.
         """

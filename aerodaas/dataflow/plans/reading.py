@@ -52,7 +52,20 @@ def flown_plan(
     ground: Ground | None = None,
     actuators: Sequence[ActuatorConfig] = (),
 ) -> tuple[list[Waypoint], list[Notice]]:
-    """Read a plan's waypoints, and what they leave out; as `AeroNavigation.from_plan`."""
+    """Read a plan's waypoints.
+
+    Args:
+        path: QGroundControl's `.plan`, or Mission Planner's `.waypoints`.
+        home_altitude: Metres above the sea of the environment's home; None for the plan's own.
+        ground: Height in metres of the ground above the sea at a latitude and longitude in degrees.
+        actuators: Those of the robot.
+
+    Returns:
+        The waypoints in order, and what they leave out.
+
+    Raises:
+        ConfigError: If the file is no plan, or an item cannot be flown.
+    """
     plan = read_plan(path)
     try:
         return waypoints_of(plan, home_altitude, ground, actuators)
@@ -61,7 +74,13 @@ def flown_plan(
 
 
 def warn_of(path: str | Path, notices: list[Notice], stacklevel: int) -> None:
-    """Tell what a plan means and is not done, by one warning."""
+    """Warn of what a plan means and is not done, by one warning.
+
+    Args:
+        path: File of the plan.
+        notices: What is not done; no warning without any.
+        stacklevel: Frames up to the line that is warned of, as of `warnings.warn`.
+    """
     if not notices:
         return
     lines = [f"  {printable(str(notice))}" for notice in notices[:_MOST_NOTICES]]

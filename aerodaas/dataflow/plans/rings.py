@@ -30,7 +30,12 @@ class AreaReader:
         self._corners = 0
 
     def add(self, name: object, rings: Sequence[Sequence[Sequence[object]]]) -> None:
-        """Take a polygon: its outline, then its holes; of longitudes, latitudes and heights.
+        """Add a polygon.
+
+        Args:
+            name: Its name; what is no text, or empty, becomes a numbered one.
+            rings: Its outline, then its holes: corners of longitude, latitude and, if given,
+                height.
 
         Raises:
             ConfigError: If a ring has too few corners, a corner is no place or has more numbers, or

@@ -39,7 +39,11 @@ _MOST_DISTANCE = 1000.0
 
 
 def structure_scan(item: dict[str, Any], number: int) -> Iterator[PlanItem]:
-    """Yield the items of a scan, of which the first has this `number`.
+    """Yield the items of a scan.
+
+    Args:
+        item: QGroundControl's complex item.
+        number: Number of the first item.
 
     Raises:
         ConfigError: If its version is not 3, or its outline or distances cannot be flown.

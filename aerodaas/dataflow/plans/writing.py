@@ -55,7 +55,16 @@ def planned(
     home_altitude: float | None = None,
     actuators: Sequence[ActuatorConfig] = (),
 ) -> tuple[Plan, list[Notice]]:
-    """Turn waypoints into a plan that starts at `home`; with what it leaves out.
+    """Turn waypoints into a plan that starts at `home`.
+
+    Args:
+        waypoints: Waypoints in order, local or global.
+        home: Origin of the local frame.
+        home_altitude: Metres above the sea of home; None if unknown.
+        actuators: Those of the robot, by whose instances and channels `actuate` is written.
+
+    Returns:
+        The plan, and what it leaves out.
 
     Raises:
         ConfigError: If a waypoint is relative to a take-off, whose place is not known yet, or
@@ -73,7 +82,14 @@ def planned(
 
 
 def write_plan(path: str | Path, plan: Plan) -> list[Notice]:
-    """Write a new `.plan` or `.waypoints` file, by its suffix; returns what it leaves out.
+    """Write a new `.plan` or `.waypoints` file, by its suffix.
+
+    Args:
+        path: The file.
+        plan: The plan.
+
+    Returns:
+        What the file leaves out.
 
     Raises:
         ConfigError: If the suffix is another, or the file exists or cannot be written.
