@@ -254,11 +254,21 @@ class AnalyticsScheduler:
     """
 
     def start(self, resources: Resources, now: int) -> None:  # noqa: ARG002 - for overriding
-        """Begin a run; tasks follow."""
+        """Begin a run; tasks follow.
+
+        Args:
+            resources: The edge executor and the cloud of the run.
+            now: Time of the event, nanoseconds.
+        """
         self.resources = resources
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Take note of a new task, or decide at once."""
+        """Take note of a new task, or decide at once.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         raise NotImplementedError
 
     def executor_idle(self, now: int) -> Iterable[Decision]:  # noqa: ARG002 - for overriding
@@ -270,7 +280,12 @@ class AnalyticsScheduler:
         return ()
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:  # noqa: ARG002
-        """Learn how a task ended; not called for tasks that the scheduler itself dropped."""
+        """Learn how a task ended; not called for tasks that the scheduler itself dropped.
+
+        Args:
+            result: The task, where it ran, and how it ended.
+            now: Time of the event, nanoseconds.
+        """
         return ()
 
     def timer(self, now: int) -> Iterable[Decision]:  # noqa: ARG002 - for overriding
@@ -282,7 +297,12 @@ class AnalyticsScheduler:
         resources: Resources,
         now: int,  # noqa: ARG002 - for overriding
     ) -> Iterable[Decision]:
-        """The cloud is gone (no slots) or back; only in flight."""
+        """The cloud is gone (no slots) or back; only in flight.
+
+        Args:
+            resources: The resources from now on.
+            now: Time of the event, nanoseconds.
+        """
         self.resources = resources
         return ()
 

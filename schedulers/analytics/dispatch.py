@@ -41,11 +41,21 @@ class Host(Protocol):
     """
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Start an execution on the edge."""
+        """Start an execution on the edge.
+
+        Args:
+            task: The task to execute.
+            now: Time of the event, nanoseconds.
+        """
         ...
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Start an execution in the cloud; a slot is free."""
+        """Start an execution in the cloud; a slot is free.
+
+        Args:
+            task: The task to execute.
+            now: Time of the event, nanoseconds.
+        """
         ...
 
     def wake_at(self, at: int) -> None:
@@ -53,7 +63,12 @@ class Host(Protocol):
         ...
 
     def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
-        """Take note of a decision about a task."""
+        """Take note of a decision about a task.
+
+        Args:
+            decision: The decision, with its task and reason.
+            now: Time of the event, nanoseconds.
+        """
         ...
 
     def closed(self, result: Result) -> None:
@@ -102,7 +117,12 @@ class Dispatch:
         return event
 
     def arrived(self, task: Task, now: int) -> None:
-        """A task has reached the edge."""
+        """A task has reached the edge.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         self.undecided[task.id] = task
         self._carry_out(self._task_arrived(task, now), now)
         if self.running is None:
@@ -115,7 +135,13 @@ class Dispatch:
             self._offer_edge(now)
 
     def finished(self, task: Task, now: int, failure: TaskOutcome | None = None) -> None:
-        """An execution has ended: with a result, or with TIMEOUT or FAILED as its `failure`."""
+        """An execution has ended.
+
+        Args:
+            task: The task executed.
+            now: Time of the event, nanoseconds.
+            failure: TIMEOUT or FAILED; None for a result.
+        """
         in_time = now <= task.deadline + task.reserve
         outcome = failure or (_DONE if in_time else _LATE)
         if task is self.running:
@@ -134,7 +160,12 @@ class Dispatch:
             self._offer_edge(now)
 
     def change_resources(self, resources: Resources, now: int) -> None:
-        """Change the resources: the cloud is gone, which gives up its queue, or back."""
+        """Change the resources: the cloud is gone, which gives up its queue, or back.
+
+        Args:
+            resources: The resources from now on.
+            now: Time of the event, nanoseconds.
+        """
         self.resources = resources
         while self._cloud_queue and not resources.cloud_slots:
             self._give_up(self._cloud_queue.popleft().task, now)
@@ -143,7 +174,12 @@ class Dispatch:
             self._offer_edge(now)
 
     def replace(self, scheduler: AnalyticsScheduler, now: int) -> None:
-        """Go on with another scheduler, which gets the undecided tasks as new ones."""
+        """Go on with another scheduler, which gets the undecided tasks as new ones.
+
+        Args:
+            scheduler: The scheduler that decides from now on.
+            now: Time of the event, nanoseconds.
+        """
         self._adopt(scheduler)
         self._ended.clear()
         self.start(now)

@@ -48,7 +48,13 @@ class TimeEstimates:
         self._cache: dict[str, TimeEstimate] = {}
 
     def observe(self, profile: Profile, taken: int, now: int) -> None:
-        """Learn from one execution."""
+        """Learn from one execution.
+
+        Args:
+            profile: Profile of the task executed.
+            taken: Time that the execution took, nanoseconds.
+            now: Time of its end, nanoseconds.
+        """
         model = self._model(profile)
         offset, variance, count = model
         error = taken - self._nominal(profile) - offset - self.delay
@@ -90,7 +96,12 @@ class TimeEstimates:
 
 
 def chance(belief: TimeEstimate, room: float) -> float:
-    """Probability that an execution takes at most `room` nanoseconds."""
+    """Probability that an execution ends within `room`, 0 to 1.
+
+    Args:
+        belief: Mean and deviation of its time, nanoseconds.
+        room: Time that it may take, nanoseconds.
+    """
     z = (room - belief.mean) / belief.sigma
     if z > CERTAIN:
         return 1.0

@@ -27,10 +27,20 @@ class FairQueue:
         return max(self.now, self.finish.get(tenant, 0.0))
 
     def serve(self, tenant: str, taken: float) -> None:
-        """An execution of `taken` nanoseconds over the tenant's weight has started."""
+        """An execution of a tenant has started.
+
+        Args:
+            tenant: Name of the tenant.
+            taken: Time that it takes over the tenant's weight, nanoseconds.
+        """
         self.now = self.tag(tenant)
         self.finish[tenant] = self.now + taken
 
     def correct(self, tenant: str, by: float) -> None:
-        """An execution has taken `by` nanoseconds over weight more than was told at its start."""
+        """An execution has taken another time than was told at its start.
+
+        Args:
+            tenant: Name of the tenant.
+            by: Time that it took in addition over the tenant's weight, nanoseconds.
+        """
         self.finish[tenant] += by

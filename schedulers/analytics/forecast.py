@@ -33,7 +33,12 @@ class Forecast:
         self._streams: OrderedDict[str, _Stream] = OrderedDict()
 
     def arrived(self, source: str, now: int) -> bool:
-        """Take note of an arrival; True if it had been forecast."""
+        """Take note of an arrival; True if it had been forecast.
+
+        Args:
+            source: The drone or stream whose task has arrived.
+            now: Time of the event, nanoseconds.
+        """
         stream = self._streams.get(source)
         if stream is None:
             self._streams[source] = _Stream(now)
@@ -47,7 +52,12 @@ class Forecast:
         return expected and regular
 
     def due(self, now: int, until: int) -> Iterator[tuple[int, str]]:
-        """Times and sources of the arrivals expected before `until`, the next period's only."""
+        """Times and sources of the arrivals expected, the next period's only.
+
+        Args:
+            now: Present time, nanoseconds; arrivals that are overdue are given as of now.
+            until: End of the forecast, nanoseconds; arrivals lie before it.
+        """
         given_up = now - LATENESS
         for source, stream in self._streams.items():
             at = stream.last + stream.period

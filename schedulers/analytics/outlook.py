@@ -70,7 +70,13 @@ class CloudOutlook:
                 return
 
     def value(self, profile: Profile, room: float, bonus: float = 0.0) -> float:
-        """Expected utility of sending a task now that has `room` left; never below zero."""
+        """Expected utility of sending a task now; never below zero.
+
+        Args:
+            profile: Profile of the task.
+            room: Time left for its execution, nanoseconds.
+            bonus: Worth of a result in time on top of its benefit.
+        """
         slots = self.resources.cloud_slots
         if self.silent_since is not None or not slots:
             return 0.0
@@ -88,9 +94,14 @@ class CloudOutlook:
     def patience(self, profile: Profile, worth: float, rate: float) -> float:
         """Room below which waiting no longer pays, nanoseconds.
 
-        Waiting a little longer may win `worth`, which happens at `rate` per nanosecond, and
-        makes the cloud miss with the density of its time at the room left. Both meet where
-        benefit * density(z) / sigma = rate * worth, solved for z, kept between 1 and 3.
+        Waiting a little longer may win `worth`, and makes the cloud miss with the density of its
+        time at the room left. Both meet where benefit * density(z) / sigma = rate * worth, solved
+        for z, kept between 1 and 3.
+
+        Args:
+            profile: Profile of the task that waits.
+            worth: Utility that waiting may win.
+            rate: How often it does, per nanosecond.
         """
         belief = self.beliefs.belief(profile)
         ratio = rate * worth * belief.sigma * sqrt(2 * pi) / profile.benefit
@@ -103,11 +114,21 @@ class CloudOutlook:
         return int(task.deadline - belief.mean + belief.sigma)
 
     def sent(self, task: Task, now: int) -> None:
-        """Take note of a task that leaves for the cloud."""
+        """Take note of a task that leaves for the cloud.
+
+        Args:
+            task: The task that leaves.
+            now: Time of the event, nanoseconds.
+        """
         self._sent[task] = self._last_sent = now
 
     def finished(self, result: Result, now: int) -> None:
-        """Learn from a task that came back, was lost or never started."""
+        """Learn from a task that came back, was lost or never started.
+
+        Args:
+            result: The task, where it ran, and how it ended.
+            now: Time of the event, nanoseconds.
+        """
         sent = self._sent.pop(result.task, now)
         self._listen_at = 0.0
         if result.place is not TaskPlace.CLOUD or result.outcome in _UNANSWERED:

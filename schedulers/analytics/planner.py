@@ -59,12 +59,19 @@ _NEVER = Job(None, inf, inf, 0.0, 0.0)
 def plan(
     lanes: Sequence[JobQueue], start: float, until: float, price: float, *, width: int, gap: float
 ) -> list[_Step]:
-    """Choose jobs and their starts from `start` to about `until`, by beam search.
+    """Choose jobs and their starts, by beam search.
 
-    A state's merit is the expected gains so far less `price` per nanosecond passed, so that
-    plans of different ends compare (the average-reward criterion, Howard, 1960). `width` states
-    survive each step, and no idle time above `gap` is considered. Takes at most
-    width x lanes x steps evaluations of a gain.
+    A state's merit is the expected gains so far less `price` per nanosecond passed, so that plans
+    of different ends compare (the average-reward criterion, Howard, 1960). Takes at most width x
+    lanes x steps evaluations of a gain.
+
+    Args:
+        lanes: The jobs to choose from, a queue for each kind.
+        start: Time from which to plan, nanoseconds.
+        until: Time at about which the plan ends, nanoseconds.
+        price: Utility that a nanosecond is worth.
+        width: States that survive each step.
+        gap: Longest idle time that is considered, nanoseconds.
     """
     digits = max((len(lane.jobs) for lane in lanes), default=0).bit_length()
     places: list[_Place] = []

@@ -45,7 +45,12 @@ class QualityWatch:
         self.arrived += 1
 
     def ended(self, arrival: int, *, in_time: bool) -> None:
-        """Count the end of a task that arrived at `arrival`."""
+        """Count the end of a task.
+
+        Args:
+            arrival: Time of its arrival, nanoseconds.
+            in_time: Whether it finished by its deadline.
+        """
         self._worth = None
         self.success += _MEMORY * (in_time - self.success)
         if arrival // self.goal.window == self.window:

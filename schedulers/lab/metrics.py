@@ -81,7 +81,12 @@ class Score:
 
 
 def score(tasks: Sequence[Task], trace: Trace) -> Score:
-    """Judge one edge's run; a task counts in the QoE window in which it arrived."""
+    """Judge one edge's run; a task counts in the QoE window in which it arrived.
+
+    Args:
+        tasks: All tasks that arrived at the edge.
+        trace: The run's results and decisions.
+    """
     total = Score(
         tasks=len(tasks),
         undecided=len(trace.undecided),

@@ -72,7 +72,12 @@ class ExecutionTimes:
         return f"{self.distribution}{spread}"
 
     def factors(self, count: int, draw: random.Random) -> list[float]:
-        """Draw `count` factors, all positive."""
+        """Draw factors on the expected time, all positive.
+
+        Args:
+            count: How many.
+            draw: Source of randomness.
+        """
         cv = self.variation
         if self.distribution == "nominal" or cv == 0:
             return [1.0] * count
@@ -114,11 +119,18 @@ class Network:
     def named(cls, wanted: str, duration: int) -> Network:
         """Make a network from its name; several joined by `+` act together.
 
-        `steady`; `trapezium` or `trapezium:MS` (rises from 0 to +400 ms over the second fifth of
-        the duration, falls back over the fourth); `outage` (10 % of the duration from 30 % on
-        and 5 % from 70 % on) or `outage:30-45,80-81` (seconds); `trace:FILE` (a measured
-        bandwidth: `aerodaas.schedulers.lab.network_trace` has the formats). Raises
-        UnknownIdError or SchedulerError.
+        The names: `steady`; `trapezium` or `trapezium:MS` (rises from 0 to +400 ms over the second
+        fifth of the duration, falls back over the fourth); `outage` (10 % of the duration from 30 %
+        on and 5 % from 70 % on) or `outage:30-45,80-81` (seconds); `trace:FILE` (a measured
+        bandwidth: `aerodaas.schedulers.lab.network_trace` has the formats).
+
+        Args:
+            wanted: The name.
+            duration: Length of the run, nanoseconds.
+
+        Raises:
+            UnknownIdError: There is no network of this name.
+            SchedulerError: A figure or a file of the name is invalid.
         """
         network = cls(wanted)
         for part in wanted.split("+"):
@@ -156,7 +168,12 @@ class Network:
         return any(begin <= stamp < end for begin, end in self.outages)
 
     def cloud_time(self, nominal: int, start: int) -> int | None:
-        """Time of an execution begun at `start`, nanoseconds; None if it is lost."""
+        """Time of an execution, nanoseconds; None if it is lost.
+
+        Args:
+            nominal: Its time on the undisturbed network, nanoseconds.
+            start: When it begins, nanoseconds from the begin of the run.
+        """
         taken = nominal
         if self.latency:
             taken += int(_linear(self.latency, start))
@@ -172,7 +189,12 @@ class Network:
         return taken
 
     def earliest_end(self, nominal: int, start: int) -> int | None:
-        """Earliest end of an execution begun at `start` or later; None without one."""
+        """Earliest end of an execution begun at `start` or later, nanoseconds; None without one.
+
+        Args:
+            nominal: Its time on the undisturbed network, nanoseconds.
+            start: When it may begin, nanoseconds from the begin of the run.
+        """
         ends = [
             begin + taken
             for begin in (start, *(end for _, end in self.outages if end > start))

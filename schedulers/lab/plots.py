@@ -34,7 +34,12 @@ _STYLE: dict[str, Any] = {
 
 
 def plot_bars(result: LabResult, path: Path) -> None:
-    """Utility (with the clairvoyant bound), completion and QoE per scheduler, with intervals."""
+    """Utility (with the clairvoyant bound), completion and QoE per scheduler, with intervals.
+
+    Args:
+        result: The schedulers' scores, and the bounds if there are any.
+        path: File of the picture.
+    """
     names = list(result.scores)
     figures = {name: result.figures(name) for name in names}
     panels = {
@@ -81,7 +86,15 @@ def plot_bars(result: LabResult, path: Path) -> None:
 
 
 def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float) -> None:
-    """Executions on one edge between two times in seconds, by model; misses are hatched."""
+    """Executions on one edge, by model; misses are hatched.
+
+    Args:
+        trace: The edge's run.
+        path: File of the picture.
+        title: Title of the picture.
+        begin: Begin of the time shown, seconds.
+        end: End of the time shown, seconds.
+    """
     shown = [r for r in trace.results if r.finished / 1e9 >= begin and r.started / 1e9 <= end]
     models = sorted({result.task.profile.model for result in trace.results})
     colours = dict(zip(models, PALETTE, strict=False))
@@ -112,7 +125,13 @@ def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float
 
 
 def plot_observations(traces: Mapping[str, Trace], sample: SamplePath, path: Path) -> None:
-    """Queue lengths and estimates over time, one column per scheduler that lets itself be seen."""
+    """Queue lengths and estimates over time, one column per scheduler that lets itself be seen.
+
+    Args:
+        traces: Runs by scheduler, recorded; those without observations have no column.
+        sample: The path that they ran on, for the true delay of its network.
+        path: File of the picture; none is made where no scheduler lets itself be seen.
+    """
     seen = {name: trace for name, trace in traces.items() if _keys(trace)}
     if not seen:
         return

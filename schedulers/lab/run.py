@@ -40,15 +40,22 @@ _BATCHES = 16
 
 
 def batch_size(parts: int, workers: int) -> int:
-    """How many of the parts go to a worker at once, so that few messages are sent."""
+    """How many of the parts go to a worker at once, so that few messages are sent.
+
+    Args:
+        parts: How many parts there are.
+        workers: How many workers share them.
+    """
     return max(1, parts // (_BATCHES * workers))
 
 
 @contextmanager
 def over_processes(jobs: int | None, parts: int | None = None) -> Iterator[Spread]:
-    """Give a map over `jobs` processes (None: one for each core), which end with the context.
+    """Give a map over processes, which end with the context.
 
-    Of 1 job, and of 1 part where their number is known, it is the ordinary `map`.
+    Args:
+        jobs: Processes; None for one for each core, 1 for the ordinary `map`.
+        parts: Parts of the work, where their number is known; no more processes are used.
     """
     workers = jobs or os.cpu_count() or 1
     if parts is not None:
@@ -177,11 +184,24 @@ def run_lab(
 ) -> LabResult:
     """Simulate each scheduler on each seed's sample path.
 
-    `jobs` processes share the work (by default one per core; 1 for none); `spread` takes their
-    place, for example to use a Ray cluster. `progress` is told how many of how many parts are
-    done. The same seeds give the same result, however the work is spread. Raises SchedulerError
-    or UnknownIdError for a scheduler that cannot be loaded, and SchedulerError, with the seed and
-    the edge, for one that raises or decides what cannot be done.
+    The same seeds give the same result, however the work is spread.
+
+    Args:
+        workload: The drones and their tasks.
+        schedulers: Schedulers or their names, which must differ.
+        seeds: Seeds of the sample paths.
+        network: Of the path to the cloud; steady by default.
+        times: Distribution of execution times; the expected ones by default.
+        resources: The edge executor and the cloud; by default those of the class.
+        bound: Whether to compute the clairvoyant bound of each path.
+        jobs: Processes that share the work; None for one per core, 1 for none.
+        spread: A map in their place, for example over a Ray cluster.
+        progress: Called with the number of parts done and of all parts.
+
+    Raises:
+        SchedulerError: There is no seed or scheduler, or a scheduler cannot be loaded, raises or
+            decides what cannot be done; the latter two with the seed and the edge.
+        UnknownIdError: There is no scheduler of a name.
     """
     if not seeds or not schedulers:
         raise SchedulerError("a run of the lab needs at least one seed and one scheduler")

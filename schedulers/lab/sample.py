@@ -27,7 +27,15 @@ class SamplePath:
     def draw(
         cls, workload: Workload, edge: int, seed: int, times: ExecutionTimes, network: Network
     ) -> SamplePath:
-        """Draw the path of one edge; the same arguments give the same path."""
+        """Draw the path of one edge; the same arguments give the same path.
+
+        Args:
+            workload: The drones and their tasks.
+            edge: Number of the edge, from 0.
+            seed: Seed of all that is drawn.
+            times: Distribution of execution times.
+            network: Of the path to the cloud.
+        """
         # One stream for each purpose: another distribution leaves the arrivals as they are.
         tasks = workload.tasks(edge, random.Random(f"{seed}/{edge}/arrivals"))
         edge_factors = times.factors(len(tasks), random.Random(f"{seed}/{edge}/edge"))

@@ -99,9 +99,16 @@ def simulate(
 ) -> Trace:
     """Run a copy of `scheduler` over the path and return its trace.
 
-    At one moment, ends of executions come first, then timers, then arrivals. `record` keeps
-    every decision and looks at the scheduler every 50 ms. Raises SchedulerError for a decision
-    that cannot be carried out.
+    At one moment, ends of executions come first, then timers, then arrivals.
+
+    Args:
+        path: The path of one edge.
+        scheduler: The scheduler, which stays unchanged.
+        resources: The edge executor and the cloud; by default those of the class.
+        record: Whether to keep every decision, and observe the scheduler every 50 ms.
+
+    Raises:
+        SchedulerError: A decision cannot be carried out.
     """
     resources = resources or Resources()
     host = _SimulatedHost(path, resources, record=record)

@@ -10,5 +10,11 @@ __all__ = ["bad_line"]
 
 
 def bad_line(path: Path, number: int, what: str) -> SchedulerError:
-    """The error that says `what` is wrong in a line of the file, the `number`th from 1."""
+    """The error that says `what` is wrong in a line of the file.
+
+    Args:
+        path: The file.
+        number: Number of the line, from 1.
+        what: What is wrong.
+    """
     return SchedulerError(f"{path}, line {number}: {what}")

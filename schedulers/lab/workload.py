@@ -106,7 +106,12 @@ class Workload:
     def named(cls, name: str, duration: int = 300 * NANOSECONDS) -> Workload:
         """Make `3D-A` (3 drones, all models), `4D-P` (four models) or `80D-A/7` (over 7 edges).
 
-        Raises UnknownIdError for any other name.
+        Args:
+            name: The name, in capitals or small letters.
+            duration: Length of the run, nanoseconds.
+
+        Raises:
+            UnknownIdError: It is any other name.
         """
         match = _NAME.fullmatch(name)
         if match is None:
@@ -141,7 +146,12 @@ class Workload:
         return replace(self, duration=duration)
 
     def tasks(self, edge: int, draw: random.Random) -> list[Task]:
-        """The tasks of one edge in order of arrival, numbered from zero."""
+        """The tasks of one edge in order of arrival, numbered from zero.
+
+        Args:
+            edge: Number of the edge, from 0.
+            draw: Source of randomness for the arrivals.
+        """
         if self.arrivals:
             return [
                 Task(

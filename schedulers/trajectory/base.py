@@ -98,9 +98,14 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
 
     @abstractmethod
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Order `pending` (local ENU waypoints that may be reordered), the next one first.
+        """Order `pending`, the next one first.
 
-        A waypoint left out of the answer is given up and reported as such.
+        Args:
+            pending: Waypoints that may be reordered, in local ENU.
+            situation: Where the drone is, its charge and its speed.
+
+        Returns:
+            The order; a waypoint left out of it is given up and reported as such.
         """
 
     def generate_navigation(self, data: IAeroData[Any]) -> AeroNavigation:
@@ -124,7 +129,16 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
     ) -> None:
         """Add waypoints or a stream of navigation to a robot's queue, before or in the mission.
 
-        `robot` may be left out where only one flies; GraphError is raised where several do.
+        Args:
+            data: The waypoints, or a stream of navigation.
+            index: Number of stops that they follow, and stay there; None for the end, to be
+                planned.
+            priority: Priority of all; None for the waypoints' own.
+            deadline: Mission time by which all are to be reached, seconds; None for their own.
+            robot: The robot or its id; may be left out where only one flies.
+
+        Raises:
+            GraphError: No robot is named where several fly.
         """
         navigation = self.generate_navigation(data)
         if priority is not None:
@@ -143,13 +157,18 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
     def clear_navigation(
         self, *, on: AeroStreamData[Any] | None = None, robot: IRobot | str | None = None
     ) -> None:
-        """Empty the queue of a robot: now, or when the stream `on` first yields something.
-
-        `robot` may be left out where only one flies; GraphError is raised where several do.
+        """Empty the queue of a robot.
 
         Before the mission, this is the paper's "on detection, reset the queue": what was added so
-        far is forgotten, and the first item of the stream that is added next empties the queue
-        of what `navigate()` was given, which is flown until then.
+        far is forgotten, and the first item of the stream that is added next empties the queue of
+        what `navigate()` was given, which is flown until then.
+
+        Args:
+            on: The stream whose first item empties the queue; None empties it now.
+            robot: The robot or its id; may be left out where only one flies.
+
+        Raises:
+            GraphError: No robot is named where several fly.
         """
         named, line = _id_of(robot), application_line()
         if on is not None:

@@ -59,6 +59,11 @@ def footprint(height: float, horizontal_fov: float, aspect: float = 16 / 9) -> t
     """Width and depth in metres of the ground that a camera looking straight down sees.
 
     `height` is in metres, `horizontal_fov` in radians, `aspect` is width over height in pixels.
+
+    Args:
+        height: Height above the ground, metres.
+        horizontal_fov: Angle of view across, radians.
+        aspect: Width over height of the picture, in pixels.
     """
     width = 2.0 * height * math.tan(horizontal_fov / 2.0)
     return width, width / aspect
@@ -78,15 +83,28 @@ def cover(
     angle: float | None = None,
     speed: float | None = None,
 ) -> Coverage:
-    """Plan a path over the area inside `outline` (ENU metres) at `height` metres.
+    """Plan a path over an area.
 
-    `width` is that of the camera's footprint across the sweep; neighbouring strips share
-    `overlap` (0 to 1) of it. A `camera` in their place knows both, looks straight down and takes
-    pictures on the strips, no farther apart than it needs, from one end to the other. `holes` need
-    not be seen but may be flown over; `no_fly` zones are flown around with `clearance` metres.
-    `start` is where the drone comes from; without `angle` (radians), the one with the shortest way
-    is taken. Raises SchedulerError for an area that is
-    none, or that no-fly zones cut in pieces that cannot all be reached.
+    A `camera` looks straight down and takes pictures on the strips, no farther apart than it needs,
+    from one end to the other.
+
+    Args:
+        outline: Corners of the area, ENU metres.
+        height: Height of the path, metres.
+        width: Ground that is seen across the sweep, metres; or `camera`.
+        overlap: Share of it that neighbouring strips have in common, 0 to less than 1.
+        camera: Camera that knows width and overlap.
+        holes: Areas that need not be seen but may be flown over, ENU metres.
+        no_fly: Zones that are flown around, ENU metres.
+        clearance: Distance to keep from them, metres.
+        start: Where the drone comes from, ENU metres.
+        angle: Direction of the strips, radians counter-clockwise from east; None for the shortest
+            way.
+        speed: Speed on the strips, m/s; None for the robot's cruise speed.
+
+    Raises:
+        SchedulerError: Not exactly one of width and camera is given, the area is none, or no-fly
+            zones cut it in pieces that cannot all be reached.
     """
     if (width is None) == (camera is None):
         raise SchedulerError("coverage needs a width or a camera: give it one of them")

@@ -23,10 +23,15 @@ def shortest_order(
     groups: Sequence[Sequence[int]] = (),
     latest: NDArray[np.float64] | None = None,
 ) -> list[int] | None:
-    """Order of N waypoints with the least sum of `costs` (N + 2, N + 2), see `Travel`.
+    """Order of N waypoints with the least sum of `costs`; takes 2^N N² steps.
 
-    Each of `groups` is visited in its order. `latest` (N,) bounds the cost on arrival at each
-    waypoint. Returns None if no order keeps these conditions. Takes 2^N N² steps.
+    Args:
+        costs: Costs from row to column, (N + 2, N + 2), see `TravelCosts`.
+        groups: Numbers of waypoints; each group is visited in its order.
+        latest: Bounds of the cost on arrival at each waypoint, (N,); None for none.
+
+    Returns:
+        Numbers of the waypoints in order; None if no order keeps these conditions.
     """
     count = len(costs) - 2
     if count == 0:

@@ -35,12 +35,21 @@ def share_out(
     budget: float = 2.0,
     seed: int = 0,
 ) -> dict[str, list[Waypoint]]:
-    """Give each drone of `fleet` (by id) its waypoints, in order; every drone then comes home.
+    """Give each drone its waypoints, in order; every drone then comes home.
 
-    `objective` is the least energy of all drones together, or the earliest time at which the last
-    one is home. Each drone's charge less its reserve bounds its own tour; waypoints that no drone
-    can serve, or not by their deadline, are left out. Takes about `budget` seconds. Raises
-    SchedulerError for a fleet without drones, and without PyVRP (on Python 3.10).
+    Each drone's charge less its reserve bounds its own tour.
+
+    Args:
+        waypoints: The waypoints, in local ENU; those that no drone can serve, or not by their
+            deadline, are left out.
+        fleet: Where each drone is, its charge and its speed, by id.
+        objective: Least energy of all drones together, or earliest time at which the last one is
+            home.
+        budget: Time that the search takes, about, seconds.
+        seed: Seed of the search.
+
+    Raises:
+        SchedulerError: The fleet has no drones, or PyVRP is not there (on Python 3.10).
     """
     require_solver("sharing waypoints out")
     if not fleet:

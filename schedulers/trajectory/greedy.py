@@ -51,7 +51,17 @@ def greedy_route(
 def route_value(
     route: Sequence[int], travel: TravelCosts, costs: Matrix, prizes: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Value of a route: its prizes first, then how little it costs."""
+    """Value of a route: its prizes first, then how little it costs.
+
+    Args:
+        route: Numbers of the waypoints in order.
+        travel: Where the route begins and ends.
+        costs: Costs from row to column, (N + 2, N + 2).
+        prizes: Worth of each waypoint, (N,).
+
+    Returns:
+        Sum of the prizes, and the negative cost.
+    """
     return float(prizes[list(route)].sum()), -travel.cost(route, costs)
 
 

@@ -24,7 +24,12 @@ class NearestNeighborScheduler(TrajectoryScheduler):
     isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Chain nearest neighbours."""
+        """Chain nearest neighbours.
+
+        Args:
+            pending: Waypoints that may be reordered, in local ENU.
+            situation: Where the drone is, its charge and its speed.
+        """
         before = {
             later: earlier for group in situation.ordered for earlier, later in pairwise(group)
         }

@@ -72,7 +72,12 @@ class OptimalScheduler(TrajectoryScheduler):
         self._seed = seed
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Order `pending`; unreachable waypoints are left out."""
+        """Order `pending`; unreachable waypoints are left out.
+
+        Args:
+            pending: Waypoints that may be reordered, in local ENU.
+            situation: Where the drone is, its charge and its speed.
+        """
         if not pending:
             return []
         travel = TravelCosts.of(pending, situation)

@@ -69,10 +69,20 @@ class SurveyCamera:
         pixels: int | None = None,
         interval: float | None = None,
     ) -> SurveyCamera:
-        """Describe a camera by its data sheet: focal length, width and height of its sensor in mm.
+        """Describe a camera by its data sheet.
 
-        `pixels` across its picture and `interval` in seconds are those of the class. Raises
-        SchedulerError for lengths that are not positive.
+        Args:
+            focal_length: Millimetres.
+            sensor: Width and height of its sensor, millimetres.
+            front_overlap: Share that a picture has in common with the next one, 0 to less than 1.
+            side_overlap: Share that it has in common with those of the next strip, 0 to less than
+                1.
+            gimbal: Whether a gimbal is to be turned straight down.
+            pixels: Width of its picture; None where it is not known.
+            interval: Shortest time between two pictures, seconds; None where it is not known.
+
+        Raises:
+            SchedulerError: A length is not positive.
         """
         width, height = sensor
         if not (focal_length > 0.0 and width > 0.0 and height > 0.0):

@@ -36,7 +36,12 @@ class TravelCosts:
 
     @classmethod
     def of(cls, waypoints: Sequence[Waypoint], situation: PlanningContext) -> TravelCosts:
-        """Measure straight legs; each is flown at the speed of the waypoint where it ends."""
+        """Measure straight legs; each is flown at the speed of the waypoint where it ends.
+
+        Args:
+            waypoints: The waypoints, in local ENU.
+            situation: Where the drone is, its home and its speed.
+        """
         places = np.array([*(w.position for w in waypoints), situation.position, situation.home])
         offsets = places[None, :, :] - places[:, None, :]
         distance = np.sqrt(np.einsum("ijk,ijk->ij", offsets, offsets))
@@ -86,12 +91,22 @@ class TravelCosts:
         )
 
     def cost(self, order: Sequence[int], costs: Matrix) -> float:
-        """Sum of `costs` from the start through `order` to home."""
+        """Sum of `costs` from the start through `order` to home.
+
+        Args:
+            order: Numbers of the waypoints in order.
+            costs: Costs from row to column, (N + 2, N + 2).
+        """
         way = np.array([len(self.hover), *order, len(self.hover) + 1])
         return float(costs[way[:-1], way[1:]].sum())
 
 
 def tour_length(waypoints: Sequence[Waypoint], situation: PlanningContext) -> float:
-    """Metres from where the drone is through `waypoints` in this order and home."""
+    """Metres from where the drone is through `waypoints` in this order and home.
+
+    Args:
+        waypoints: The waypoints in order, in local ENU.
+        situation: Where the drone is, and its home.
+    """
     travel = TravelCosts.of(waypoints, situation)
     return travel.cost(range(len(waypoints)), travel.distance)

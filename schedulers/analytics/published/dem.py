@@ -19,7 +19,12 @@ class Dem(EdgeCloudEdf):
     """
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Insert, insert and migrate the victims, or send the newcomer down the cloud path."""
+        """Insert, insert and migrate the victims, or send the newcomer down the cloud path.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         place, finish = self.slot(task, now)
         if finish >= task.deadline:
             return self.to_cloud(task, now)
@@ -34,7 +39,12 @@ class Dem(EdgeCloudEdf):
         return decisions
 
     def loss(self, task: Task, now: int) -> float:
-        """Utility that `task` loses off the edge: the difference to the cloud, or all of it."""
+        """Utility that `task` loses off the edge: the difference to the cloud, or all of it.
+
+        Args:
+            task: A task that may leave the edge's queue.
+            now: Time of the event, nanoseconds.
+        """
         profile = task.profile
         if now + self.cloud_time(task) < task.deadline and profile.cloud_gain >= 0:
             return abs(profile.edge_gain - profile.cloud_gain)

@@ -25,7 +25,12 @@ class EdgeCloudEdf(EdgeQueue):
         return task.profile.deadline if self.published else task.deadline
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Edge if the newcomer finishes before its deadline there, else the cloud path."""
+        """Edge if the newcomer finishes before its deadline there, else the cloud path.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         place, finish = self.slot(task, now)
         if finish < task.deadline:
             self.insert(place, task)

@@ -39,7 +39,12 @@ class EdgeQueue(AnalyticsScheduler):
         return task.deadline
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
-        """Queue the task."""
+        """Queue the task.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         self.insert(bisect_right(self.queue, self.key(task), key=self.key), task)
         return ()
 
@@ -56,7 +61,12 @@ class EdgeQueue(AnalyticsScheduler):
         return decisions
 
     def insert(self, place: int, task: Task) -> None:
-        """Put `task` before the one that has this place in the queue."""
+        """Put `task` into the queue.
+
+        Args:
+            place: Place in the queue, from 0; the task that has it comes next.
+            task: The task to queue.
+        """
         self.queue.insert(place, task)
         if self._keys is not None:
             self._keys.insert(place, self.key(task))
@@ -69,12 +79,24 @@ class EdgeQueue(AnalyticsScheduler):
         return self.queue.pop(place)
 
     def run(self, task: Task, now: int, reason: str = "first in the edge queue") -> RunOnEdge:
-        """Start `task`, expected to take its profile's time."""
+        """Start `task`, expected to take its profile's time.
+
+        Args:
+            task: The task to start.
+            now: Time of the event, nanoseconds.
+            reason: Why, for the decision.
+        """
         self.free_at = now + task.profile.edge_time
         return RunOnEdge(task, reason)
 
     def drop(self, task: Task, now: int, reason: str) -> Drop:  # noqa: ARG002 - for overriding
-        """Give `task` up; the one place that GEMS and DEMS-A watch."""
+        """Give `task` up; the one place that GEMS and DEMS-A watch.
+
+        Args:
+            task: The task to give up.
+            now: Time of the event, nanoseconds.
+            reason: Why, for the decision.
+        """
         return Drop(task, reason)
 
     def due(self, task: Task) -> int:
@@ -86,13 +108,24 @@ class EdgeQueue(AnalyticsScheduler):
         return task.profile.cloud_time
 
     def send(self, task: Task, reason: str) -> SendToCloud:
-        """Send `task` to the cloud, where it starts only while its expected time fits."""
+        """Send `task` to the cloud, where it starts only while its expected time fits.
+
+        Args:
+            task: The task to send.
+            reason: Why, for the decision.
+        """
         return SendToCloud(task, reason, self.due(task) - self.cloud_time(task))
 
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """The cloud path: the cloud if it pays and fits in the slack, else drop."""
+        """The cloud path: the cloud if it pays and fits in the slack, else drop.
+
+        Args:
+            task: The task that the edge does not run.
+            now: Time of the event, nanoseconds.
+            reason: Why, for the decision.
+        """
         if task.profile.cloud_gain <= 0:
             return [self.drop(task, now, "the cloud costs more than the result is worth")]
         if not self.resources.cloud_slots or now + self.cloud_time(task) > task.deadline:
@@ -104,7 +137,12 @@ class EdgeQueue(AnalyticsScheduler):
         return task.profile.edge_time
 
     def slot(self, task: Task, now: int) -> tuple[int, int]:
-        """Place of a newcomer in the queue, and when it would finish there."""
+        """Place of a newcomer in the queue, from 0, and when it would finish there, nanoseconds.
+
+        Args:
+            task: The task that has arrived.
+            now: Time of the event, nanoseconds.
+        """
         if self._keys is None:
             self._keys = [self.key(other) for other in self.queue]
             self._lengths = [self.occupied(other) for other in self.queue]
@@ -117,7 +155,12 @@ class EdgeQueue(AnalyticsScheduler):
         self._lengths = [self.occupied(task) for task in self.queue]
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """The edge is free as soon as its task is back."""
+        """The edge is free as soon as its task is back.
+
+        Args:
+            result: The task, where it ran, and how it ended.
+            now: Time of the event, nanoseconds.
+        """
         if result.started + result.task.profile.edge_time == self.free_at:
             self.free_at = now
         return ()

@@ -54,8 +54,12 @@ ACTIVE: tuple[str, ...] = tuple(PUBLISHED)
 def told_profile(model: str, schedulers: SchedulersConfig) -> Profile:
     """Profile of an analysis from the environment file's `schedulers`.
 
-    `model` is the analysis' stream; the file may leave the robot's name out. Raises
-    SchedulerError for figures that no scheduler could work with.
+    Args:
+        model: The analysis' stream; the file may leave the robot's name out.
+        schedulers: The file's figures of tasks and tenants, times in milliseconds.
+
+    Raises:
+        SchedulerError: No scheduler could work with the figures.
     """
     task = told(model, schedulers.tasks) or TaskConfig()
     owners = {name: one for one in schedulers.tenants for name in schedulers.tenants[one].analyses}
