@@ -177,7 +177,12 @@ class OnnxDetector(Analytics[Detections]):
         self._session = None
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Detect the objects in one frame."""
+        """Detect the objects in one frame.
+
+        Args:
+            item: The frame.
+            context: Ignored.
+        """
         del context
         return self.detect([item])[0]
 
@@ -240,6 +245,13 @@ class OnnxDetector(Analytics[Detections]):
         self, frames: Sequence[Frame], outputs: Sequence[NDArray[Any]]
     ) -> list[Detections]:
         """Convert the network's outputs for the frames last preprocessed to detections.
+
+        Args:
+            frames: The frames, of one size.
+            outputs: Outputs of the network, each with the batch axis first.
+
+        Returns:
+            The detections of each frame.
 
         Raises:
             ModelError: If no frames were preprocessed.

@@ -191,9 +191,17 @@ class KeypointModel:
         self._session = None
 
     def find(self, image: NDArray[np.uint8], boxes: Sequence[Box]) -> NDArray[np.float32]:
-        """Find the keypoints (n, 17, 3) of the person in each of `boxes`, in pixels of `image`.
+        """Find the keypoints of the person in each of some boxes, by one run of the network.
 
-        `image` is BGR. All boxes take one run of the network; raises ModelError before `open`.
+        Args:
+            image: Picture, height x width x 3, BGR.
+            boxes: Boxes of people, in pixels of `image`.
+
+        Returns:
+            Keypoints (n, 17, 3): u and v in pixels of `image`, and confidence.
+
+        Raises:
+            ModelError: Before `open`.
         """
         head = self.head
         regions = [head.region(box) for box in boxes]

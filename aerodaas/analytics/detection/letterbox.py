@@ -50,11 +50,24 @@ class Letterbox:
         self.top, self.left = (slack[0] // 2, slack[1] // 2) if style.centred else (0, 0)
 
     def buffer(self, count: int, dtype: type[PixelType]) -> NDArray[Any]:
-        """Make an input for `count` frames, count x 3 x height x width, filled with padding."""
+        """Make an input of the network, filled with padding.
+
+        Args:
+            count: Number of frames.
+            dtype: Type of its elements.
+
+        Returns:
+            Array, count x 3 x height x width.
+        """
         return np.full((count, 3, *self.network), self.style.fill * self.style.scale, dtype)
 
     def write(self, image: NDArray[np.uint8], slot: NDArray[Any]) -> None:
-        """Resize a BGR `image` into `slot` (3 x height x width) of a buffer."""
+        """Resize a picture into a slot of a buffer.
+
+        Args:
+            image: Picture, height x width x 3, BGR.
+            slot: Slot of the buffer, 3 x height x width.
+        """
         height, width = self.inner
         if self.frame != self.inner:
             image = np.asarray(cv2.resize(image, (width, height)), np.uint8)

@@ -129,14 +129,21 @@ class ModelFile:
         return tuple(str(name) for name in names)
 
     def refusal(self, problem: str, remedy: str = _REMEDY) -> ModelError:
-        """Make the error that names a problem of this file and its remedy."""
+        """Make the error that names a problem of this file and its remedy.
+
+        Args:
+            problem: What is wrong; follows the file's name.
+            remedy: What to do about it.
+        """
         return _refusal(self.path, problem, remedy)
 
 
 def read_model(path: str | Path, size: int | None = None) -> ModelFile:
     """Read and check an ONNX file, or a fetched model by its name.
 
-    `size` is the side in pixels of the square input of a model of variable input size.
+    Args:
+        path: The file, or a model's name.
+        size: Side in pixels of the square input of a model of variable input size.
 
     Raises:
         ModelError: If the file is missing, empty, not an ONNX model, or does not take one colour

@@ -42,11 +42,17 @@ def default_providers() -> list[str]:
 def open_session(
     content: bytes, label: str, providers: Sequence[str] | None, threads: int | None
 ) -> ort.InferenceSession:
-    """Create the session for a model's `content`, and log its execution provider.
+    """Create the session for a model, and log its execution provider.
 
-    `providers` are names in onnxruntime's spelling, best first; None selects those available of
-    TensorRT, CUDA and CPU. Raises ModelError if a provider is not installed or the session
-    cannot be created.
+    Args:
+        content: Content of the ONNX file.
+        label: Name of the model, for log and errors.
+        providers: Names in onnxruntime's spelling, best first; None selects those available of
+            TensorRT, CUDA and CPU.
+        threads: Threads of one inference; None for the default.
+
+    Raises:
+        ModelError: If a provider is not installed, or the session cannot be created.
     """
     available = ort.get_available_providers()
     missing = [name for name in providers or () if name not in available]

@@ -22,6 +22,10 @@ _FLAT_REMEDY = (
 def recognise(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
     """Return the decoder of the first of `families` that the model belongs to.
 
+    Args:
+        model: The model.
+        families: Families to ask, in order.
+
     Raises:
         ModelError: If it is made for another task, or belongs to none.
     """
@@ -39,7 +43,15 @@ def recognise(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
 
 
 def class_names(model: ModelFile, decoder: Decoder, names: Sequence[str] | None) -> tuple[str, ...]:
-    """Return `names`, or those of the file, or COCO's for 80 classes, or numbers.
+    """Return the names of a model's classes.
+
+    Args:
+        model: The model.
+        decoder: Its decoder.
+        names: Names that go before those of the file; None for none.
+
+    Returns:
+        `names`, or those of the file, or COCO's for 80 classes, or numbers.
 
     Raises:
         ModelError: If they are not as many as the model's classes.

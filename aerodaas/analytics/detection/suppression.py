@@ -14,7 +14,12 @@ __all__ = ["one_for_each", "strongest", "suppress"]
 
 
 def suppress(candidates: Candidates, iou: float) -> Candidates:
-    """Keep, best first, boxes that overlap no better one of their class by more than `iou`."""
+    """Keep, best first, boxes that overlap no better one of their class too much.
+
+    Args:
+        candidates: Boxes of one image.
+        iou: Overlap, intersection over union, above which only the better one is kept.
+    """
     if len(candidates) == 0:
         return candidates
     boxes = candidates.boxes.astype(np.float64)
@@ -31,17 +36,26 @@ def suppress(candidates: Candidates, iou: float) -> Candidates:
 
 
 def strongest(candidates: Candidates, count: int) -> Candidates:
-    """Keep the `count` candidates of highest score, in no particular order."""
+    """Keep the `count` candidates of highest score, in no particular order.
+
+    Args:
+        candidates: Boxes of one image.
+        count: Largest number to keep.
+    """
     if len(candidates) <= count:
         return candidates
     return candidates.select(np.argpartition(-candidates.scores, count)[:count])
 
 
 def one_for_each(items: Sequence[Detection], shared: float) -> list[Detection]:
-    """Keep, best first, boxes that share at most `shared` of the smaller box with a better one.
+    """Keep, best first, boxes that share little with a better one.
 
     A box of half an object lies within the box of the whole, and overlaps it too little for the
     usual suppression, which divides by the union. Labels are treated separately.
+
+    Args:
+        items: Detections of one image.
+        shared: Largest share of the smaller box that lies within the other one.
     """
     kept: list[Detection] = []
     boxes = np.zeros((0, 4))

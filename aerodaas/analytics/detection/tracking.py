@@ -69,7 +69,12 @@ class BoxFilter:
         self._velocity_variance = self._velocity_variance + noise * dt**2
 
     def shift(self, u: float, v: float) -> None:
-        """Move the estimate by pixels, as the camera has turned."""
+        """Move the estimate, as the camera has turned.
+
+        Args:
+            u: Pixels to the right.
+            v: Pixels down.
+        """
         self.value = self.value + np.array([u, v, 0.0, 0.0])
 
     def distance(self, box: Box) -> tuple[float, float]:
@@ -111,7 +116,12 @@ _ABOVE = 0.5
 
 
 def touches(one: Box, other: Box) -> bool:
-    """Whether two boxes overlap, or nearly do."""
+    """Whether two boxes overlap, or nearly do.
+
+    Args:
+        one: Box in pixels.
+        other: The other one.
+    """
     beside = _BESIDE * min(one[2] - one[0], other[2] - other[0])
     above = _ABOVE * min(one[3] - one[1], other[3] - other[1])
     across = min(one[2], other[2]) - max(one[0], other[0])
@@ -131,7 +141,12 @@ class AppearanceHistory:
         return len(self._seen)
 
     def add(self, stamp: int, appearance: bytes) -> None:
-        """Remember an appearance at mission time `stamp`, nanoseconds."""
+        """Add an appearance.
+
+        Args:
+            stamp: Mission time of the frame, nanoseconds.
+            appearance: Appearance of a person, as `Detection.appearance`.
+        """
         self._seen.append((stamp, appearance))
 
     def since(self, stamp: int = 0) -> tuple[bytes, ...]:
@@ -284,7 +299,12 @@ class TrackingAnalytics(Analytics[Detections]):
         self.tracker = Tracker(max_age=max_age, min_hits=min_hits)
 
     def process(self, item: Detections, context: Context) -> Detections:
-        """Return the same boxes with the track ids of confirmed tracks."""
+        """Return the same boxes with the track ids of confirmed tracks.
+
+        Args:
+            item: Boxes of one frame.
+            context: Ignored.
+        """
         del context
         return self.tracker.update(item)
 

@@ -59,7 +59,12 @@ class Trial:
 
 
 def preprocessing_for(model: ModelFile, decoder: Decoder) -> Preprocessing:
-    """The decoder's preprocessing; an input of bytes is not scaled."""
+    """The decoder's preprocessing; an input of bytes is not scaled.
+
+    Args:
+        model: The model.
+        decoder: Its decoder.
+    """
     style = decoder.preprocessing
     return replace(style, scale=1.0) if model.dtype is np.uint8 else style
 
@@ -67,7 +72,10 @@ def preprocessing_for(model: ModelFile, decoder: Decoder) -> Preprocessing:
 def try_out(model: ModelFile, decoder: Decoder, style: Preprocessing) -> Trial:
     """Run `model` on the trial pictures and examine what `decoder` makes of it.
 
-    `style` is how pictures become the network's input, by `preprocessing_for`.
+    Args:
+        model: The model.
+        decoder: Its decoder.
+        style: How pictures become the network's input, by `preprocessing_for`.
 
     Raises:
         ModelError: If its scores or boxes cannot be those of a detector.

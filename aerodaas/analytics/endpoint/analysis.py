@@ -48,7 +48,15 @@ class TensorAnalysis(Protocol):
     def postprocess(
         self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
     ) -> list[Any]:
-        """Convert the model's outputs for the frames last preprocessed to results."""
+        """Convert the model's outputs for the frames last preprocessed to results.
+
+        Args:
+            frames: The frames.
+            outputs: Outputs of the model, each with the batch axis first.
+
+        Returns:
+            The result of each frame.
+        """
         ...
 
 
@@ -61,10 +69,17 @@ class _Choosy(Protocol):
 def endpoint_analysis(
     work: Analytics[Any], name: str, resource: ComputeConfig, *, strict: bool
 ) -> Analytics[Any]:
-    """Wrap the analysis `work`, called `name`, so that its inference runs at `resource`.
+    """Wrap an analysis so that its inference runs at an endpoint.
 
-    A frame without a reply is counted and logged; with `strict` EndpointError is raised, too.
-    Raises GraphError if the endpoint's protocol does not support the analysis.
+    Args:
+        work: The analysis.
+        name: Name of its node.
+        resource: Compute resource, with the endpoint.
+        strict: Raise EndpointError for a frame without a reply, which is counted and logged in any
+            case.
+
+    Raises:
+        GraphError: If the endpoint's protocol does not support the analysis.
     """
     endpoint = resource.endpoint
     assert endpoint is not None  # noqa: S101 - implied by the resource's kind

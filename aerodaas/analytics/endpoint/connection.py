@@ -94,8 +94,15 @@ class Connection:
     ) -> Reply:
         """Send a request and return the reply, of any status except those of a busy server.
 
-        `budget` is the time for the reply in wall-clock seconds, capped by the endpoint's
-        `timeout`. Raises EndpointError without a reply within it.
+        Args:
+            method: HTTP method.
+            url: Address of the resource.
+            body: Body of the request; None for none.
+            headers: Further headers.
+            budget: Wall seconds for the reply, capped by the endpoint's `timeout`; None for that.
+
+        Raises:
+            EndpointError: Without a reply within `budget`.
         """
         timeout = self._config.timeout
         until = time.monotonic() + (timeout if budget is None else min(timeout, budget))

@@ -87,9 +87,16 @@ class FunctionUrl:
         classes: Sequence[str] | None = None,
         min_score: float = 0.0,
     ) -> Detections:
-        """Detect the objects in a frame, of these classes and of at least this score.
+        """Detect the objects in a frame.
 
-        `budget` is as in `Connection.ask`. Raises EndpointError.
+        Args:
+            frame: The frame.
+            budget: Wall seconds for the reply, as for `Connection.ask`.
+            classes: Labels to keep; None for all.
+            min_score: Least confidence of a detection, 0 to 1.
+
+        Raises:
+            EndpointError: Without a valid reply.
         """
         found = self._read(self._post(frame.image, budget), frame.width, frame.height)
         wanted = [

@@ -28,7 +28,15 @@ _DENIED = {HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN}
 
 
 def refuse_denied(reply: Reply, url: SecretUrl) -> None:
-    """Raise ConfigError if the endpoint rejects the secret."""
+    """Refuse a reply that rejects the secret.
+
+    Args:
+        reply: The reply.
+        url: Address of the endpoint, for the error.
+
+    Raises:
+        ConfigError: If the endpoint rejects the secret.
+    """
     if reply.status in _DENIED:
         raise ConfigError(
             f"{url} refuses our secret (status {reply.status}): "
@@ -48,7 +56,14 @@ class EndpointModel:
     def check(self, inputs: Sequence[TensorSpec], outputs: Sequence[TensorSpec]) -> None:
         """Compare the model's metadata at the endpoint with the expected inputs and outputs.
 
-        Raises ModelError or ConfigError if they do not fit, EndpointError without a reply.
+        Args:
+            inputs: Tensors that the model must take.
+            outputs: Tensors that the model must give, of any element type.
+
+        Raises:
+            ModelError: If the model does not fit, or is not there.
+            ConfigError: If the endpoint rejects the secret.
+            EndpointError: Without a reply.
         """
         reply = self._connection.ask("GET", self._path)
         refuse_denied(reply, self._connection.url)
@@ -70,8 +85,13 @@ class EndpointModel:
     def rehearse(self, inputs: Mapping[str, NDArray[Any]], outputs: Sequence[TensorSpec]) -> None:
         """Run one trial inference, which determines whether the server accepts binary tensors.
 
-        Raises ModelError if it accepts neither binary nor JSON tensors or the outputs do not fit,
-        EndpointError without a reply.
+        Args:
+            inputs: Arrays of the trial picture by name.
+            outputs: Tensors that the model must give.
+
+        Raises:
+            ModelError: If it accepts neither binary nor JSON tensors, or the outputs do not fit.
+            EndpointError: Without a reply.
         """
         for self._binary in (True, False):
             reply = self._infer(inputs, outputs, None)
@@ -92,7 +112,19 @@ class EndpointModel:
         outputs: Sequence[TensorSpec],
         budget: float | None,
     ) -> list[NDArray[Any]]:
-        """Run the model; raises EndpointError. `budget` is as in `Connection.ask`."""
+        """Run the model.
+
+        Args:
+            inputs: Arrays by name.
+            outputs: Tensors to be returned, in this order.
+            budget: Wall seconds for the reply, as for `Connection.ask`.
+
+        Returns:
+            Array of each output.
+
+        Raises:
+            EndpointError: Without a valid reply.
+        """
         reply = self._infer(inputs, outputs, budget)
         if reply.status != HTTPStatus.OK:
             self._connection.failures["status"] += 1

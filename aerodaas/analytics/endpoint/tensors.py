@@ -57,7 +57,13 @@ class TensorSpec:
 
     @classmethod
     def of(cls, name: str, kind: type[np.generic], shape: Sequence[int | None]) -> TensorSpec:
-        """Create a spec from a numpy type."""
+        """Create a spec from a numpy type.
+
+        Args:
+            name: Name of the tensor.
+            kind: Element type.
+            shape: Its dimensions; None for one of variable size.
+        """
         return cls(name, _NAMES[np.dtype(kind)], tuple(shape))
 
     def fits(self, shape: Sequence[int | None]) -> bool:
@@ -74,7 +80,16 @@ class TensorSpec:
 def encode_request(
     inputs: Mapping[str, NDArray[Any]], outputs: Sequence[str], *, binary: bool
 ) -> tuple[bytes, dict[str, str]]:
-    """Encode `inputs` as body and headers of a request for the named `outputs`."""
+    """Encode a request for inference.
+
+    Args:
+        inputs: Arrays by name.
+        outputs: Names of the outputs to be returned.
+        binary: Send and request arrays as bytes; if False, as JSON.
+
+    Returns:
+        Body and headers of the request.
+    """
     described, blocks = [], []
     for name, array in inputs.items():
         entry: dict[str, Any] = {
@@ -99,7 +114,18 @@ def encode_request(
 
 
 def decode_reply(body: bytes, header_length: str | None) -> dict[str, NDArray[Any]]:
-    """Decode the outputs of a reply by name; raises EndpointError for a malformed reply."""
+    """Decode the outputs of a reply.
+
+    Args:
+        body: Body of the reply.
+        header_length: Bytes of JSON before the arrays, as the header says; None if all is JSON.
+
+    Returns:
+        Array of each output by name.
+
+    Raises:
+        EndpointError: For a malformed reply.
+    """
     try:
         end = int(header_length) if header_length is not None else len(body)
         # A wrong length leaves invalid JSON or too little data, and so is detected.

@@ -22,10 +22,16 @@ def corners(centred: NDArray[np.float32]) -> NDArray[np.float32]:
 def best_class(
     scores: NDArray[np.float32], min_score: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
-    """Find the best class of each anchor in C x N `scores`.
+    """Find the best class of each anchor.
 
-    Returns the anchors that reach `min_score`, their scores and classes, and the number of
-    anchors with a NaN score. The class is computed only for the few anchors kept.
+    The class is computed only for the few anchors kept.
+
+    Args:
+        scores: Scores, C classes x N anchors.
+        min_score: Least score of an anchor that is kept.
+
+    Returns:
+        Anchors that are kept, their scores and classes, and the number of anchors with a NaN score.
     """
     best = scores.max(axis=0)
     kept = np.flatnonzero(best >= min_score)
@@ -36,10 +42,17 @@ def best_class(
 def listed(
     scores: NDArray[np.float32], classes: NDArray[np.float32], count: int, min_score: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
-    """Find the detections of a list that reach `min_score` and are of one of `count` classes.
+    """Find the detections of a list that have a score and a class.
 
-    Returns their rows, scores and classes, and the number of rows with a NaN score, or of no class
-    though they reach `min_score`.
+    Args:
+        scores: Score of each row.
+        classes: Number of each row's class.
+        count: Number of classes.
+        min_score: Least score of a row that is kept.
+
+    Returns:
+        Rows that are kept, their scores and classes, and the number of rows with a NaN score, or of
+        no class though they reach `min_score`.
     """
     enough = scores >= min_score
     known = (classes >= 0) & (classes < count)

@@ -100,8 +100,13 @@ class Decoder(Protocol):
     ) -> Candidates:
         """Decode the outputs for one image, without the batch axis.
 
-        `size` is the height and width of the network's input in pixels. A trial run asks for every
-        box: its `min_score` is minus infinity.
+        Args:
+            outputs: Outputs of the network for the image.
+            size: Height and width of the network's input in pixels.
+            min_score: Least score of a box that is kept; minus infinity in a trial run.
+
+        Returns:
+            The boxes in pixels of the network's input.
         """
         ...
 
@@ -118,7 +123,15 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (4, 8, 16, 32), (16, 32))
 
 
 def strides_for(size: tuple[int, int], count: int) -> tuple[int, ...] | None:
-    """Strides whose feature maps have `count` cells in total; None if there are none."""
+    """Strides whose feature maps have a number of cells in total.
+
+    Args:
+        size: Height and width of the network's input in pixels.
+        count: Number of cells.
+
+    Returns:
+        The strides in pixels, or None if there are none.
+    """
     return next((s for s in _STRIDES if _anchor_count(size, s) == count), None)
 
 

@@ -40,7 +40,13 @@ class EndToEndDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the rows with a score of at least `min_score` and a valid class."""
+        """Keep the rows with enough score and a valid class.
+
+        Args:
+            outputs: One array, N rows of box, score, class and keypoints.
+            size: Ignored.
+            min_score: Least score of a row.
+        """
         del size
         rows = outputs[0]
         kept, scores, classes, invalid = listed(

@@ -38,7 +38,13 @@ class NmsOutputsDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the detections with a score of at least `min_score` and a valid class."""
+        """Keep the detections with enough score and a valid class.
+
+        Args:
+            outputs: Number of detections, boxes (N, 4), scores (N,) and class numbers (N,).
+            size: Ignored.
+            min_score: Least score of a detection.
+        """
         del size
         count, boxes, scores, numbers = outputs
         # The first ones, so that their numbers hold for the boxes, too.

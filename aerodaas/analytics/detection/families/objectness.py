@@ -17,10 +17,16 @@ _OBJECTNESS, _FIRST_CLASS = 4, 5
 def pick(
     rows: NDArray[np.float32], min_score: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
-    """Find the boxes of [boxes, 5 + classes] whose objectness x class score reaches `min_score`.
+    """Find the boxes whose score, objectness x class score, is enough.
 
-    Returns their indices, scores and classes, and the number of NaN scores. No class score
-    exceeds 1, so the objectness alone rules out most boxes.
+    No class score exceeds 1, so the objectness alone rules out most boxes.
+
+    Args:
+        rows: Boxes x (5 + classes).
+        min_score: Least score of a box that is kept.
+
+    Returns:
+        Indices of the boxes that are kept, their scores and classes, and the number of NaN scores.
     """
     objectness = rows[:, _OBJECTNESS]
     invalid = int(np.count_nonzero(np.isnan(objectness)))

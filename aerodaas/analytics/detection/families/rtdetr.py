@@ -54,7 +54,13 @@ class RtDetrDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the queries whose score reaches `min_score`, their boxes scaled to pixels."""
+        """Keep the queries with enough score, their boxes scaled to pixels.
+
+        Args:
+            outputs: Boxes as fractions of the input, with their scores or with score and class.
+            size: Height and width of the network's input in pixels.
+            min_score: Least score of a query.
+        """
         if self.ranked:
             boxes = outputs[0]
             found = listed(boxes[:, _SCORE], boxes[:, _CLASS], self.classes, min_score)

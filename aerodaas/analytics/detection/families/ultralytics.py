@@ -44,7 +44,13 @@ class UltralyticsDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Decode only the anchors whose score reaches `min_score`."""
+        """Decode only the anchors with enough score.
+
+        Args:
+            outputs: One array, (4 + classes + keypoints) x N anchors.
+            size: Ignored.
+            min_score: Least score of an anchor.
+        """
         del size
         raw = outputs[0]
         kept, scores, classes, invalid = best_class(raw[_BOX : _BOX + self.classes], min_score)
@@ -79,7 +85,15 @@ def keypoint_shape(model: ModelFile) -> tuple[int, int] | None:
 def read_keypoints(
     rows: NDArray[np.float32], shape: tuple[int, int] | None
 ) -> NDArray[np.float32] | None:
-    """Reshape N rows of flat keypoints to N x K x 3; a missing confidence counts as 1."""
+    """Reshape rows of flat keypoints; a missing confidence counts as 1.
+
+    Args:
+        rows: N rows.
+        shape: Number of keypoints, and of numbers for each: 2 or 3; None without keypoints.
+
+    Returns:
+        Keypoints, N x K x 3, or None without.
+    """
     if shape is None:
         return None
     points = rows.reshape(len(rows), *shape)

@@ -43,7 +43,13 @@ class YoloNasDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the cells whose score reaches `min_score`."""
+        """Keep the cells with enough score.
+
+        Args:
+            outputs: Boxes (N, 4) in pixels and scores (N, classes), in the order of the model.
+            size: Ignored.
+            min_score: Least score of a cell.
+        """
         del size
         boxes, scores = (outputs[number] for number in self.outputs)
         kept, best, classes, invalid = best_class(scores.T, min_score)

@@ -42,7 +42,13 @@ class YoloV5Decoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Select the boxes whose score reaches `min_score`, and convert them to corners."""
+        """Select the boxes with enough score, and convert them to corners.
+
+        Args:
+            outputs: One array, boxes x (5 + classes).
+            size: Ignored.
+            min_score: Least score of a box.
+        """
         del size
         rows = outputs[0]
         kept, scores, classes, invalid = pick(rows, min_score)

@@ -47,7 +47,13 @@ class YoloxDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Decode only the cells whose score reaches `min_score`."""
+        """Decode only the cells with enough score.
+
+        Args:
+            outputs: One array, cells x (5 + classes).
+            size: Height and width of the network's input in pixels.
+            min_score: Least score of a cell.
+        """
         rows = outputs[0]
         kept, scores, classes, invalid = pick(rows, min_score)
         boxes = rows[kept, :_BOX]
