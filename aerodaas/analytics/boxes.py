@@ -20,10 +20,16 @@ O_co = TypeVar("O_co", covariant=True)
 def shipped_detector(
     owner: str, labels: Sequence[str], also: Sequence[str] = ()
 ) -> Analytics[Detections]:
-    """Create the shipped detector for `also` and those of `labels` that it has classes for.
+    """Create the detector that ships, for those of some labels that it has classes for.
 
-    Raises GraphError, in the name of `owner`, if it has none of them, and ModelError if its file
-    is missing.
+    Args:
+        owner: Name of the analysis that uses it, for the error.
+        labels: Labels that the analysis takes, of which the detector must have a class for one.
+        also: Further classes to detect.
+
+    Raises:
+        GraphError: If it has a class for none of `labels`.
+        ModelError: If its file is missing.
     """
     known = [label for label in labels if label in DETECTOR_CLASSES]
     if not known:
@@ -64,7 +70,15 @@ class BoxAnalytics(Analytics[O_co]):
             self.isolated = True
 
     def examine(self, boxes: Detections, context: Context) -> O_co | None:
-        """Turn the boxes of one frame into a result."""
+        """Turn the boxes of one frame into a result.
+
+        Args:
+            boxes: Boxes of the frame.
+            context: Services of its node.
+
+        Returns:
+            The result to publish, or None for no result.
+        """
         raise NotImplementedError
 
     def open(self) -> None:
@@ -78,14 +92,27 @@ class BoxAnalytics(Analytics[O_co]):
             self.detector.close()
 
     def process(self, item: Detections | Frame, context: Context) -> O_co | None:
-        """Turn one frame, or its boxes, into a result."""
+        """Turn one frame, or its boxes, into a result.
+
+        Args:
+            item: Frame, which is given to the detector, or the boxes of one.
+            context: Services of its node.
+
+        Returns:
+            The result to publish, or None for no result.
+        """
         if not isinstance(item, Frame):
             return self.examine(item, context)
         found = self.detector.process(item, context) if self.detector is not None else None
         return None if found is None else self.examine(found, context)
 
     def explain_once(self, boxes: Detections, context: Context) -> None:
-        """Publish one alert that names the missing calibration or height."""
+        """Publish one alert that names the missing calibration or height.
+
+        Args:
+            boxes: Boxes of a frame without calibration or height.
+            context: Services of its node.
+        """
         if self._explained:
             return
         self._explained = True

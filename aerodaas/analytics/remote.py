@@ -65,4 +65,9 @@ class RemoteAnalytics(NavigableAnalytics):
             )
 
     def process(self, item: object, context: Context) -> None:
-        """Do nothing: waypoints arrive by the API."""
+        """Do nothing: waypoints arrive by the API.
+
+        Args:
+            item: Ignored.
+            context: Ignored.
+        """

@@ -42,6 +42,11 @@ class SyntheticAnalytics(Analytics[Readings]):
         self._seconds = {"edge": edge_ms / 1000, "cloud": cloud_ms / 1000}
 
     def process(self, item: Frame, context: Context) -> Readings:
-        """Sleep for the execution time, and return it in seconds."""
+        """Sleep for the execution time, and return it in seconds.
+
+        Args:
+            item: Frame, whose stamp the result has.
+            context: Services of its node, whose kind selects the time.
+        """
         time.sleep(self._seconds[context.kind])
         return Readings(item.header.stamp, {"seconds": self._seconds[context.kind]})

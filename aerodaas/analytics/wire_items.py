@@ -139,7 +139,15 @@ def item_json(item: object) -> Any:  # noqa: ANN401 - JSON
 
 
 def unpack(content: Any, blob: bytes = b"") -> Any:  # noqa: ANN401 - JSON to any item
-    """Rebuild an item from the wire; raises MessageError if it is malformed or too large."""
+    """Rebuild an item from the wire.
+
+    Args:
+        content: JSON of the item; it may be a stranger's.
+        blob: Bytes beside it, only for a frame.
+
+    Raises:
+        MessageError: If it is malformed or too large.
+    """
     _require_bounds(content)
     whole = content if isinstance(content, dict) else {"is": type(content).__name__}
     kind = str(whole.get("is"))

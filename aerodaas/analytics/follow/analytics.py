@@ -167,7 +167,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None without a target."""
+        """Return one velocity command, or None without a target.
+
+        Args:
+            boxes: Boxes of one frame.
+            context: Services of its node.
+        """
         item = boxes
         if item.camera is None:
             self.explain_once(item, context)

@@ -69,7 +69,13 @@ class TargetIdentity:
         self._rivals.clear()
 
     def watch(self, target: Track | None, others: Sequence[Track], stamp: int) -> None:
-        """Take in the tracks after a frame at `stamp`; `target` is the followed one."""
+        """Update the identity by the tracks after a frame.
+
+        Args:
+            target: Track of the followed person; None while there is none.
+            others: All other tracks.
+            stamp: Mission time of the frame, nanoseconds.
+        """
         if target is None:
             return
         touched = False
@@ -108,7 +114,12 @@ class TargetIdentity:
         return found
 
     def may_be_mine(self, track: int | None, looks: Sequence[bytes]) -> bool:
-        """Whether a box of this `track` may show the followed person while theirs is not seen."""
+        """Whether a box may show the followed person while theirs is not seen.
+
+        Args:
+            track: Id of the box's track; None without one.
+            looks: Appearances of the track.
+        """
         if self.certainty is Certainty.CERTAIN:
             # Where nobody came close, the place tells more than looks, as of who has fallen.
             return self._together[track or 0] < _TOGETHER

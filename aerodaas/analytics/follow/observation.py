@@ -20,7 +20,12 @@ def observation(
 ) -> Observation:
     """Combine the `sighting` in `boxes` with the drone's odometry at capture and at present.
 
-    `others` and `people` are those of `Observation`.
+    Args:
+        boxes: Boxes of one frame.
+        sighting: The target in it; None if it is not seen.
+        context: Services of the node, with the vehicle's newest state.
+        others: Everybody and everything else that the drone must not fly into.
+        people: Everybody who is seen, among them the target if that is a person.
     """
     state = context.vehicle()
     return Observation(

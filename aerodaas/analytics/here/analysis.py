@@ -97,10 +97,18 @@ class HereAnalysis(Analytics[Any]):
             ) from None
 
     def process(self, item: Any, context: Context) -> Any:  # noqa: ANN401 - any result
-        """Ask the user's side; None, and an error once, while it does not answer.
+        """Ask the user's side for the result.
 
-        Raises ModelError for a failure there, MessageError for a malformed result or one of
-        another class than was declared.
+        Args:
+            item: Item of the analysed stream.
+            context: Services of its node.
+
+        Returns:
+            The result; None while the user's side does not answer.
+
+        Raises:
+            ModelError: For a failure there, and once while there is no answer.
+            MessageError: For a malformed result, or one of another class than was declared.
         """
         _fired.pop(self.key, None)
         content, blob = pack(item, lossless=self._site.lossless)

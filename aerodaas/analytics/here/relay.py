@@ -56,7 +56,16 @@ class Channel:
         self._socket = connection
 
     def send(self, text: dict[str, Any], blob: bytes = b"", timeout: float | None = None) -> None:
-        """Send one message; raises ChannelError if it is too large or not taken in time."""
+        """Send one message.
+
+        Args:
+            text: Its JSON, at most 4 MiB.
+            blob: Bytes that follow it, at most 64 MiB.
+            timeout: Seconds to wait until it is taken; None for no limit.
+
+        Raises:
+            ChannelError: If it is too large, not taken in time, or the other process has ended.
+        """
         data = json.dumps(text).encode()
         if len(data) > LARGEST_TEXT or len(blob) > _LARGEST_BLOB:
             raise ChannelError(f"a message of {len(data)} and {len(blob)} bytes is too large")
@@ -166,11 +175,21 @@ class HereUser:
         self._relay = relay
 
     def answered(self, message: object, blob: bytes = b"") -> None:
-        """Take an answer, JSON and a blob, as it came from the user; never raises."""
+        """Accept an answer as it came from the user; never raises.
+
+        Args:
+            message: Its JSON.
+            blob: Bytes that came with it.
+        """
         self._relay.accept_answer(self, message, blob)
 
     def answered_text(self, text: bytes, blob: bytes = b"") -> None:
-        """As `answered`, with the JSON as it came; what cannot be an answer is not even parsed."""
+        """As `answered`, with the JSON as it came; what cannot be an answer is not even parsed.
+
+        Args:
+            text: JSON of the answer as UTF-8.
+            blob: Bytes that came with it.
+        """
         if (
             not (self.slow or self._relay.waits)
             or text.count(b"[") + text.count(b"{") > _MOST_GROUPS
@@ -242,7 +261,13 @@ class HereRelay:
         self._drop(user, "the user's side has left")
 
     def accept_answer(self, user: HereUser, message: object, blob: bytes) -> None:
-        """Take an answer of `user`; one to no question of theirs is ignored."""
+        """Accept an answer of the user; one to no question of theirs is ignored.
+
+        Args:
+            user: Who answers.
+            message: JSON of the answer, with its `number`.
+            blob: Bytes that came with it.
+        """
         content = message if isinstance(message, dict) else {}
         number = content.get("number")
         if not isinstance(number, int):
@@ -274,7 +299,15 @@ class HereRelay:
         self.path.unlink(missing_ok=True)
 
     def ask(self, request: dict[str, Any], blob: bytes) -> dict[str, Any]:
-        """Ask the user; the answer, or why there is none, as `absent`."""
+        """Ask the user.
+
+        Args:
+            request: Question as JSON, with the `key` of its analysis.
+            blob: Bytes of the item that go beside the JSON.
+
+        Returns:
+            The answer, or why there is none, as `absent`.
+        """
         key = str(request.get("key"))
         with self._lock:
             user = self._user
@@ -330,7 +363,12 @@ class HereRelay:
 
 
 def oversize(content: dict[str, Any], blob: bytes) -> str:
-    """What is wrong with an answer's size; empty if nothing is."""
+    """What is wrong with an answer's size; empty if nothing is.
+
+    Args:
+        content: JSON of the answer.
+        blob: Bytes beside it, of which there may be none.
+    """
     size = len(json.dumps(content))
     if blob or size > LARGEST_ANSWER:
         return f"an answer of {size} bytes and {len(blob)} beside it; the most are {LARGEST_ANSWER}"

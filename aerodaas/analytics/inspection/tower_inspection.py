@@ -134,12 +134,22 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         return stream
 
     def process(self, item: Detections | Frame, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None without a tower to inspect."""
+        """Return one velocity command, or None without a tower to inspect.
+
+        Args:
+            item: Frame, or the boxes of one.
+            context: Services of its node.
+        """
         self._frame = item if isinstance(item, Frame) else None
         return super().process(item, context)
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None without a tower to inspect."""
+        """Return one velocity command, or None without a tower to inspect.
+
+        Args:
+            boxes: Boxes of one frame.
+            context: Services of its node.
+        """
         if boxes.camera is None or boxes.odometry is None:
             self.explain_once(boxes, context)
             return None

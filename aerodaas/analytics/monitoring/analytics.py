@@ -80,7 +80,15 @@ class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
         item: Odometry | VehicleState | GpsFix | Battery | MissionStatus | Frame,
         context: Context,
     ) -> Readings:
-        """Update the readings from one item; returns the newest values of the selected ones."""
+        """Update the readings from one item.
+
+        Args:
+            item: Item of an analysed stream.
+            context: Services of its node.
+
+        Returns:
+            The newest values of the selected readings.
+        """
         now = context.now()
         vehicle = context.vehicle()
         if vehicle is not None:

@@ -76,7 +76,16 @@ class DistanceAnalytics(BoxAnalytics[Readings]):
         self._near = Debounce(needed, of)
 
     def examine(self, boxes: Detections, context: Context) -> Readings:
-        """Measure the distances in one frame."""
+        """Measure the distances in one frame.
+
+        Args:
+            boxes: Boxes of the frame.
+            context: Services of its node.
+
+        Returns:
+            Metres to the nearest object of each label, and to the nearest of all with its bearing
+            in radians.
+        """
         stamp = boxes.header.stamp
         if boxes.camera is None:
             self.explain_once(boxes, context)

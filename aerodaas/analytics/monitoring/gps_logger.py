@@ -66,9 +66,14 @@ class GpsTrack:
 
 
 def parse_track(text: str, name: str) -> GpsTrack:
-    """Parse the text of a GPX, CSV or JSON document called `name`.
+    """Parse the text of a GPX, CSV or JSON document.
 
-    Raises SourceError for any other format.
+    Args:
+        text: The text.
+        name: Name of the document, for errors.
+
+    Raises:
+        SourceError: For any other format.
     """
     start = text.lstrip("\ufeff \t\r\n")[:1]
     if start == "<":
@@ -302,7 +307,12 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
             )
 
     def process(self, item: None, context: Context) -> GpsFix | None:
-        """Return the newest fix if it has not been published yet, else None."""
+        """Return the newest fix if it has not been published yet, else None.
+
+        Args:
+            item: Ignored.
+            context: Services of its node, with the present mission time.
+        """
         del item
         if self._is_feed:
             return self._ask(context)

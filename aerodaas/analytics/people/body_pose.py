@@ -46,10 +46,13 @@ Array = NDArray[np.float64]
 
 
 def raised_arm(keypoints: NDArray[np.floating], min_confidence: float) -> bool:
-    """Whether a wrist of `keypoints` (17, 3) is above the face, on an arm of human length.
+    """Whether a wrist is above the face, on an arm of human length.
 
-    If the wrist is not seen, the elbow decides. Joints below `min_confidence` count as not seen.
-    Without hips, the length of the arm is not checked.
+    If the wrist is not seen, the elbow decides. Without hips, the length of the arm is not checked.
+
+    Args:
+        keypoints: Keypoints of a body, (17, 3): u and v in pixels, and confidence.
+        min_confidence: Confidence below which keypoints count as not seen, 0 to 1.
     """
     points = keypoints[:, :2].astype(np.float64)
     seen = visible(keypoints, min_confidence)
@@ -214,7 +217,12 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     def deploy(
         self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
     ) -> Self:
-        """Run on `compute`, together with its own pose model; otherwise as `Analytics.deploy`."""
+        """Run on `compute`, together with its own pose model; otherwise as `Analytics.deploy`.
+
+        Args:
+            compute: Edge or cloud node, or endpoint; or `env.here`.
+            runtime_env: The analysis' own runtime environment; None for the node's.
+        """
         super().deploy(compute, runtime_env)
         if self._poses is not None and self.node is not None and self._graph is not None:
             self._graph.nodes[self._poses].compute = self.node.compute
@@ -240,7 +248,15 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.classifier.close()
 
     def process(self, item: Detections, context: Context) -> Detections | None:
-        """Analyse one frame; None for boxes of vests, which only identify the wearer."""
+        """Analyse one frame.
+
+        Args:
+            item: Bodies with keypoints, or boxes of vests, which only identify the wearer.
+            context: Services of its node.
+
+        Returns:
+            The result, or None for boxes of vests.
+        """
         if item.labelled(*self.vest_labels):
             self._vests = item
         bodies = any(one.keypoints is not None for one in item)

@@ -69,7 +69,16 @@ class CrowdDensityAnalytics(BoxAnalytics[Readings]):
         self._crowded = Debounce(needed, of)
 
     def examine(self, boxes: Detections, context: Context) -> Readings:
-        """Count the people in one frame and measure their density."""
+        """Count the people in one frame and measure their density.
+
+        Args:
+            boxes: Boxes of the frame.
+            context: Services of its node.
+
+        Returns:
+            `count`; where the camera is calibrated, `area` in m² and `density` and `peak` in people
+            per m².
+        """
         people = [
             item for item in boxes.labelled(*self.labels) if all(map(math.isfinite, item.box))
         ]

@@ -34,7 +34,15 @@ class Debounce:
         self._since: int | None = None
 
     def update(self, stamp: int, shown: bool) -> bool:  # noqa: FBT001 - its only input
-        """Add whether the frame of `stamp` (nanoseconds) shows the event; returns `active`."""
+        """Add a frame.
+
+        Args:
+            stamp: Mission time of the frame, nanoseconds.
+            shown: Whether the frame shows the event.
+
+        Returns:
+            Whether the event holds, as `active`.
+        """
         if self._frames and not 0 <= seconds(stamp - self._frames[-1][0]) <= _LONGEST_GAP:
             self._frames.clear()
         self._frames.append((stamp, shown))

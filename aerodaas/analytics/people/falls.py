@@ -115,10 +115,15 @@ class FallDetector:
         self._fell = False
 
     def shows(self, person: Detection | None, seen: Detections) -> bool:
-        """Process a frame of people; returns whether the person has fallen.
+        """Process a frame of people.
 
-        `person` is None if not detected. Always False for a camera of unknown calibration, and of
-        unknown height or nearer to the ground than 0.5 m.
+        Args:
+            person: The person, one of `seen`; None if not detected.
+            seen: People in the frame.
+
+        Returns:
+            Whether the person has fallen; always False for a camera of unknown calibration, and of
+            unknown height or nearer to the ground than 0.5 m.
         """
         view = _view_of(seen)
         if view is None:

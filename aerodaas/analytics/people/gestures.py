@@ -32,12 +32,18 @@ Array = NDArray[np.float32]
 
 
 def normalised(keypoints: Array, min_confidence: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Features (N, 51) of bodies (N, 17, 3: u, v, confidence), and a mask of the usable bodies.
+    """Features of bodies, independent of their place and distance.
 
-    A body is centred on its trunk and scaled to one size, independent of its distance. Points
-    below `min_confidence`, and those that are not finite, count as missing: they are placed at
-    the centre, and 17 further features flag the points present. A usable body has at least five
-    points, one of them of the trunk.
+    A body is centred on its trunk and scaled to one size. Missing points are placed at the centre,
+    and 17 further features flag the points present.
+
+    Args:
+        keypoints: Keypoints of N bodies, (N, 17, 3): u, v, confidence.
+        min_confidence: Confidence below which keypoints count as missing, as do those not finite.
+
+    Returns:
+        Features (N, 51), and a mask of the usable bodies, which have at least five points, one of
+        them of the trunk.
     """
     points = np.asarray(keypoints[..., :2], np.float64)
     seen = visible(keypoints, min_confidence)

@@ -51,7 +51,15 @@ MIRRORED = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15])
 
 
 def visible(keypoints: NDArray[np.floating[Any]], min_confidence: float) -> NDArray[np.bool_]:
-    """Mask (..., 17) of the `keypoints` (..., 17, 3: u, v, confidence) that count as visible."""
+    """Mask of the keypoints that count as visible.
+
+    Args:
+        keypoints: Keypoints, (..., 17, 3): u, v, confidence.
+        min_confidence: Confidence below which keypoints count as missing, 0 to 1.
+
+    Returns:
+        Mask, (..., 17).
+    """
     finite = np.isfinite(keypoints).all(axis=-1)
     return np.asarray(finite & (keypoints[..., 2] >= min_confidence))
 
@@ -76,9 +84,13 @@ def square_around(box: Box) -> Region:
 def cut_region(
     image: NDArray[np.uint8], region: Region, size: tuple[int, int], fill: int = GREY
 ) -> NDArray[np.uint8]:
-    """Crop a region of `image` to `size` (width, height), of one shape.
+    """Crop a region of a picture and resize it.
 
-    Outside the image it is of the grey level `fill`, 0 to 255.
+    Args:
+        image: Picture, height x width x 3.
+        region: Left, top, width and height in pixels of `image`, also beyond it.
+        size: Width and height of the result in pixels, of the region's shape.
+        fill: Grey level outside the picture, 0 to 255.
     """
     left, top, wide, high = region
     height, width = image.shape[:2]

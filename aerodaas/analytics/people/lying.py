@@ -39,11 +39,19 @@ _NEAREST = 0.3
 
 
 def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: float) -> bool | None:
-    """Whether the body with `keypoints` (17, 3) in the frame of `seen` lies on flat ground.
+    """Whether a body lies on flat ground.
 
-    None if undecidable: for a camera of unknown height or calibration, without a pair of ankles
-    or knees, or without two joints of head and shoulders or both hips. Each joint is assumed to
-    be above the nearest foot or knee, which gives its height if the body is upright.
+    Each joint is assumed to be above the nearest foot or knee, which gives its height if the body
+    is upright.
+
+    Args:
+        keypoints: Keypoints of the body, (17, 3): u and v in pixels, and confidence.
+        seen: Frame in which it is.
+        min_confidence: Confidence below which keypoints count as missing, 0 to 1.
+
+    Returns:
+        None if undecidable: for a camera of unknown height or calibration, without a pair of ankles
+        or knees, or without two joints of head and shoulders or both hips.
     """
     try:
         view = GroundView(seen)
@@ -70,9 +78,16 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
 def feet_below(
     keypoints: NDArray[np.floating], view: GroundView, min_confidence: float
 ) -> NDArray[np.float64] | None:
-    """Position of a standing person, metres forward and left, by the lowest visible joint pair.
+    """Position of a standing person by the lowest visible joint pair.
 
-    None if that pair is too high for this camera, or if no pair is visible.
+    Args:
+        keypoints: Keypoints of the person, (17, 3): u and v in pixels, and confidence.
+        view: The camera over the ground.
+        min_confidence: Confidence below which keypoints count as missing, 0 to 1.
+
+    Returns:
+        Metres forward and left, (2,); None if that pair is too high for this camera, or if no pair
+        is visible.
     """
     known = visible(keypoints, min_confidence)
     for part, up in _LEGS:
