@@ -34,13 +34,21 @@ class Pin:
         self._refused_at = self._moved_at = -math.inf
 
     def set(self, peer: Peer, now: float) -> None:
-        """Pin `peer`, heard at `now` (seconds)."""
+        """Pin `peer`.
+
+        Args:
+            peer: Address of the pinned one.
+            now: When it was heard, monotonic seconds.
+        """
         self.address, self._heard_at = peer, now
 
     def admits(self, peer: Peer, now: float, *, may_lead: bool = True) -> bool:
         """Whether a packet of `peer` is the pinned one's.
 
-        With `may_lead` False this packet does not make another address the pinned one.
+        Args:
+            peer: Address that it came from.
+            now: When it was heard, monotonic seconds.
+            may_lead: False for a packet that does not make another address the pinned one.
         """
         if peer is None or self.address in {None, peer}:
             self.set(peer, now)

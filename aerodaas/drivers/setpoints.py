@@ -17,9 +17,14 @@ __all__ = ["require_finite", "slowed"]
 def slowed(
     setpoint: PositionSetpoint, cruise: float, fastest: float
 ) -> tuple[PositionSetpoint, float]:
-    """`setpoint` with a speed of at most `fastest` m/s, and that speed; `cruise` if it names none.
+    """`setpoint` with a speed that can be flown, and that speed in m/s.
 
     Its place is passed no faster than the way there is flown.
+
+    Args:
+        setpoint: The setpoint.
+        cruise: Speed if it names none, m/s.
+        fastest: Largest speed, m/s.
     """
     speed = min(cruise if setpoint.speed is None else float(setpoint.speed), fastest)
     passing = min(float(setpoint.passing_speed), speed)
@@ -27,7 +32,16 @@ def slowed(
 
 
 def require_finite(name: str, setpoint: Setpoint) -> None:
-    """Raise InvalidWaypointError unless the numbers of `setpoint` can be flown by robot `name`."""
+    """Check that the numbers of `setpoint` can be flown.
+
+    Args:
+        name: Id of the robot, for the error.
+        setpoint: The setpoint.
+
+    Raises:
+        InvalidWaypointError: A number is not finite, a speed not positive, or a passing speed
+            negative.
+    """
     if isinstance(setpoint, VelocitySetpoint):
         vectors = [setpoint.velocity]
         scalars: dict[str, float | None] = {"yaw_rate": setpoint.yaw_rate}

@@ -59,7 +59,12 @@ class Connection:
     """System and component."""
 
     def put_back(self, name: str, *, stands: bool) -> None:
-        """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
+        """Give the vehicle its own parameters back, if it stands: they may bring it home else.
+
+        Args:
+            name: Id of the robot, for warnings.
+            stands: Whether the vehicle stands on the ground.
+        """
         if not stands:
             _log.warning(
                 "%s: still in flight, so that its fallback stays set; the next flight, or "
@@ -77,7 +82,15 @@ def require_answer(commander: Commander, name: str, pause: Callable[[], None]) -
     """Wait for the first answer of a vehicle that signs, while we have no key.
 
     Its packets can be read without one, so that all would look well until it is to be flown; but
-    most that sign drop what is unsigned. Raises VehicleError if this one does.
+    most that sign drop what is unsigned.
+
+    Args:
+        commander: Knows whether a command was answered.
+        name: Id of the robot, for the error.
+        pause: Waits for the next messages.
+
+    Raises:
+        VehicleError: The vehicle answers nothing.
     """
     deadline = time.monotonic() + _ANSWER
     while not commander.answered:
@@ -101,7 +114,22 @@ def establish(
     home: GeodeticOrigin | None,
     pause: Callable[[], None],
 ) -> Connection:
-    """Wait until it is ready, see to its protections and its fence; raises VehicleError."""
+    """Wait until it is ready, see to its protections and its fence.
+
+    Args:
+        link: The link, whose vehicle is adopted.
+        autopilot: The autopilot's dialect of commands and parameters.
+        commander: Sends the vehicle's commands.
+        departure: Take-off of the vehicle.
+        telemetry: What the vehicle has told so far.
+        robot: The robot, with its limits and start.
+        settings: Settings of its driver.
+        home: Geodetic origin of the environment; None without one.
+        pause: Waits for the next messages.
+
+    Raises:
+        VehicleError: The vehicle is not ready in time, or a protection cannot be seen to.
+    """
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
     # Now: its place may be lost again, which changes nothing any more, while the rest is seen to.

@@ -433,7 +433,15 @@ class MavlinkVehicle:
     def upload_mission(
         self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
     ) -> None:
-        """Replace the mission on the vehicle by `items`; blocks, raises VehicleError."""
+        """Replace the mission on the vehicle by `items`; blocks.
+
+        Args:
+            items: Items of the plan, in order.
+            progress: Called with the number of items uploaded and of all items.
+
+        Raises:
+            VehicleError: The upload failed, or the vehicle is not ours to control.
+        """
         self._require_control("take a mission")
         upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
@@ -449,7 +457,19 @@ class MavlinkVehicle:
     def fetch_log(
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
     ) -> Path:
-        """Fetch one of them into `folder`; blocks, raises VehicleError, in flight always."""
+        """Fetch one of them into `folder`; blocks.
+
+        Args:
+            log: The log, as the vehicle lists it.
+            folder: Made where it is missing.
+            progress: Called with the bytes fetched and of all bytes.
+
+        Returns:
+            Path of the file.
+
+        Raises:
+            VehicleError: The log cannot be fetched; in flight always.
+        """
         link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
         return fetch_log(link, autopilot, log, folder, progress, ftp=self._telemetry.serves_files)
 

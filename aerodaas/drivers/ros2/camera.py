@@ -120,9 +120,14 @@ class Ros2Camera:
         )
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest picture at mission time `stamp`; None if there is no new one.
+        """Return the newest picture; None if there is no new one.
 
-        Raises SourceError for a pixel format that is not known.
+        Args:
+            stamp: Mission clock, nanoseconds; the picture's age is subtracted.
+            pose: Ignored.
+
+        Raises:
+            SourceError: The pixel format is not known.
         """
         del pose
         with self._lock:

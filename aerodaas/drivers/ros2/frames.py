@@ -24,7 +24,13 @@ class Alignment:
 
     @classmethod
     def to(cls, start: Vector, yaw: float, first: Odometry) -> Alignment:
-        """Such that the drone of the odometry `first` stands at `start`, with heading `yaw`."""
+        """Such that a drone that tells the odometry `first` stands at `start`.
+
+        Args:
+            start: ENU metres.
+            yaw: Its heading there, radians counter-clockwise from east.
+            first: Its odometry in its own frame.
+        """
         turn = wrap_angle(yaw - first.yaw)
         return cls(turn, start - body_to_enu(first.position, turn))
 

@@ -84,7 +84,12 @@ class VelocityLoop:
             self.hold(odometry)
 
     def take_off(self, height: float, odometry: Odometry) -> None:
-        """Climb to `height` metres above where it stands."""
+        """Climb from where it stands.
+
+        Args:
+            height: Metres.
+            odometry: The drone's, in the local frame.
+        """
         self._ground = odometry.height
         self._touchdown = Touchdown(self._ground)
         self._target = PositionSetpoint(
@@ -107,7 +112,16 @@ class VelocityLoop:
     def guide(
         self, setpoint: PositionSetpoint | VelocitySetpoint, odometry: Odometry, now: float
     ) -> tuple[PositionSetpoint | VelocitySetpoint, VelocitySetpoint]:
-        """Follow a setpoint: as it was clipped, and the velocity that it means now."""
+        """Follow a setpoint.
+
+        Args:
+            setpoint: The setpoint to follow.
+            odometry: The drone's, in the local frame.
+            now: Monotonic clock, seconds.
+
+        Returns:
+            The setpoint as it was clipped, and the velocity that it means now.
+        """
         self.mode, self._told_at = VehicleMode.GUIDED, now
         if isinstance(setpoint, VelocitySetpoint):
             rate = _cut(float(setpoint.yaw_rate), self._limits.turn)
@@ -117,7 +131,12 @@ class VelocityLoop:
         return setpoint, self._towards(setpoint, odometry)
 
     def observe(self, odometry: Odometry, now: float) -> None:
-        """Take fresh odometry."""
+        """Take fresh odometry.
+
+        Args:
+            odometry: The drone's, in the local frame.
+            now: Monotonic clock, seconds.
+        """
         self._lifted = self._lifted or odometry.height > self._ground + _LIFTED
         if self.mode is VehicleMode.LANDING:
             self._touchdown.observe(odometry, now)
@@ -125,8 +144,11 @@ class VelocityLoop:
     def step(self, odometry: Odometry | None, now: float) -> VelocitySetpoint | None:
         """The velocity to be told now; None where the drone is told nothing.
 
-        `odometry` is None while it is too old to fly by. While setpoints come, their sender tells
-        the velocity.
+        While setpoints come, their sender tells the velocity.
+
+        Args:
+            odometry: The drone's, in the local frame; None while it is too old to fly by.
+            now: Monotonic clock, seconds.
         """
         if self.mode is VehicleMode.GROUNDED:
             return None

@@ -90,7 +90,12 @@ def ros2_camera_settings(
 ) -> Ros2CameraSettings:
     """Check the settings of `sensor`, and take the domain of the robot that carries it.
 
-    Raises ConfigError that names the sensor and the setting.
+    Args:
+        sensor: The camera.
+        environment: Its robots; that of the camera gives the domain.
+
+    Raises:
+        ConfigError: A setting is invalid; the message names the sensor and the setting.
     """
     place = f"sensor {sensor.full_id}: settings"
     settings = checked(Ros2CameraSettings, sensor.settings, place)

@@ -52,9 +52,15 @@ class Steering:
         alignment: Alignment,
         frames: tuple[str, str],
     ) -> None:
-        """Publish the velocity of `setpoint`; `frames` are those of the odometry's messages.
+        """Publish the velocity of `setpoint`.
 
         Nothing that is not finite leaves here: zero does.
+
+        Args:
+            setpoint: ENU m/s and rad/s.
+            odometry: The drone's, in the local frame.
+            alignment: Our local frame in the drone's.
+            frames: World and body frame of the odometry's messages.
         """
         frame = self._settings.velocity_frame
         velocity = velocity_in(frame, setpoint.velocity, odometry, alignment)

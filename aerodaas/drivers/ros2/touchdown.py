@@ -39,7 +39,12 @@ class Touchdown:
         self._fastest = 0.0
 
     def observe(self, odometry: Odometry, now: float) -> None:
-        """Take fresh odometry, heard at `now` (seconds)."""
+        """Take fresh odometry, heard at `now` (seconds).
+
+        Args:
+            odometry: The drone's, in the local frame.
+            now: Monotonic clock, seconds.
+        """
         height = float(odometry.position[2])
         self._highest = max(self._highest, height)
         self._fastest = max(self._fastest, -float(odometry.velocity[2]))

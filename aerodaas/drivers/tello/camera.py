@@ -123,7 +123,12 @@ class TelloCamera:
         self._thread.start()
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest image, stamped `stamp` less its age; None without a new one."""
+        """Return the newest image; None without a new one.
+
+        Args:
+            stamp: Mission clock, nanoseconds; the image's age is subtracted.
+            pose: Ignored.
+        """
         del pose
         with self._lock:
             newest, self._newest = self._newest, None
@@ -159,7 +164,12 @@ class TelloCamera:
                 self.on_packet(packet, now)
 
     def on_packet(self, packet: bytes, now: int) -> None:
-        """Process a video packet of the Tello, received at `now` (host nanoseconds)."""
+        """Process a video packet of the Tello.
+
+        Args:
+            packet: Its bytes.
+            now: When it was received, host nanoseconds.
+        """
         decoder = self._decoder
         for whole in self._assembler.add_packet(packet, now):
             for picture in decoder.decode(Packet(whole.content)):

@@ -72,7 +72,12 @@ LAND = Command("land", timeout=8.0, tries=3)
 
 
 def ports(state: int, video: int) -> Command:
-    """Set the ports of this host to which the Tello sends; SDK 3.0."""
+    """Set the ports of this host to which the Tello sends; SDK 3.0.
+
+    Args:
+        state: Port for states.
+        video: Port for video.
+    """
     return Command(f"port {state} {video}", timeout=1.0, tries=3)
 
 

@@ -42,7 +42,15 @@ def greet(
 ) -> None:
     """Enter SDK mode, set ports that are not the default ones, switch the video on.
 
-    Returns by `deadline` (monotonic seconds) or raises VehicleError.
+    Args:
+        link: The link to the Tello.
+        name: Id of the robot, for errors.
+        settings: Ports of this host.
+        video_port: Port for video; None leaves the video off.
+        deadline: Monotonic seconds by which it returns or raises.
+
+    Raises:
+        VehicleError: The Tello does not answer, or refuses.
     """
     if _ask(link, ENTER, deadline) is None:
         raise VehicleError(_explain_silence(link, name, settings))
@@ -103,7 +111,13 @@ def _explain_silence(link: TelloLink, name: str, settings: TelloSettings) -> str
 
 
 def explain_no_states(link: TelloLink, name: str, settings: TelloSettings) -> str:
-    """Reason why no state packet arrives although the Tello replies to commands."""
+    """Reason why no state packet arrives although the Tello replies to commands.
+
+    Args:
+        link: The link to the Tello.
+        name: Id of the robot, for the text.
+        settings: The port for states.
+    """
     port, counts = settings.state_port, link.counts
     if counts.malformed:
         return (

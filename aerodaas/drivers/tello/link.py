@@ -140,7 +140,13 @@ class TelloLink:
         self._thread.start()
 
     def request(self, command: Command, done: Done, *, urgent: bool = False) -> None:
-        """Send `command` after those before it; an urgent one at once, before them."""
+        """Send `command` after those before it.
+
+        Args:
+            command: The command.
+            done: Called with its outcome.
+            urgent: Whether it is sent at once; those before it are dropped.
+        """
         with self._lock:
             if urgent:
                 self._queue.clear()

@@ -68,7 +68,12 @@ class FlightPhase:
         return "its motors have stopped in flight" if fell else "it has landed by itself"
 
     def to(self, mode: VehicleMode, now: float) -> None:
-        """Change to `mode` by request, at `now` seconds."""
+        """Change to `mode` by request.
+
+        Args:
+            mode: The new mode.
+            now: Monotonic clock, seconds.
+        """
         off = mode is VehicleMode.LANDING and self.mode is VehicleMode.TAKING_OFF and not self.risen
         self._patience = _CALLED_OFF if off else _MOTORS_STOPPED
         self.mode, self._since = mode, now
@@ -92,7 +97,12 @@ class FlightPhase:
             self.risen = True
 
     def observe(self, state: TelloState, now: float) -> None:
-        """Update by a packet received at `now` seconds."""
+        """Update by a packet.
+
+        Args:
+            state: The packet.
+            now: Monotonic clock, seconds.
+        """
         if self._motor_time is not None and state.motor_time != self._motor_time:
             self._ticked_at = now
         self._motor_time = state.motor_time

@@ -90,7 +90,12 @@ class DeadReckoning:
         )
 
     def predict(self, now: float, asked: BodyMotion) -> None:
-        """Predict the estimate at `now`, with the sticks as `asked` since the last call."""
+        """Predict the estimate at `now`.
+
+        Args:
+            now: Monotonic clock, seconds.
+            asked: The sticks since the last call.
+        """
         elapsed = now - self.time
         self.time = now
         if self._standing or not 0.0 < elapsed < math.inf:
@@ -110,9 +115,13 @@ class DeadReckoning:
             self._blind_for += elapsed
 
     def correct(self, state: TelloState, now: float, *, standing: bool) -> None:
-        """Limit the estimate of `now` to the range that a new packet allows.
+        """Limit the estimate to the range that a new packet allows.
 
-        While it is `standing` on the ground nothing moves, and heights count from there.
+        Args:
+            state: The packet.
+            now: Time of the estimate, seconds.
+            standing: Whether the drone is on the ground; nothing moves then, and heights count from
+                there.
         """
         self._packet_at = now
         self._standing = standing

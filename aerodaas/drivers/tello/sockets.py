@@ -24,9 +24,15 @@ def bound_socket(
     receive_buffer: int | None = None,
     raises: type[AeroDaaSError],
 ) -> socket.socket:
-    """Open a non-blocking UDP socket at `port` (0 for any) of this host.
+    """Open a non-blocking UDP socket of this host.
 
-    `place` names it in errors of the class `raises`; `receive_buffer` is bytes.
+    Args:
+        place: What needs it, for errors.
+        port: 0 for any.
+        address: Of this host; empty for all.
+        interface: Network interface; empty for any.
+        receive_buffer: Bytes; None for the system's default.
+        raises: Class of the error where it cannot be opened.
     """
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -130,7 +130,12 @@ class ArduPilot(Autopilot):
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """Guided first, then arm, then climb: it takes off in guided mode only."""
+        """Guided first, then arm, then climb: it takes off in guided mode only.
+
+        Args:
+            height: Height to climb, metres.
+            telemetry: Ignored.
+        """
         del telemetry
         climb = PendingCommand(
             mavlink.MAV_CMD_NAV_TAKEOFF,
@@ -149,7 +154,12 @@ class ArduPilot(Autopilot):
         return bool(sensors.health & check)
 
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Its PreArm texts."""
+        """Its PreArm texts.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Monotonic clock, seconds.
+        """
         if self.ready(telemetry) is not False:
             return []
         said = [
@@ -160,18 +170,34 @@ class ArduPilot(Autopilot):
         return said or ["ArduPilot's arming checks fail"]
 
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
-        """Its fence's status, and its texts about failsafes, of whatever severity they are."""
+        """Its fence's status, and its texts about failsafes, of whatever severity they are.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Monotonic clock, seconds.
+            seconds: Age up to which texts count.
+        """
         said = telemetry.texts.recent(now, seconds, mavlink.MAV_SEVERITY_NOTICE)
         telling = [text for text in said if _PROTECTS.search(text) and "clear" not in text.lower()]
         return [telemetry.breach, *telling] if telemetry.breach else telling
 
     def encode(self, value: float, kind: int) -> float:
-        """Every parameter travels as a float."""
+        """Every parameter travels as a float.
+
+        Args:
+            value: The parameter's value.
+            kind: Ignored.
+        """
         del kind
         return value
 
     def decode(self, value: float, kind: int) -> float:
-        """Every parameter travels as a float."""
+        """Every parameter travels as a float.
+
+        Args:
+            value: As PARAM_VALUE carries it.
+            kind: Ignored.
+        """
         del kind
         return value
 
@@ -183,6 +209,11 @@ class ArduPilot(Autopilot):
         Names and meanings as in ArduCopter 4.3 to 4.7 (ArduCopter/Parameters.cpp and events.cpp,
         libraries/GCS_MAVLink/GCS.cpp): 4.7 renamed SYSID_MYGCS and made a range of it, and gives
         heights in metres instead of centimetres.
+
+        Args:
+            settings: Our system id, and when and how it is to come home.
+            ceiling: Ceiling of the geofence, metres above home.
+            software: Ignored.
         """
         del software
         ours, after = float(settings.own_system), settings.fallback_after
@@ -231,7 +262,12 @@ class ArduPilot(Autopilot):
         )
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
-        """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types."""
+        """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types.
+
+        Args:
+            action: What the vehicle does at the fence.
+            ceiling: Metres above home.
+        """
         code = {"warn": 0.0, "hold": 4.0, "return": 1.0, "land": 2.0}[action]
         altitude_and_polygon = 5.0
         return {

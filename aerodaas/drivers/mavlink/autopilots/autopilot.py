@@ -69,7 +69,13 @@ class FallbackParameter:
 def return_height(
     ceiling: float, *names: str, scales: tuple[float, ...] = (1.0, 1.0)
 ) -> FallbackParameter:
-    """The height of its return, which must stay below the geofence's `ceiling`, in metres."""
+    """The height of its return, which must stay below the geofence's ceiling.
+
+    Args:
+        ceiling: Metres above home.
+        scales: Scale of the parameter by name, as `FallbackParameter` has it.
+        *names: Names of the parameter in the versions of the autopilot.
+    """
     return FallbackParameter(
         names,
         lambda metres: metres <= ceiling,
@@ -80,7 +86,12 @@ def return_height(
 
 
 def older_than(software: str, *version: int) -> bool:
-    """Whether a version such as `1.13.3` is known to be older than `version`."""
+    """Whether a version such as `1.13.3` is known to be older than `version`.
+
+    Args:
+        software: The version's text; one without numbers is not known.
+        *version: Numbers to compare with, the major one first.
+    """
     numbers = tuple(int(number) for number in re.findall(r"\d+", software))
     return bool(numbers) and numbers[: len(version)] < version
 
@@ -144,7 +155,12 @@ class Autopilot(ABC):
 
     @abstractmethod
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """Orders for arming and a climb of `height` metres, each after the previous one's end."""
+        """Orders for arming and a climb, each after the previous one's end.
+
+        Args:
+            height: Height to climb, metres.
+            telemetry: What the vehicle has told so far.
+        """
 
     @abstractmethod
     def ready(self, telemetry: Telemetry) -> bool | None:
@@ -152,7 +168,12 @@ class Autopilot(ABC):
 
     @abstractmethod
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Reasons why it would not arm, in its own texts as far as it sends any."""
+        """Reasons why it would not arm, in its own texts as far as it sends any.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Monotonic clock, seconds.
+        """
 
     @abstractmethod
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
@@ -169,11 +190,21 @@ class Autopilot(ABC):
 
     @abstractmethod
     def encode(self, value: float, kind: int) -> float:
-        """A parameter's value as PARAM_SET carries it."""
+        """A parameter's value as PARAM_SET carries it.
+
+        Args:
+            value: The parameter's value.
+            kind: Its MAV_PARAM_TYPE.
+        """
 
     @abstractmethod
     def decode(self, value: float, kind: int) -> float:
-        """A parameter's value from PARAM_VALUE."""
+        """A parameter's value from PARAM_VALUE.
+
+        Args:
+            value: As PARAM_VALUE carries it.
+            kind: Its MAV_PARAM_TYPE.
+        """
 
     @abstractmethod
     def fallback(
@@ -181,12 +212,20 @@ class Autopilot(ABC):
     ) -> tuple[FallbackParameter, ...]:
         """Parameters with which it comes home once we are silent, in the order of setting them.
 
-        `ceiling` is the geofence's, in metres above home; `software` its version, as far as known.
+        Args:
+            settings: Our system id, and when and how it is to come home.
+            ceiling: Ceiling of the geofence, metres above home.
+            software: Version of the autopilot; empty where it is not known.
         """
 
     @abstractmethod
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
-        """Parameters without which an uploaded fence is not enforced; `ceiling` metres."""
+        """Parameters without which an uploaded fence is not enforced, by name.
+
+        Args:
+            action: What the vehicle does at the fence.
+            ceiling: Metres above home.
+        """
 
     @staticmethod
     def arm() -> PendingCommand:
@@ -208,7 +247,12 @@ class Autopilot(ABC):
 
     @staticmethod
     def interval(message: int, rate: float) -> PendingCommand:
-        """Request a message `rate` times a second."""
+        """Request a message at a rate.
+
+        Args:
+            message: Id of the message.
+            rate: Messages per second.
+        """
         values = (float(message), 1e6 / rate, 0.0, 0.0, 0.0, 0.0, 0.0)
         what = f"send message {message} at {rate:g} Hz"
         return PendingCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, values, what)

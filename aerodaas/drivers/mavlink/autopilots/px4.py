@@ -116,7 +116,12 @@ class PX4(Autopilot):
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """From hold, where no sticks are needed: arm, then climb to an altitude above the sea."""
+        """From hold, where no sticks are needed: arm, then climb to an altitude above the sea.
+
+        Args:
+            height: Height to climb, metres.
+            telemetry: What the vehicle has told so far.
+        """
         altitude = (telemetry.altitude or 0.0) + height
         climb = PendingCommand(
             mavlink.MAV_CMD_NAV_TAKEOFF,
@@ -134,7 +139,12 @@ class PX4(Autopilot):
         return bool(telemetry.sensors.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Complaints of its latest report of the arming checks."""
+        """Complaints of its latest report of the arming checks.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Ignored.
+        """
         del now
         if telemetry.altitude is None:
             unknown = "PX4 does not know its altitude above the sea yet"
@@ -152,19 +162,35 @@ class PX4(Autopilot):
         return list(found) or ["PX4's arming checks fail"]
 
     def protection_reasons(self, telemetry: Telemetry, now: float, seconds: float) -> list[str]:
-        """New findings of its checks in flight, and texts of its events."""
+        """New findings of its checks in flight, and texts of its events.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Monotonic clock, seconds.
+            seconds: Age up to which findings and texts count.
+        """
         said = telemetry.texts.recent(now, seconds)
         return [*telemetry.events.new_objections(now, seconds), *said]
 
     def encode(self, value: float, kind: int) -> float:
-        """Integers travel as the float of the same bytes."""
+        """Integers travel as the float of the same bytes.
+
+        Args:
+            value: The parameter's value.
+            kind: Its MAV_PARAM_TYPE.
+        """
         if kind not in _INTEGER:
             return value
         (encoded,) = struct.unpack("<f", struct.pack("<i", round(value)))
         return float(encoded)
 
     def decode(self, value: float, kind: int) -> float:
-        """Integers travel as the float of the same bytes."""
+        """Integers travel as the float of the same bytes.
+
+        Args:
+            value: As PARAM_VALUE carries it.
+            kind: Its MAV_PARAM_TYPE.
+        """
         if kind not in _INTEGER:
             return value
         (decoded,) = struct.unpack("<i", struct.pack("<f", value))
@@ -179,6 +205,11 @@ class PX4(Autopilot):
         ground station lost, so that a moment without a link sends it nowhere; a companion's
         returns at once, and follows setpoints again when they come (failsafe.cpp). Before 1.14 it
         asks another parameter while it has no radio.
+
+        Args:
+            settings: Our role, and when and how it is to come home.
+            ceiling: Ceiling of the geofence, metres above home.
+            software: Version of the autopilot; empty where it is not known.
         """
         after = settings.fallback_after
         sinks = "when our setpoints stop it sinks where it is, waits for a pilot, or hovers"
@@ -212,6 +243,11 @@ class PX4(Autopilot):
         return tuple(wanted)
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
-        """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land."""
+        """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land.
+
+        Args:
+            action: What the vehicle does at the fence.
+            ceiling: Metres above home.
+        """
         code = {"warn": 1.0, "hold": 2.0, "return": 3.0, "land": 5.0}[action]
         return {"GF_ACTION": code, "GF_MAX_VER_DIST": ceiling}

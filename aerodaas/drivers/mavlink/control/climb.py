@@ -79,7 +79,13 @@ class Climb:
         return not self._orders
 
     def update(self, now: float, up: float, rise: float) -> bool:
-        """Update with the height `up` in metres and climb rate `rise` in m/s; True when done."""
+        """Update with the vehicle's height; True when done.
+
+        Args:
+            now: Monotonic clock, seconds.
+            up: Height in the autopilot's frame, metres.
+            rise: Climb rate, m/s.
+        """
         self._now = now
         self._settle_doubt(now)
         if self._over:

@@ -75,7 +75,13 @@ class Departure:
         return self._withdrawal is not None
 
     def begin(self, orders: Sequence[PendingCommand], height: float, now: float) -> None:
-        """Climb `height` metres by `orders`."""
+        """Climb by `orders`.
+
+        Args:
+            orders: Arming and take-off, each given after the previous one's end.
+            height: Height to climb, metres.
+            now: Monotonic clock, seconds.
+        """
         assert self._telemetry.position is not None  # noqa: S101 - checked before
         self._phase.rest()
         self._top = height - float(self._telemetry.position[2])
@@ -125,7 +131,12 @@ class Departure:
         self._commander.withdraw_steering()
 
     def observe(self, now: float, *, was_armed: bool) -> None:
-        """Handle a HEARTBEAT, after the phase's update by it."""
+        """Handle a HEARTBEAT, after the phase's update by it.
+
+        Args:
+            now: Monotonic clock, seconds.
+            was_armed: Whether the vehicle was armed before this HEARTBEAT.
+        """
         phase = self._phase
         if was_armed and not phase.armed and self._climb is not None:
             self._climb.fail("it stopped its motors again")

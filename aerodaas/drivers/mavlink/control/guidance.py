@@ -93,10 +93,16 @@ class MovingTarget:
         now: float,
         waits: bool = False,
     ) -> Target:
-        """The target at `now` (seconds), moving to the place of `setpoint` at `speed` (m/s).
+        """The target at `now`, moving to the place of `setpoint`.
 
-        `vehicle`, `velocity` and `facing` are the vehicle's own state; while it `waits` for its
-        mode the target stays with it.
+        Args:
+            setpoint: Where the vehicle is to fly.
+            speed: Speed on the way, m/s.
+            vehicle: Where the vehicle is, ENU metres.
+            velocity: The vehicle's velocity, ENU m/s.
+            facing: The vehicle's yaw, radians.
+            now: Monotonic clock, seconds.
+            waits: Whether the vehicle waits for its mode; the target stays with it then.
         """
         duration = min(_LONGEST, max(0.0, now - self._now))
         self._now = now

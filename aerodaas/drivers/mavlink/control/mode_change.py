@@ -40,9 +40,13 @@ class ModeChange:
         self._tell = tell
 
     def ask(self, wish: FlightMode, refused: Callable[[str], None] = _ignore) -> None:
-        """Ask for a mode, unless that is under way or done; `refused` gets the reason of a no.
+        """Ask for a mode, unless that is under way or done.
 
         While the vehicle's mode is not known, nothing is asked: somebody else may have chosen one.
+
+        Args:
+            wish: The mode.
+            refused: Called with the reason of a no.
         """
         phase, now = self._phase, time.monotonic()
         if not self._commander.in_touch(now):

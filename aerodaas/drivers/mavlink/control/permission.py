@@ -18,9 +18,15 @@ _WHY = {
 
 
 def flight_objection(mode: VehicleMode, *, climbing: bool, landing: bool) -> str:
-    """Why a vehicle in `mode` is given no order of flight, to be read after "cannot …".
+    """Why a vehicle in `mode` is given no order of flight; empty if it is.
 
-    Empty if it is; `climbing` and `landing`: also while it takes off and lands.
+    Args:
+        mode: The vehicle's mode.
+        climbing: Whether it is given one also while it takes off.
+        landing: Whether it is given one also while it lands.
+
+    Returns:
+        A text to be read after "cannot …".
     """
     if mode in _WHY:
         return _WHY[mode]

@@ -25,7 +25,14 @@ def position_message(
     vehicle: tuple[int, int],
     now: float,
 ) -> Any:  # noqa: ANN401 - pymavlink has no types
-    """Packet of the target's position, velocity and heading, for `vehicle` (system, component)."""
+    """Packet of the target's position, velocity and heading.
+
+    Args:
+        target: ENU metres, ENU m/s, radians.
+        frame: Converts to the autopilot's frame.
+        vehicle: System and component id.
+        now: Monotonic clock, seconds.
+    """
     north, east, down = frame.place(target.position)
     ahead, right, sinking = frame.velocity(target.velocity)
     return mavlink.MAVLink_set_position_target_local_ned_message(
@@ -42,7 +49,13 @@ def position_message(
 
 
 def velocity_message(setpoint: VelocitySetpoint, vehicle: tuple[int, int], now: float) -> Any:  # noqa: ANN401 - pymavlink has no types
-    """Packet of a velocity and a yaw rate, for the `vehicle` (system, component)."""
+    """Packet of a velocity and a yaw rate.
+
+    Args:
+        setpoint: ENU m/s, rad/s.
+        vehicle: System and component id.
+        now: Monotonic clock, seconds.
+    """
     return mavlink.MAVLink_set_position_target_local_ned_message(
         int(now * 1e3) & _MASK32,
         *vehicle,

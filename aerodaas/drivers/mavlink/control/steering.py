@@ -53,8 +53,14 @@ class Steering:
     ) -> tuple[Message, Setpoint]:
         """The packet for `target` and the setpoint as it was clipped.
 
-        Without a `frame`, that is without a position, it is commanded to stand still; while it
-        `waits` for its mode, the target of a flight stays with it.
+        Args:
+            setpoint: As it was sent to the driver.
+            odometry: The vehicle's own.
+            frame: Converts to the autopilot's frame; None, without a position, commands it to stand
+                still.
+            target: System and component id of the vehicle.
+            now: Monotonic clock, seconds.
+            waits: Whether it waits for its mode; the target of a flight stays with it then.
         """
         if now - self._streamed_at > _STREAM_GAP:
             self._stream_since = now
@@ -93,9 +99,15 @@ class Steering:
         change: Callable[[FlightMode], None],
         now: float,
     ) -> None:
-        """Switch to the guided mode, after a stream of setpoints for `stream_before` seconds.
+        """Switch to the guided mode, after a stream of setpoints.
 
         Until then a vehicle that flies a plan is stopped.
+
+        Args:
+            phase: Phase of the flight.
+            stream_before: Seconds for which setpoints must have been sent.
+            change: Asks for a flight mode.
+            now: Monotonic clock, seconds.
         """
         if phase.wish is FlightMode.GUIDED and phase.seen:
             return

@@ -53,7 +53,12 @@ class TakeoffCancellation:
         self._go_on(now)
 
     def observe(self, now: float, *, armed: bool) -> None:
-        """Update by a HEARTBEAT."""
+        """Update by a HEARTBEAT.
+
+        Args:
+            now: Monotonic clock, seconds.
+            armed: Whether the vehicle is armed by it.
+        """
         waits = self._commander.under_way(self._disarm.number) is not None
         if armed:
             self._last_order, self._calm = now, 0

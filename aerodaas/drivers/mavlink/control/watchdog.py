@@ -47,9 +47,11 @@ class Watchdog:
         return now - self._fed_at > _GONE
 
     def step(self, now: float, phase: FlightPhase) -> FlightMode | None:
-        """Flight mode to request in `phase` because the loop hangs, each mode once.
+        """Flight mode to request because the loop hangs, each mode once; called 20 times a second.
 
-        Called 20 times a second; `now` in monotonic seconds.
+        Args:
+            now: Monotonic clock, seconds.
+            phase: Phase of the flight.
         """
         since, self._stepped_at = now - self._stepped_at, now
         if _STALL < since < math.inf:

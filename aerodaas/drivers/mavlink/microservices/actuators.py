@@ -99,7 +99,12 @@ class MavlinkActuators:
         return dict(self._positions)
 
     def move(self, actuator: str, position: str) -> int:
-        """See `Actuators`."""
+        """See `Actuators`.
+
+        Args:
+            actuator: Id of the actuator.
+            position: Name of its position.
+        """
         if position not in self._known[actuator].positions:
             raise VehicleError(f"{actuator} has no position {position!r}")
         return self._ask(actuator, position)

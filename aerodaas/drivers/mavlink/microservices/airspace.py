@@ -49,11 +49,22 @@ class Airspace:
         self._here: Vector = np.full(3, np.nan)
 
     def begin(self, link: MavlinkLink, commander: Commander, alignment: Alignment) -> None:
-        """Begin to tell and to ask, once the vehicle is connected."""
+        """Begin to tell and to ask, once the vehicle is connected.
+
+        Args:
+            link: The link to the vehicle.
+            commander: Sends the vehicle's commands.
+            alignment: Pins our frame to the earth.
+        """
         self._link, self._commander, self._alignment = link, commander, alignment
 
     def on_message(self, message: Message, now: float) -> None:
-        """Process one of `messages`."""
+        """Process one of `messages`.
+
+        Args:
+            message: The message, of the vehicle or of its remote id.
+            now: Monotonic clock, seconds.
+        """
         if message.get_type() == "OPEN_DRONE_ID_ARM_STATUS":
             self._remote_id.on_arm_status(message, now)
         elif self._alignment is not None:
@@ -97,7 +108,12 @@ class Airspace:
         return self._stood
 
     def traffic(self, here: Vector, now: float) -> tuple[Traffic, ...]:
-        """Traffic around `here` (ENU metres) at `now`, the nearest first."""
+        """Traffic around `here`, the nearest first.
+
+        Args:
+            here: Where the vehicle is, ENU metres.
+            now: Monotonic clock, seconds.
+        """
         self._here = here if is_finite(here) else self._here
         return self._traffic.around(self._here, now)
 

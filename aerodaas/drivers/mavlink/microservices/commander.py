@@ -126,11 +126,17 @@ class Commander:
         still: Callable[[], bool] = always,
         now: float,
     ) -> None:
-        """Send a command; `done` gets its outcome, in the link's thread.
+        """Send a command.
 
-        It is repeated without an answer and after a temporary rejection, and only while `still`
-        returns True: what the vehicle's state shows is done, acknowledged or not. A newer command
-        of the same number supersedes an older one, whose `done` gets that outcome.
+        It is repeated without an answer and after a temporary rejection. A newer command of the
+        same number supersedes an older one, whose `done` gets that outcome.
+
+        Args:
+            order: The command.
+            done: Called with its outcome, in the link's thread.
+            still: Whether to repeat it: what the vehicle's state shows is done, acknowledged or
+                not.
+            now: Monotonic clock, seconds.
         """
         with self._lock:
             before = self._pending.get(order.number)
@@ -175,7 +181,12 @@ class Commander:
             return None if pending is None else pending.order
 
     def on_ack(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Process a COMMAND_ACK."""
+        """Process a COMMAND_ACK.
+
+        Args:
+            message: The acknowledgement; one to other systems is ignored.
+            now: Monotonic clock, seconds.
+        """
         if message.target_system not in {0, self._ours}:
             return
         with self._lock:

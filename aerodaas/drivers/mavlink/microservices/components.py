@@ -167,7 +167,12 @@ class PayloadComponent:
         return None if self.gone(now) else self.camera
 
     def on_message(self, message: Message, now: float) -> None:
-        """Process a message of its own, other than an attitude."""
+        """Process a message of its own, other than an attitude.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         if self._own:
             if self.gone(now):
                 self._begin()
@@ -283,7 +288,9 @@ class PayloadComponent:
     def see_to_attitude(self, now: float, device: Callable[[int], Commander | None]) -> None:
         """Ask for the gimbal's attitude, at first and where it does not come.
 
-        `device` is the commander of a gimbal device that speaks for itself, by its id.
+        Args:
+            now: Monotonic clock, seconds.
+            device: Commander of a gimbal device that speaks for itself, by its id.
         """
         gimbal = self.gimbal
         if gimbal is None or self.gone(now) or now - self._asked_at < _OVERDUE:

@@ -73,9 +73,13 @@ class EventReader:
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
     def new_objections(self, now: float, seconds: float) -> list[str]:
-        """Objections of the last `seconds`, also in flight: its failsafes act for them.
+        """Objections of the last moments, also in flight: its failsafes act for them.
 
         What a mode lacks is among them only where there is nothing else.
+
+        Args:
+            now: Monotonic clock, seconds.
+            seconds: Age up to which they count.
         """
         new = [text for text in self.objections if now - self._since[text] <= seconds]
         return [text for text in new if text not in _OF_THE_MODE] or new

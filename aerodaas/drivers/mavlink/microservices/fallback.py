@@ -92,10 +92,15 @@ class Fallback:
     def establish(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> None:
         """Judge what it would do, and make it come home where the settings ask for that.
 
-        `plan` is the way home to be uploaded, if any; `ceiling` that of the geofence, in metres,
-        and `software` the autopilot's version. Raises VehicleError if it cannot be done: then what
-        was changed before has been put back. An observer changes nothing: what is judged then is
-        what a flight could not change.
+        An observer changes nothing: what is judged then is what a flight could not change.
+
+        Args:
+            ceiling: Ceiling of the geofence, metres above home.
+            software: Version of the autopilot; empty where it is not known.
+            plan: The way home to be uploaded, if any.
+
+        Raises:
+            VehicleError: It cannot be done; what was changed before has been put back.
         """
         self._remind()
         if self._settings.fallback == "set" and self._settings.observe:
@@ -119,7 +124,13 @@ class Fallback:
             )
 
     def examine(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> list[str]:
-        """Faults that keep the vehicle from coming home, one sentence each; nothing is changed."""
+        """Faults that keep the vehicle from coming home, one sentence each; nothing is changed.
+
+        Args:
+            ceiling: Ceiling of the geofence, metres above home.
+            software: Version of the autopilot; empty where it is not known.
+            plan: The way home that the vehicle must hold, if any.
+        """
         wanted = self._autopilot.fallback(self._settings, ceiling, software)
         obstacles = [unable] if (unable := self._unable()) else []
         obstacles += [one.text for one in self._judge(wanted)]

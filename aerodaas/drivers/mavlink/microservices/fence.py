@@ -16,7 +16,12 @@ __all__ = ["fence_items", "upload_fence"]
 
 
 def fence_items(fence: GeofenceConfig, origin: GeodeticOrigin) -> list[MissionItem]:
-    """Items of the fence protocol for the polygons of `fence`, whose ENU origin is `origin`."""
+    """Items of the fence protocol for the polygons of `fence`.
+
+    Args:
+        fence: Polygons in local metres.
+        origin: Geodetic origin of the local frame.
+    """
     inside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
     outside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
     outlines = [(inside, fence.polygon)] if fence.polygon else []
@@ -45,10 +50,20 @@ def upload_fence(
     *,
     progress: Callable[[int, int], None] = lambda _, __: None,
 ) -> None:
-    """Upload `fence` and have it enforced by `action`.
+    """Upload `fence` and have it enforced by `action`; blocks.
 
-    The floor is not uploaded: neither autopilot allows a landing below it. Blocks; raises
-    VehicleError.
+    The floor is not uploaded: neither autopilot allows a landing below it.
+
+    Args:
+        link: The link to the vehicle.
+        autopilot: The autopilot's dialect of commands and parameters.
+        fence: Polygons in local metres, and the ceiling.
+        origin: Geodetic origin of the local frame.
+        action: What the vehicle does at the fence.
+        progress: Called with the number of items uploaded and of all items.
+
+    Raises:
+        VehicleError: The vehicle does not take the fence or a parameter.
     """
     items = fence_items(fence, origin)
     upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE, progress)

@@ -171,10 +171,19 @@ class FtpClient:
     def read(
         self, path: str, size: int, sink: Callable[[bytes], object], begin: int = 0
     ) -> FtpScript[None]:
-        """Script: give bytes `begin` to `size` of a file to `sink`, in their order.
+        """Script: give a file's bytes to `sink`, in their order.
 
         Lost packets are asked for again, and the file is opened again where the vehicle has closed
-        it. Raises VehicleError if it has another size, or stops sending.
+        it.
+
+        Args:
+            path: Path on the vehicle.
+            size: Size of the file, bytes.
+            sink: Called with the bytes.
+            begin: First byte to read, from 0.
+
+        Raises:
+            VehicleError: The file has another size, or the vehicle stops sending.
         """
         yield from self._open(path, size)
         pieces = _Pieces(begin, size, sink)
@@ -195,10 +204,16 @@ class FtpClient:
             tries, singly = 0 if grew else tries, ended
 
     def checksum(self, path: str, size: int) -> FtpScript[int | None]:
-        """Script: the CRC-32 of a file of `size` bytes; None where the vehicle tells none.
+        """Script: the CRC-32 of a file; None where the vehicle tells none.
 
         Polynomial of IEEE 802.3, reflected, from zero and not inverted, as both autopilots have it.
-        Raises VehicleError.
+
+        Args:
+            path: Path on the vehicle.
+            size: Size of the file, bytes, by which the time-out is reckoned.
+
+        Raises:
+            VehicleError: The vehicle refuses or does not answer.
         """
         reply = yield from self._ask(
             mavlink.MAV_FTP_OPCODE_CALCFILECRC,

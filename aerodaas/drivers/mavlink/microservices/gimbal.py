@@ -68,7 +68,18 @@ class MavlinkGimbal:
         return 0.0 if self.heard_at is None else now - self.heard_at
 
     def aim(self, target: GimbalTarget, now: float) -> GimbalTarget:
-        """Have it turn to `target`, as its range allows; raises VehicleError for no number."""
+        """Have it turn to `target`, as its range allows.
+
+        Args:
+            target: Pitch and yaw, radians.
+            now: Monotonic clock, seconds.
+
+        Returns:
+            The target within the gimbal's range.
+
+        Raises:
+            VehicleError: An angle is not finite.
+        """
         if not (math.isfinite(target.pitch) and math.isfinite(target.yaw)):
             raise VehicleError(f"a gimbal needs finite angles, not {target}")
         pitch = min(max(target.pitch, self._pitch[0]), self._pitch[1])
@@ -124,10 +135,15 @@ class MavlinkGimbal:
         self._ours = self._ours and outcome.accepted
 
     def on_attitude(self, message: Message, now: float, stamp: int, heading: float) -> None:
-        """Process a GIMBAL_DEVICE_ATTITUDE_STATUS, heard at mission clock `stamp`.
+        """Process a GIMBAL_DEVICE_ATTITUDE_STATUS.
 
-        `heading` is the vehicle's, radians clockwise from north. What is no attitude, or another
-        gimbal's, is ignored; it was not heard then.
+        What is no attitude, or another gimbal's, is ignored; it was not heard then.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+            stamp: Mission clock at which it was heard, nanoseconds.
+            heading: The vehicle's, radians clockwise from north.
         """
         if message.gimbal_device_id not in {0, self.device}:
             return

@@ -32,7 +32,15 @@ class MavlinkLens:
         return not self._open and not self.fault
 
     def adjust(self, target: LensTarget, now: float) -> None:
-        """Have it set; raises VehicleError for what the camera says that it has not."""
+        """Have the lens set.
+
+        Args:
+            target: Zoom and focus; None leaves one as it is.
+            now: Monotonic clock, seconds.
+
+        Raises:
+            VehicleError: The camera says that it has not what is asked.
+        """
         zooms = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
         focuses = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS
         if self._flags and target.zoom is not None and not zooms:

@@ -46,7 +46,17 @@ class FileTransfer:
         return self._run(self._client.entries(folder))
 
     def read(self, path: str, size: int, sink: Callable[[bytes], object], begin: int = 0) -> None:
-        """Give bytes `begin` to `size` of a file to `sink`, in order; raises VehicleError."""
+        """Give a file's bytes to `sink`, in order.
+
+        Args:
+            path: Path on the vehicle.
+            size: Size of the file, bytes.
+            sink: Called with the bytes.
+            begin: First byte to read, from 0.
+
+        Raises:
+            VehicleError: As `FtpClient.read`.
+        """
         try:
             self._run(self._client.read(path, size, sink, begin))
         finally:
@@ -58,7 +68,15 @@ class FileTransfer:
         return next((one.size for one in self.entries(folder) if one.name == name), None)
 
     def checksum(self, path: str, size: int) -> int | None:
-        """Its CRC-32 by the vehicle's own reckoning, None if it tells none; VehicleError."""
+        """CRC-32 of a file by the vehicle's own reckoning, None if it tells none.
+
+        Args:
+            path: Path on the vehicle.
+            size: Size of the file, bytes.
+
+        Raises:
+            VehicleError: As `FtpClient.checksum`.
+        """
         return self._run(self._client.checksum(path, size))
 
     def _run(self, script: FtpScript[_T]) -> _T:
@@ -84,8 +102,16 @@ class FileTransfer:
 def find_log(transfer: FileTransfer, autopilot: Autopilot, log: LogEntry) -> str | None:
     """Path of a log's file on the vehicle, which is told by its size alone.
 
-    None if no file has that size, as while it is written, or several have. Raises VehicleError if
-    the vehicle does not answer.
+    Args:
+        transfer: MAVLink FTP with the vehicle.
+        autopilot: Knows the folders and the suffix of logs.
+        log: The log, as the vehicle lists it.
+
+    Returns:
+        None if no file has that size, as while it is written, or several have.
+
+    Raises:
+        VehicleError: The vehicle does not answer.
     """
     for folder in autopilot.log_folders:
         with contextlib.suppress(FtpRefusedError):
@@ -106,11 +132,22 @@ def fetch_file(
     part: Path,
     progress: Callable[[int, int], None] = lambda _, __: None,
 ) -> None:
-    """Fetch `path` of `size` bytes from the vehicle into `file`, whole or not at all.
+    """Fetch `path` from the vehicle into `file`, whole or not at all.
 
-    What has come is kept in `part` while it is not whole, and is where the next one goes on.
-    Raises VehicleError, also if the vehicle's own checksum is another one, and OSError. A file that
-    has grown meanwhile, as a log that is not ended does, has no checksum of these bytes.
+    A file that has grown meanwhile, as a log that is not ended does, has no checksum of these
+    bytes.
+
+    Args:
+        transfer: MAVLink FTP with the vehicle.
+        path: Path on the vehicle.
+        size: Size of the file, bytes.
+        file: Path on this machine.
+        part: Holds what has come while it is not whole, and is where the next fetch goes on.
+        progress: Called with the bytes fetched and of all bytes.
+
+    Raises:
+        VehicleError: The vehicle stops sending, or its own checksum is another one.
+        OSError: The file or its part cannot be written.
     """
     held = part.stat().st_size if part.is_file() else 0
     for begin in dict.fromkeys((held if held <= size else 0, 0)):

@@ -39,9 +39,15 @@ Progress = Callable[[int, int], None]
 
 
 def list_logs(link: MavlinkLink, autopilot: Autopilot, software: str) -> list[LogEntry]:
-    """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread.
+    """The vehicle's logs, oldest first; not for use in the link's thread.
 
-    `software` is its version, such as `1.16.1.255`; empty where it is not known.
+    Args:
+        link: The link to the vehicle.
+        autopilot: The autopilot's dialect of commands and parameters.
+        software: Version of the autopilot, such as `1.16.1.255`; empty where it is not known.
+
+    Raises:
+        VehicleError: The vehicle does not answer, or tells not all of its logs.
     """
     ends = not older_than(software, *autopilot.log_begin_until)
     target = link.target
@@ -72,11 +78,24 @@ def fetch_log(
     *,
     ftp: bool = False,
 ) -> Path:
-    """Fetch a log into a file of `folder`, whole or not at all; raises VehicleError.
+    """Fetch a log into a file of `folder`, whole or not at all; not for use in the link's thread.
 
-    By MAVLink FTP where the vehicle has `ftp`, and this log among its files. Packets that are lost
-    are asked for again. `grounded` is the link of a vehicle that stands, and raises VehicleError
-    for one that does not: it is asked again and again. Not for use in the link's thread.
+    Packets that are lost are asked for again.
+
+    Args:
+        grounded: Link of a vehicle that stands, asked again and again; raises VehicleError for one
+            that does not.
+        autopilot: The autopilot's dialect of commands and parameters.
+        log: The log, as the vehicle lists it.
+        folder: Made where it is missing.
+        progress: Called with the bytes fetched and of all bytes.
+        ftp: Whether the vehicle has MAVLink FTP, used where this log is among its files.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        VehicleError: The vehicle does not stand, or the log cannot be fetched.
     """
 
     def told(done: int, size: int) -> None:

@@ -223,7 +223,12 @@ class MavlinkMissionMode:
             self._fail(text)
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take one of `messages`."""
+        """Take one of `messages`.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         kind = message.get_type()
         if kind in Upload.messages:
             if self._upload is not None:

@@ -38,9 +38,14 @@ class Parameters:
         return self.known([(name,)]).get(name)
 
     def known(self, wanted: Iterable[tuple[str, ...]], tries: int = _TRIES) -> dict[str, float]:
-        """Values by name, asked for together: of each tuple's names the vehicle knows one.
+        """Values by name, asked for together.
 
-        What it does not know, or does not tell, is missing. As many tries are made as for one.
+        What the vehicle does not know, or does not tell, is missing. As many tries are made as for
+        one.
+
+        Args:
+            wanted: Names of each parameter, of which the vehicle knows one.
+            tries: How often to ask.
         """
         missing, found = set(wanted), dict[str, float]()
         with self._link.listen("PARAM_VALUE") as inbox:
@@ -56,7 +61,15 @@ class Parameters:
         return found
 
     def set(self, name: str, value: float) -> None:
-        """Set `name` and verify it; raises VehicleError if it was not set."""
+        """Set a parameter and verify it.
+
+        Args:
+            name: Name of the parameter.
+            value: Its value, in the parameter's own unit.
+
+        Raises:
+            VehicleError: It was not set.
+        """
         before = self._read(name)
         if before is None:
             raise VehicleError(f"the autopilot knows no parameter {name}")
@@ -128,7 +141,12 @@ class UnsafeParameter:
 
 
 def unsafe_parameters(parameters: Parameters, autopilot: Autopilot) -> list[UnsafeParameter]:
-    """Failsafes that are off by the vehicle's parameters; each is read from the vehicle."""
+    """Failsafes that are off by the vehicle's parameters; each is read from the vehicle.
+
+    Args:
+        parameters: Parameters of the vehicle.
+        autopilot: The autopilot's dialect of commands and parameters.
+    """
     held = parameters.known((one.name,) for one in autopilot.failsafes)
     return [
         UnsafeParameter(one, held[one.name])

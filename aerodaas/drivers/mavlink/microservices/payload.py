@@ -118,7 +118,15 @@ class Payload:
         return next((one for one in found if one is not None), None)
 
     def film(self, now: float, *, on: bool) -> None:
-        """Have the camera record that takes pictures, or that end which was told; locked."""
+        """Have the camera record that takes pictures, or that end which was told; locked.
+
+        Args:
+            now: Monotonic clock, seconds.
+            on: Whether to record.
+
+        Raises:
+            VehicleError: No camera answers any more, or it cannot record.
+        """
         if on or self._filmed is None:
             self._filmed = next((one for one in self._ranked() if one.camera_now(now)), None)
         camera = self.filming_camera(now)
@@ -134,7 +142,12 @@ class Payload:
         return self.used_camera() if self._filmed is None else self._filmed.camera_now(now)
 
     def part(self, name: str, pause: Callable[[], None]) -> None:
-        """Wait a little for a recording that is to end; `pause` waits for the next message."""
+        """Wait a little for a recording that is to end.
+
+        Args:
+            name: Id of the robot, for warnings.
+            pause: Waits for the next message.
+        """
         end = time.monotonic() + _PARTING
         while any(one.camera is not None and one.camera.recorder.ending for one in self._ranked()):
             if time.monotonic() >= end:
@@ -197,12 +210,22 @@ class Payload:
         return self.clock.now(), self._odometry, self._attitude()
 
     def on_message(self, message: Message, now: float) -> None:
-        """Process one of the autopilot's `messages`; in the link's thread."""
+        """Process one of the autopilot's `messages`; in the link's thread.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         if self._autopilot is not None:
             self._on_component_message(self._autopilot, message, now)
 
     def take_component(self, message: Message, now: float) -> None:
-        """Process what a component with an id of its own says; in the link's thread."""
+        """Process what a component with an id of its own says; in the link's thread.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         with self._lock:
             if self._autopilot is None:
                 return

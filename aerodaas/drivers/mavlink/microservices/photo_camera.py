@@ -80,7 +80,15 @@ class MavlinkCamera:
         self._outcomes: deque[PhotoOutcome] = deque(maxlen=_MOST)
 
     def take_photo(self, label: str, now: float) -> int:
-        """Ask for one picture; one that is still awaited is given up."""
+        """Ask for one picture; one that is still awaited is given up.
+
+        Args:
+            label: Name of the picture.
+            now: Monotonic clock, seconds.
+
+        Returns:
+            Number of the picture.
+        """
         self.give_up("another picture was asked for before it came")
         self._now = now
         number = next(self._count)
@@ -134,7 +142,12 @@ class MavlinkCamera:
         return self._request is not None and now - self._request.begun_at >= _OVERDUE
 
     def compare(self, status: CaptureStatus, now: float) -> None:
-        """Take an overdue picture for taken where the camera's own count has gone up for it."""
+        """Take an overdue picture for taken where the camera's own count has gone up for it.
+
+        Args:
+            status: The camera's own count.
+            now: Monotonic clock, seconds.
+        """
         request = self._request
         self._taken = status.taken
         # Its count begins anew with a formatted card.

@@ -58,7 +58,13 @@ class MissionItem:
 
 
 def item_place(origin: GeodeticOrigin, east: float, north: float) -> tuple[int, int]:
-    """`x` and `y` of an item at a place in metres of the local frame, whose ENU origin is known."""
+    """`x` and `y` of an item at a place, degrees times `DEGREE`.
+
+    Args:
+        origin: Geodetic origin of the local frame.
+        east: Metres in the local frame.
+        north: Metres in the local frame.
+    """
     latitude, longitude, _ = origin.to_geodetic(np.array([east, north, 0.0]))
     return round(latitude * DEGREE), round(longitude * DEGREE)
 
@@ -105,7 +111,12 @@ class Upload:
         self.step(now)
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Answer a message of the vehicle."""
+        """Answer a message of the vehicle.
+
+        Args:
+            message: The message, one of `messages`.
+            now: Monotonic clock, seconds.
+        """
         if self.done or self.failure or message.mission_type != self._kind:
             return
         items, name = self._items, _name(self._kind)
@@ -149,9 +160,16 @@ def upload(
     kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
     progress: Progress = _ignore,
 ) -> None:
-    """Replace the vehicle's plan by `items`; raises VehicleError with the reason of a failure.
+    """Replace the vehicle's plan by `items`; blocks, and is not for use in the link's thread.
 
-    Blocks; not for use in the link's thread.
+    Args:
+        link: The link to the vehicle.
+        items: Items of the plan, in order.
+        kind: MAV_MISSION_TYPE of the plan.
+        progress: Called with the number of items uploaded and of all items.
+
+    Raises:
+        VehicleError: The upload failed, for the reason that it gives.
     """
     with link.listen(*Upload.messages) as inbox:
         began = time.monotonic()
@@ -169,7 +187,16 @@ def download(
     kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
     progress: Progress = _ignore,
 ) -> list[MissionItem]:
-    """The vehicle's plan; raises VehicleError. Blocks; not for use in the link's thread."""
+    """The vehicle's plan; blocks, and is not for use in the link's thread.
+
+    Args:
+        link: The link to the vehicle.
+        kind: MAV_MISSION_TYPE of the plan.
+        progress: Called with the number of items downloaded and of all items.
+
+    Raises:
+        VehicleError: The vehicle does not answer, or says that the plan has too many items.
+    """
     target = link.target
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
         ask: Any = mavlink.MAVLink_mission_request_list_message(*target, kind)

@@ -57,7 +57,15 @@ class MavlinkRecorder:
         self._now = now
 
     def film(self, now: float, *, on: bool) -> None:
-        """Have it begin or end; raises VehicleError for a camera that says that it cannot."""
+        """Have it begin or end.
+
+        Args:
+            now: Monotonic clock, seconds.
+            on: Whether to record.
+
+        Raises:
+            VehicleError: The camera says that it cannot.
+        """
         if self._flags and not self._flags & mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO:
             raise VehicleError("the camera records no video")
         if self.filming is on and not self.fault:
@@ -85,7 +93,12 @@ class MavlinkRecorder:
         self._acknowledged, self._confirmed = (on, now), False
 
     def heed(self, status: CaptureStatus, now: float) -> None:
-        """Take in what the camera says that it does, at second `now`."""
+        """Compare with what the camera says that it does.
+
+        Args:
+            status: Activity of the camera.
+            now: Monotonic clock, seconds.
+        """
         if any(self._commander.under_way(number) is not None for number in (_START, _STOP)):
             return
         records = status.recording is not None

@@ -63,7 +63,12 @@ class RemoteId:
         self._next = 0
 
     def on_arm_status(self, message: Message, now: float) -> None:
-        """Process an OPEN_DRONE_ID_ARM_STATUS."""
+        """Process an OPEN_DRONE_ID_ARM_STATUS.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         error = _printable(message.error)
         self._told[message.get_srcComponent()] = now, int(message.status), error
 
@@ -81,9 +86,12 @@ class RemoteId:
     def due_messages(
         self, now: float, place: Callable[[], OperatorPlace | None], target: int
     ) -> list[Message]:
-        """The messages that are due at `now`, for the vehicle `target`.
+        """The messages that are due at `now`.
 
-        `place` is where it took off, or stands; None while that is not known.
+        Args:
+            now: Monotonic clock, seconds.
+            place: Where the vehicle took off, or stands; None while that is not known.
+            target: System id of the vehicle.
         """
         if self._config is None or now < self._due:
             return []

@@ -29,7 +29,15 @@ class Texts:
     def add_statustext(
         self, text: str, severity: int, now: float, number: int = 0, piece: int = 0
     ) -> None:
-        """Add one STATUSTEXT; one in pieces has a `number` other than zero."""
+        """Add one STATUSTEXT.
+
+        Args:
+            text: Of the message.
+            severity: MAV_SEVERITY, 0 the gravest.
+            now: Monotonic clock, seconds.
+            number: Id of a text in pieces; 0 for a whole one.
+            piece: Number of the piece, from 0.
+        """
         whole = 50
         if number == 0:
             self.add(text, severity, now)
@@ -43,13 +51,25 @@ class Texts:
             self._pieces.pop(next(iter(self._pieces)))
 
     def add(self, text: str, severity: int, now: float) -> None:
-        """Add a complete text."""
+        """Add a complete text.
+
+        Args:
+            text: The text; unprintable letters are left out.
+            severity: MAV_SEVERITY, 0 the gravest.
+            now: Monotonic clock, seconds.
+        """
         text = "".join(letter for letter in text if letter.isprintable()).strip()
         if text:
             self._texts.append(_Text(now, severity, text))
 
     def recent(self, now: float, seconds: float, severity: int = _GRAVE) -> list[str]:
-        """Texts of the last `seconds` of at least this `severity`, each once, oldest first."""
+        """Texts of the last moments, each once, oldest first.
+
+        Args:
+            now: Monotonic clock, seconds.
+            seconds: Age up to which they count.
+            severity: The least grave MAV_SEVERITY that counts.
+        """
         fresh = (
             one.text for one in self._texts if now - one.at <= seconds and one.severity <= severity
         )

@@ -69,8 +69,12 @@ class TrafficTable:
     ) -> None:
         """Process an ADSB_VEHICLE.
 
-        `origin` pins our frame, whose zero lies `sea_level` metres above the sea (None: not known),
-        and `here` is the vehicle's own position in it, ENU metres.
+        Args:
+            message: The message; the vehicle's own is ignored.
+            now: Monotonic clock, seconds.
+            origin: Geodetic origin of our frame.
+            sea_level: Height of its zero above the sea, metres; None where it is not known.
+            here: The vehicle's own position, ENU metres.
         """
         self.heard = True
         address = int(message.ICAO_address)
@@ -87,7 +91,12 @@ class TrafficTable:
             self.ignored += 1
 
     def around(self, here: Vector, now: float) -> tuple[Traffic, ...]:
-        """All that is known at `now`, the nearest to `here` first."""
+        """All that is known, the nearest to `here` first.
+
+        Args:
+            here: ENU metres.
+            now: Monotonic clock, seconds.
+        """
         self._forget(now)
         return tuple(
             Traffic(

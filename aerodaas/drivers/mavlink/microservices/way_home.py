@@ -33,9 +33,18 @@ def way_home_items(
 ) -> list[MissionItem]:
     """The plan that leads through `places` to the robot's start, and lands there.
 
-    The vehicle joins it at the leg nearest to it (DO_RETURN_PATH_START). Heights are above the
-    start, as those of the places are. `origin` is that of the local frame. Raises VehicleError if
-    the fence does not allow the way.
+    The vehicle joins it at the leg nearest to it (DO_RETURN_PATH_START).
+
+    Args:
+        robot: The robot, with its start and its fence.
+        places: East, north and up, local metres.
+        origin: Geodetic origin of the local frame.
+
+    Returns:
+        The items, whose heights are metres above the start.
+
+    Raises:
+        VehicleError: The fence does not allow the way.
     """
     start = np.array(robot.start, dtype=np.float64)
     _require_allowed(robot, places)
@@ -61,7 +70,15 @@ def way_home_items(
 
 
 def upload_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> None:
-    """Upload the plan and read it back; raises VehicleError if the vehicle holds another one."""
+    """Upload the plan and read it back.
+
+    Args:
+        link: The link to the vehicle.
+        items: Items of the plan, in order.
+
+    Raises:
+        VehicleError: The vehicle refuses the plan, or holds another one.
+    """
     try:
         upload(link, items)
     except VehicleError as error:
@@ -74,7 +91,15 @@ def upload_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> None:
 
 
 def other_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> str:
-    """In what the vehicle's plan differs from `items`; empty if in nothing. Raises VehicleError."""
+    """In what the vehicle's plan differs from `items`; empty if in nothing.
+
+    Args:
+        link: The link to the vehicle.
+        items: Items of the plan, in order; the first is not compared.
+
+    Raises:
+        VehicleError: The vehicle does not tell its plan.
+    """
     held = download(link)
     if len(held) != len(items):
         return f"it holds another way home than ours: {len(held)} items instead of {len(items)}"

@@ -92,7 +92,12 @@ class Alignment:
         self._lose("" if stands else "position: not believed, its local frame is a new one")
 
     def place(self, now: float, *, sure: bool) -> None:
-        """Update by a new global position; `sure`: the estimator reports it as valid."""
+        """Update by a new global position.
+
+        Args:
+            now: Monotonic clock, seconds.
+            sure: Whether the estimator reports it as valid.
+        """
         telemetry, last = self._telemetry, self._last
         if self.frame is not None:
             if self.fault and now - self._mended_at > _TOLD:
@@ -137,7 +142,12 @@ def _leap(before: _Sample, after: _Sample) -> float:
 def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
     """Geodetic origin of our local frame by the autopilot's own estimate.
 
-    Raises VehicleError if it has none now.
+    Args:
+        telemetry: What the vehicle has told so far.
+        frame: Our local frame in the autopilot's.
+
+    Raises:
+        VehicleError: The autopilot has no estimate now.
     """
     place, position = telemetry.whereabouts()
     latitude, longitude, _ = GeodeticOrigin(*place).to_geodetic(-frame.position(position))

@@ -29,7 +29,14 @@ class Attitude:
 
 
 def attitude_from_frd(roll: float, pitch: float, yaw: float, yaw_rate: float) -> Attitude:
-    """Convert angles of the FRD body in NED, as in ATTITUDE: nose up and clockwise positive."""
+    """Convert angles of the FRD body in NED, as in ATTITUDE.
+
+    Args:
+        roll: Radians, right side down positive.
+        pitch: Radians, nose up positive.
+        yaw: Radians clockwise from north.
+        yaw_rate: rad/s, clockwise positive.
+    """
     return Attitude(roll, -pitch, yaw_ned_to_enu(yaw), -yaw_rate)
 
 
@@ -41,17 +48,29 @@ class LocalFrame:
 
     @classmethod
     def standing_at(cls, start: Vector, ned: Vector) -> LocalFrame:
-        """Align the frame so that the position `ned` is our `start`."""
+        """Align the frame so that the position `ned` is our `start`.
+
+        Args:
+            start: ENU metres in our frame.
+            ned: The same place in the autopilot's frame, NED metres.
+        """
         return cls(start - ned_to_enu(ned))
 
     @classmethod
     def over_home(
         cls, home: GeodeticOrigin, latitude: float, longitude: float, up: float, ned: Vector
     ) -> LocalFrame:
-        """Align it by the global position of the position `ned`, which is `up` metres above home.
+        """Align it by the global position of the position `ned`.
 
-        Heights are not taken from the global position: an autopilot's is above mean sea level,
-        ours is above the ellipsoid, and the two differ by up to a hundred metres.
+        Heights are not taken from the global position: an autopilot's is above mean sea level, ours
+        is above the ellipsoid, and the two differ by up to a hundred metres.
+
+        Args:
+            home: Geodetic origin of our frame.
+            latitude: Degrees.
+            longitude: Degrees.
+            up: Height of the position above home, metres.
+            ned: In the autopilot's frame, NED metres.
         """
         east, north, _ = home.to_local(latitude, longitude, home.altitude)
         return cls.standing_at(np.array([east, north, up]), ned)

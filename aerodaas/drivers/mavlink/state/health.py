@@ -122,7 +122,12 @@ class Health:
         }
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Process a message of any kind."""
+        """Process a message of any kind.
+
+        Args:
+            message: The message; of some kinds only its time counts.
+            now: Monotonic clock, seconds.
+        """
         if self._heard_at is not None:
             self._gps_silence += min(now - self._heard_at, _GAP)
         self._heard_at = now

@@ -101,7 +101,13 @@ class FlightPhase:
     def ask(
         self, wish: FlightMode, now: float, meanwhile: frozenset[FlightMode] = frozenset()
     ) -> None:
-        """Record a requested mode; HEARTBEATs may show others `meanwhile`."""
+        """Record a requested mode.
+
+        Args:
+            wish: The mode.
+            now: Monotonic clock, seconds.
+            meanwhile: Other modes that HEARTBEATs may show until then.
+        """
         if wish is not self.wish:
             follows = _FOLLOWS[self.wish] if self.wish is not None else frozenset()
             self._before, self.seen = follows | {self.shown} | meanwhile, False

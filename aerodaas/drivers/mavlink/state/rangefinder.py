@@ -30,7 +30,12 @@ class Rangefinder:
         self._metres = math.nan
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Update by a DISTANCE_SENSOR; those that look elsewhere are not heeded."""
+        """Update by a DISTANCE_SENSOR; those that look elsewhere are not heeded.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         if message.orientation != mavlink.MAV_SENSOR_ROTATION_PITCH_270:
             return
         self._heard_at = now
@@ -43,7 +48,12 @@ class Rangefinder:
             self._metres, self._read_at = read / 100, now
 
     def below(self, attitude: Attitude, now: float) -> float | None:
-        """Metres straight down to whatever is there; None without a reading that counts."""
+        """Metres straight down to whatever is there; None without a reading that counts.
+
+        Args:
+            attitude: The vehicle's, by which the reading is made upright.
+            now: Monotonic clock, seconds.
+        """
         upright = math.cos(attitude.roll) * math.cos(attitude.pitch)
         if now - self._read_at > _FRESH or upright < math.cos(_LEVEL):
             return None

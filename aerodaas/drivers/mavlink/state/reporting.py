@@ -70,9 +70,13 @@ class VehicleReport:
     def state(
         self, stamp: int, now: float, counts: LinkCounts, reports: Sequence[str] = ()
     ) -> VehicleState:
-        """The newest state at `now`, which is `stamp` (nanoseconds) on the mission's clock.
+        """The newest state at `now`.
 
-        `counts` and `reports` are the link's.
+        Args:
+            stamp: The same time on the mission's clock, nanoseconds.
+            now: Monotonic clock, seconds.
+            counts: Counters of the link.
+            reports: Faults of the link.
         """
         telemetry, lost = self._telemetry, self.lost(now)
         # A silent link is no loss of the position: the last known one stays, with its age. Only a
@@ -137,7 +141,12 @@ class VehicleReport:
         return {name: number for name, number in items.items() if math.isfinite(number)}
 
     def odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
-        """Its position in our frame; NaN unless that is `known`."""
+        """Its position in our frame; NaN unless that is `known`.
+
+        Args:
+            frame: Our frame in the autopilot's; None while it is not known.
+            known: Whether the position is known.
+        """
         telemetry, attitude = self._telemetry, self._telemetry.attitude
         position: Vector = np.full(3, np.nan)
         if known and frame is not None and telemetry.position is not None:
@@ -152,7 +161,12 @@ class VehicleReport:
         )
 
     def health(self, now: float, stranded: tuple[str, ...] | None) -> HealthReadings:
-        """Its health at `now`; `stranded` is why it would not come home without us, if known."""
+        """Its health at `now`.
+
+        Args:
+            now: Monotonic clock, seconds.
+            stranded: Why it would not come home without us; None if not known.
+        """
         telemetry, health = self._telemetry, self._telemetry.health
         logs = mavlink.MAV_SYS_STATUS_LOGGING
         sensors = telemetry.sensors

@@ -129,7 +129,12 @@ class Telemetry:
         }
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Update by a message of the vehicle."""
+        """Update by a message of the vehicle.
+
+        Args:
+            message: The message.
+            now: Monotonic clock, seconds.
+        """
         if now - self.heard_at > _GAP:
             self.back_at = now
         self.heard_at = now

@@ -65,7 +65,14 @@ class Touchdown:
         """Forget positions, because the autopilot has restarted."""
 
     def move(self, up: float, rise: float, speed: float, now: float) -> None:
-        """Update by a position: `up` metres, climb rate `rise` and total `speed` in m/s."""
+        """Update by a position.
+
+        Args:
+            up: Height, metres.
+            rise: Climb rate, m/s.
+            speed: Total speed, m/s.
+            now: Monotonic clock, seconds.
+        """
         if now - self._moved_at > _FRESH:
             self._back_at = now
         if rise < -_FALLS:
@@ -78,13 +85,24 @@ class Touchdown:
         self.flew |= self._armed is True and up - self._ground > _LIFTED
 
     def report(self, now: float, *, on_ground: bool | None) -> None:
-        """Update by the autopilot's own landed state; None if it sends none."""
+        """Update by the autopilot's own landed state.
+
+        Args:
+            now: Monotonic clock, seconds.
+            on_ground: Whether it says so; None if it sends none.
+        """
         self._on_ground = on_ground
         self._on_ground_since = min(self._on_ground_since, now) if on_ground else math.inf
         self.flew |= self._armed is True and on_ground is False
 
     def observe(self, mode: FlightMode, now: float, *, armed: bool) -> None:
-        """Update by a HEARTBEAT."""
+        """Update by a HEARTBEAT.
+
+        Args:
+            mode: Flight mode that it shows.
+            now: Monotonic clock, seconds.
+            armed: Whether the vehicle is armed by it.
+        """
         if armed:
             if not self._armed:
                 # Found armed, it counts as flying: it was not seen to stand.

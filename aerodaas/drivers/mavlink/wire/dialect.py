@@ -71,7 +71,12 @@ class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]
         self.arguments = arguments
 
     def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:  # noqa: ANN401, FBT001, FBT002 - pymavlink's signature
-        """Serialise."""
+        """Serialise.
+
+        Args:
+            mav: pymavlink's codec.
+            force_mavlink1: As pymavlink passes it.
+        """
         payload = self.unpacker.pack(
             self.event,
             self.event_time_boot_ms,
@@ -89,7 +94,12 @@ mavlink.mavlink_map.setdefault(EventMessage.id, EventMessage)
 
 
 def decoded(reader: Any, frame: bytearray) -> Any:  # noqa: ANN401 - pymavlink has no types
-    """The message in a whole packet; None for one that is damaged or that the dialect lacks."""
+    """The message in a whole packet; None for one that is damaged or that the dialect lacks.
+
+    Args:
+        reader: pymavlink's codec.
+        frame: The packet's bytes.
+    """
     try:
         message = reader.decode(frame)
     except mavlink.MAVError:

@@ -52,7 +52,12 @@ class Finder:
         self.found: FoundVehicle | None = None
 
     def on_heartbeat(self, message: Any, peer: Peer = None) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Process a HEARTBEAT of any sender, from the address `peer`."""
+        """Process a HEARTBEAT of any sender.
+
+        Args:
+            message: The message.
+            peer: Address that it came from; None on a wire without addresses.
+        """
         system, component = message.get_srcSystem(), message.get_srcComponent()
         objection, family = self._judge(message, system)
         if family is not None and not objection:

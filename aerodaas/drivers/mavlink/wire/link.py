@@ -213,7 +213,13 @@ class MavlinkLink:
         return target
 
     def adopt(self, target: Sender, peer: Peer, now: float) -> None:
-        """Accept only this system's component as the vehicle, and only from the address `peer`."""
+        """Accept only this system's component as the vehicle, and only from its address.
+
+        Args:
+            target: System and component id.
+            peer: Address that it speaks from.
+            now: Monotonic clock, seconds.
+        """
         self.pins.adopt(target, peer, now)
 
     def reports(self, now: float) -> list[str]:

@@ -36,7 +36,12 @@ class RateKeeper:
         self._waiting = False
 
     def step(self, telemetry: Telemetry, now: float) -> None:
-        """Request the next missing message; called by the link's thread."""
+        """Request the next missing message; called by the link's thread.
+
+        Args:
+            telemetry: What the vehicle has told so far.
+            now: Monotonic clock, seconds.
+        """
         if telemetry.reboots != self._reboots:
             self._reboots = telemetry.reboots
             self._asked_at = dict.fromkeys(self._asked_at, -math.inf)

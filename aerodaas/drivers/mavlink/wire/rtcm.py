@@ -89,11 +89,15 @@ class RtcmFramer:
 
 
 def fragments(message: bytes, sequence: int) -> list[Any]:
-    """GPS_RTCM_DATA for one message of at most `LARGEST` bytes, the `sequence`th.
+    """GPS_RTCM_DATA for one message.
 
     Its flags: bit 0 for a message in several parts, then two bits for the part, five for the
     sequence. A part that is not full is the last; so where all are full and fewer than four, an
     empty one ends them.
+
+    Args:
+        message: At most `LARGEST` bytes.
+        sequence: Number of the message.
     """
     parts = [message[start : start + _ONE] for start in range(0, len(message), _ONE)]
     if len(parts) > 1 and len(parts) < _MOST and len(parts[-1]) == _ONE:

@@ -35,18 +35,34 @@ class SenderPins:
         self._others: dict[Sender, Peer] = {}
 
     def adopt(self, target: Sender, peer: Peer, now: float) -> None:
-        """Pin the vehicle to the address of the HEARTBEAT by which it was found."""
+        """Pin the vehicle to the address of the HEARTBEAT by which it was found.
+
+        Args:
+            target: System and component id.
+            peer: The address.
+            now: Monotonic clock, seconds.
+        """
         self._others.pop(target, None)
         self.pin.set(peer, now)
         self.target = target
 
     def remember(self, sender: Sender, peer: Peer) -> None:
-        """Remember a sender other than the adopted vehicle."""
+        """Remember a sender other than the adopted vehicle.
+
+        Args:
+            sender: System and component id.
+            peer: Address that it speaks from.
+        """
         if len(self._others) < _MOST:
             self._others.setdefault(sender, peer)
 
     def carries(self, sender: Sender, peer: Peer) -> bool:
-        """Whether a packet is of a camera or gimbal of the vehicle, from the vehicle's address."""
+        """Whether a packet is of a camera or gimbal of the vehicle, from the vehicle's address.
+
+        Args:
+            sender: System and component id of the packet.
+            peer: Address that it came from.
+        """
         target = self.target
         known = target is not None and sender[0] == target[0] and sender != target
         return known and sender[1] in CAMERAS | GIMBALS and peer == self.pin.address
@@ -58,7 +74,12 @@ class SenderPins:
         return tuple(dict.fromkeys((*own, *self._others.values())))
 
     def may_pass(self, content: bytes, peer: Peer) -> bool:
-        """Whether a datagram may be forwarded: no packet in it uses another address' ids."""
+        """Whether a datagram may be forwarded: no packet in it uses another address' ids.
+
+        Args:
+            content: The datagram.
+            peer: Address that it came from; None on a wire without addresses.
+        """
         if peer is None or self.target is None:
             return True
         found = senders(content)

@@ -83,7 +83,13 @@ class WireShare:
         return system != self.system and system in self._owner.systems
 
     def put(self, content: bytes, peer: Peer, *, own: bool) -> None:
-        """Add what came from `peer`; `own` if the vehicle's ids are on it. Drops it if full."""
+        """Add a datagram, or drop it if too many wait.
+
+        Args:
+            content: The datagram.
+            peer: Address that it came from.
+            own: Whether the vehicle's ids are on it.
+        """
         with self._lock:
             if len(self._waiting) >= (_MOST if own else _MOST_OF_OTHERS):
                 self.dropped += 1
@@ -108,7 +114,12 @@ class WireShare:
         return arrived
 
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        """Send to `peers`, if the wire has several; drops unsendable packets."""
+        """Send a packet; drops unsendable ones.
+
+        Args:
+            packet: The packet's bytes.
+            peers: Addresses to send to, if the wire has several.
+        """
         self._owner.send(packet, peers)
 
     def close(self) -> None:

@@ -26,9 +26,14 @@ _RADIO_STATUS = 109
 
 
 def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
-    """The key of robot `name`, or None for unsigned flight.
+    """The key of a robot, or None for unsigned flight.
 
-    Raises ConfigError for one that cannot be read; the message never holds any of it.
+    Args:
+        settings: Name the file of the key, unless the variable `MAVLINK_KEY` holds it.
+        name: Id of the robot, for errors.
+
+    Raises:
+        ConfigError: The key cannot be read; the message never holds any of it.
     """
     text = os.environ.get(MAVLINK_KEY, "")
     if text:
@@ -78,10 +83,15 @@ class _Clocked(mavlink.MAVLinkSigning):  # type: ignore[misc]
 
 
 def sign_with(mav: Any, key: bytes, vehicle: int = 0) -> None:  # noqa: ANN401 - pymavlink has no types
-    """Make `mav` sign its packets to the system `vehicle`, and refuse unsigned ones.
+    """Make `mav` sign its packets, and refuse unsigned ones.
 
     The link id is the same in each run: until it is started again, a vehicle remembers sixteen
     streams of signed packets (MAVLINK_MAX_SIGNING_STREAMS of the C library), and drops all others.
+
+    Args:
+        mav: pymavlink's codec.
+        key: 32 bytes.
+        vehicle: System id of the vehicle, of which the link id is made.
     """
     mav.signing = signing = _Clocked()
     signing.secret_key = key
@@ -95,7 +105,12 @@ def _let_through(_: object, message_id: int) -> bool:
 
 
 def signature_fits(key: bytes, frame: bytes | bytearray) -> bool:
-    """Whether the signature of a signed packet was made with `key`."""
+    """Whether the signature of a signed packet was made with `key`.
+
+    Args:
+        key: 32 bytes.
+        frame: The packet with its signature.
+    """
     expected = hashlib.sha256(key + bytes(frame[:-6])).digest()[:6]
     return hmac.compare_digest(expected, bytes(frame[-6:]))
 
@@ -113,7 +128,13 @@ class SignedCodec(mavlink.MAVLink):  # type: ignore[misc]
         return int(self.signing.reject_count)
 
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:  # noqa: N803 - pymavlink's names
-        """Check the signature, then whether its timestamp is newer than all before."""
+        """Check the signature, then whether its timestamp is newer than all before.
+
+        Args:
+            msgbuf: The packet with its signature.
+            srcSystem: System id of its sender.
+            srcComponent: Component id of its sender.
+        """
         if not signature_fits(self.signing.secret_key, msgbuf):
             return False
         return bool(super().check_signature(msgbuf, srcSystem, srcComponent))

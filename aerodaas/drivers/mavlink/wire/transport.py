@@ -40,7 +40,12 @@ class Transport(Protocol):
         ...
 
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        """Send to `peers`, if the wire has several; drops unsendable packets."""
+        """Send a packet; drops unsendable ones.
+
+        Args:
+            packet: The packet's bytes.
+            peers: Addresses to send to, if the wire has several.
+        """
         ...
 
     def close(self) -> None:
@@ -49,9 +54,15 @@ class Transport(Protocol):
 
 
 def open_transport(url: str, name: str) -> Transport:
-    """Open `url` for robot `name`.
+    """Open a transport of MAVLink.
 
-    Raises ConfigError for an invalid address, VehicleError for one that cannot be opened.
+    Args:
+        url: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD.
+        name: Id of the robot, for errors.
+
+    Raises:
+        ConfigError: The address is invalid.
+        VehicleError: The address cannot be opened.
     """
     kind, _, rest = url.partition(":")
     host, _, number = rest.rpartition(":")
