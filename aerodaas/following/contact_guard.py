@@ -117,12 +117,18 @@ class PeopleTracker:
         *,
         target: RelativeTarget | None = None,
     ) -> None:
-        """Add the people in a frame captured from `pose` at `stamp`, `interval` s after the last.
+        """Add the people in a frame.
 
-        `target` is that one of `people` who is followed, known by other evidence than its place. It
-        claims its person first, whom no other sighting moves: a loose box around a body often looks
-        nearer than the body. Then each, nearest first, is the person predicted nearest to it, or a
-        new one.
+        The target claims its person first, whom no other sighting moves: a loose box around a body
+        often looks nearer than the body. Then each, nearest first, is the person predicted nearest
+        to it, or a new one.
+
+        Args:
+            people: Everybody in the frame.
+            pose: Odometry of the drone at capture.
+            stamp: Mission time of capture, nanoseconds.
+            interval: Seconds since the last frame.
+            target: That one of `people` who is followed, known by other evidence than its place.
         """
         last, self._newest = self._newest, stamp
         self._people = [
@@ -167,7 +173,12 @@ class PeopleTracker:
         return min((one for one in offs if one is not mine), key=offs.__getitem__, default=None)
 
     def relative_to(self, pose: Odometry, stamp: int) -> list[Prediction]:
-        """Everybody surely there, predicted for `stamp` relative to `pose`, nearest first."""
+        """Everybody surely there, predicted relative to the drone, nearest first.
+
+        Args:
+            pose: Odometry of the drone.
+            stamp: Mission time to predict for, nanoseconds.
+        """
         found = []
         for person in self._people:
             predicted = person.motion.relative_to(pose, stamp)
@@ -263,17 +274,27 @@ class ContactGuard:
         *,
         target: RelativeTarget | None = None,
     ) -> None:
-        """Add the people in a frame captured at `stamp`, `interval` seconds after the last.
+        """Add the people in a frame.
 
-        `target` is that one of `people` who is followed.
+        Args:
+            people: Everybody in the frame.
+            at_capture: Odometry of the drone at capture; None if unknown.
+            stamp: Mission time of capture, nanoseconds.
+            interval: Seconds since the last frame.
+            target: That one of `people` who is followed.
         """
         self._interval = interval
         self._people.see(people, at_capture or _STILL, stamp, interval, target=target)
 
     def evade(self, now: Odometry | None, stamp: int) -> Vector | None:
-        """Velocity (forward, left, up in m/s) by which to give way now; None if there is no need.
+        """Velocity by which to give way now.
 
-        `stamp` is the time of the drone's odometry `now`, nanoseconds.
+        Args:
+            now: Newest odometry of the drone; None if unknown.
+            stamp: Mission time of `now`, nanoseconds.
+
+        Returns:
+            Forward, left and up in m/s; None if there is no need.
         """
         pose = now or _STILL
         people = self._people.relative_to(pose, stamp)
@@ -292,18 +313,31 @@ class ContactGuard:
         return None if self._velocity is None else enu_to_body(self._velocity, pose.yaw)
 
     def away(self, now: Odometry | None, stamp: int) -> float:
-        """Speed in m/s at which who is followed goes away; infinite while they are not seen.
+        """Speed at which who is followed goes away.
 
         Believed at once, so that the drone brakes before it is sure that they turn round.
+
+        Args:
+            now: Newest odometry of the drone; None if unknown.
+            stamp: Mission time of `now`, nanoseconds.
+
+        Returns:
+            Metres per second; infinite while they are not seen.
         """
         people = self._people.relative_to(now or _STILL, stamp)
         return min((one.away for one in people if one.followed and one.in_sight), default=math.inf)
 
     def headway(self, pace: float, delay: float) -> float:
-        """Distance in metres from which a drone that follows somebody at `pace` m/s can back off.
+        """Distance from which a drone that follows somebody can back off.
 
-        They may turn round within a step and come back as fast; the drone learns of it `delay`
-        seconds later.
+        They may turn round within a step and come back as fast.
+
+        Args:
+            pace: Their speed in m/s; counted up to the limit `forward`.
+            delay: Seconds until the drone learns that they have turned round.
+
+        Returns:
+            Metres.
         """
         closing = 2.0 * max(0.0, min(pace, self.limits.forward))
         flown_on = closing * (delay + self.limits.reply)

@@ -156,9 +156,16 @@ class FollowController:
         self._reset()
 
     def expected(self, odometry: Odometry, stamp: int) -> RelativeTarget | None:
-        """Predicted sighting of the target in a frame captured at `odometry`; None if unknown.
+        """Predicted sighting of the target in a frame.
 
         A bound locates the feet of a fallen person, who lies, or gets up, within `LYING` of them.
+
+        Args:
+            odometry: Odometry of the drone at capture.
+            stamp: Mission time of capture, nanoseconds.
+
+        Returns:
+            The sighting, or None if it is unknown.
         """
         if self._stood is not None:
             return replace(seen_from(odometry, self._stood), bound=True)

@@ -142,9 +142,14 @@ def _foot(lens: Vector, ray: Vector, ground: Ground | None) -> tuple[float, floa
 
 
 def reach(ray: Vector, height: float) -> float:
-    """Metres along level ground to where `ray` meets it, from a lens `height` metres above.
+    """Metres along level ground to where a ray meets it.
 
-    Infinite if the height is unknown or not positive, or the ray does not point down.
+    Args:
+        ray: Direction in a level frame, its third part up.
+        height: Metres of the lens above the ground.
+
+    Returns:
+        Metres; infinite if the height is unknown or not positive, or the ray does not point down.
     """
     steep = slope(ray)
     if not (math.isfinite(height) and height > 0.0 and steep < -SMALLEST_SLOPE):
@@ -197,9 +202,14 @@ class GroundView:
         )
 
     def points(self, pixels: Array, up: float = 0.0) -> Array:
-        """Ground points (N, 2) below objects `up` metres high at the pixels (N, 2).
+        """Ground points below objects at some pixels.
 
-        NaN at and above the horizon; `up` must be less than the camera's height.
+        Args:
+            pixels: Pixels of the picture, (N, 2).
+            up: Metres of the objects above the ground, less than the camera's height.
+
+        Returns:
+            Metres forward and left, (N, 2); NaN at and above the horizon.
         """
         rays = self._rays(pixels)
         down = -rays[:, 2]
@@ -208,7 +218,12 @@ class GroundView:
         return np.asarray(self._eye[:2] + reach[:, None] * rays[:, :2])
 
     def height_above(self, point: Array, pixel: Array) -> float:
-        """Height in metres of the object at `pixel` (2,), if it is above ground `point` (2,)."""
+        """Height in metres of an object above the ground.
+
+        Args:
+            point: Ground point below it, (2,), metres forward and left.
+            pixel: Pixel at which it is seen, (2,).
+        """
         (ray,) = self._rays(pixel[None])
         away = float(np.hypot(*(point - self._eye[:2])))
         return self.height + away * float(ray[2] / max(np.hypot(*ray[:2]), _STEEPEST))

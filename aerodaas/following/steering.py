@@ -31,12 +31,17 @@ lost."""
 
 
 def closing_speed(gap: float, deceleration: float, reaction_time: float) -> float:
-    """Highest safe speed (m/s) towards a person `gap` metres beyond the least safe distance.
+    """Highest safe speed (m/s) towards a person.
 
     For a positive gap as `braking_speed`. For a negative gap it is negative, so that the drone
-    backs away; the slope is 1 / `reaction_time` on both sides of zero. Keeping below it makes
-    gap >= 0 a forward invariant (control barrier function: Ames et al., "Control barrier
-    functions: theory and applications", ECC 2019).
+    backs away; the slope is 1 / `reaction_time` on both sides of zero. Keeping below it makes gap
+    >= 0 a forward invariant (control barrier function: Ames et al., "Control barrier functions:
+    theory and applications", ECC 2019).
+
+    Args:
+        gap: Metres beyond the least safe distance.
+        deceleration: Braking in m/s².
+        reaction_time: Seconds until braking begins.
     """
     return gap / reaction_time if gap < 0.0 else braking_speed(gap, deceleration, reaction_time)
 
@@ -72,9 +77,15 @@ class ApproachLimit:
         at_capture: Odometry | None,
         interval: float,
     ) -> None:
-        """Store the people in a frame captured `interval` seconds after the last.
+        """Store the people in a frame.
 
         A frame without people keeps their previous positions.
+
+        Args:
+            target: The followed person; None if not seen.
+            others: Everybody and everything else in the way.
+            at_capture: Odometry of the drone at capture; None if unknown.
+            interval: Seconds since the last frame.
         """
         self._blind = min(interval, _LONGEST_BLIND)
         seen = [*([] if target is None else [target]), *others]
@@ -86,11 +97,19 @@ class ApproachLimit:
             self._places = [place_of(one, at_capture) for one in seen]
 
     def speed(self, towards: RelativeTarget, away: float, now: Odometry | None) -> float:
-        """Highest safe speed in m/s towards `towards`, which moves away at `away` m/s.
+        """Highest safe speed towards the target.
 
-        Negative if the drone must back off from the target. A target walking away allows no more
-        speed than a standing one, and a drone that gains on it has less room than measured, by the
-        airframe's response time. Others in the path stop the drone, but do not drive it back.
+        A target walking away allows no more speed than a standing one, and a drone that gains on it
+        has less room than measured, by the airframe's response time. Others in the path stop the
+        drone, but do not drive it back.
+
+        Args:
+            towards: The target, relative to the drone now.
+            away: Speed in m/s at which it moves away.
+            now: Newest odometry of the drone; None if unknown.
+
+        Returns:
+            Metres per second; negative if the drone must back off.
         """
         seen = list(self._distances(towards.bearing, now))
         target = min([towards.distance, *(far for far, is_target in seen if is_target)])
@@ -172,15 +191,27 @@ class Clearance:
     def see(
         self, points: NDArray[np.float64] | None, at_capture: Odometry | None, interval: float
     ) -> None:
-        """Store the surfaces of a frame captured `interval` seconds after the last.
+        """Store the surfaces of a frame.
 
-        None, for a frame without depth, keeps the previous ones.
+        Args:
+            points: Surfaces, (N, 2), metres forward and left; None, for a frame without depth,
+                keeps the last.
+            at_capture: Odometry of the drone at capture; None if unknown.
+            interval: Seconds since the last frame.
         """
         if points is not None:
             self._points, self._at, self._interval = points, at_capture, interval
 
     def speed(self, towards: RelativeTarget, now: Odometry | None) -> float:
-        """Highest safe speed along the line of sight `towards`, m/s; infinite if it is free."""
+        """Highest safe speed along the line of sight.
+
+        Args:
+            towards: The target at its end, relative to the drone now.
+            now: Newest odometry of the drone; None if unknown.
+
+        Returns:
+            Metres per second; infinite if the line is free.
+        """
         points = self._points
         if self._at is not None and now is not None:
             east_north = self._at.position[:2] + points @ _rotation(self._at.yaw).T
@@ -226,11 +257,17 @@ class CommandShaper:
         braking: bool = False,
         evasive: bool = False,
     ) -> VelocityCommand:
-        """Limit `wanted` (forward, left, up in m/s) and `yaw_rate` (rad/s).
+        """Limit a velocity and a yaw rate.
 
-        `dt` is the time since the last command in seconds; `braking` applies the limit `stopping`
-        instead of `acceleration`, and `evasive` none. Numbers that are not finite command an
-        immediate stop.
+        Numbers that are not finite command an immediate stop.
+
+        Args:
+            wanted: Forward, left and up in m/s.
+            yaw_rate: Radians per second.
+            dt: Seconds since the last command.
+            priority: Priority of the command.
+            braking: Apply the limit `stopping` instead of `acceleration`.
+            evasive: Apply no limit of acceleration, nor of climbing.
         """
         limits = self.limits
         if not np.isfinite([*wanted, yaw_rate]).all():

@@ -95,12 +95,20 @@ class RelativeTarget:
 
 
 def sight(detection: Detection, detections: Detections, size: TargetSize) -> RelativeTarget | None:
-    """Locate `detection`, one of `detections`, an upright object of `size`.
+    """Locate an upright object.
 
     A measured depth gives the distance. Otherwise the height of the box does, if all of it is in
     the image; if its top or bottom is cut off or hidden, by a wall or a car, the width is used as
-    well, because such a box is too short and the object nearer than it appears. None if the
-    camera is not calibrated or the box is degenerate.
+    well, because such a box is too short and the object nearer than it appears.
+
+    Args:
+        detection: Box of the object, in pixels.
+        detections: Boxes of its frame, with camera and odometry.
+        size: Size of such objects, metres.
+
+    Returns:
+        Where it is relative to the drone, or None if the camera is not calibrated or the box
+        degenerate.
     """
     camera, odometry = detections.camera, detections.odometry
     left, top, right, bottom = detection.box
@@ -162,6 +170,10 @@ def ends_in_picture(detection: Detection, detections: Detections) -> bool:
 
     A box that extends beyond the left, right and lower edges may be the ground before the camera,
     which a detector cannot distinguish from an object at that distance.
+
+    Args:
+        detection: The box, in pixels.
+        detections: Boxes of its frame, with its size.
     """
     left, _, right, bottom = detection.box
     margin_u, margin_v = EDGE_MARGIN * detections.width, EDGE_MARGIN * detections.height
@@ -208,14 +220,27 @@ _FIRST_SPEED = 0.7
 
 
 def seen_from(odometry: Odometry, place: tuple[float, float]) -> RelativeTarget:
-    """Bearing and distance of a place (metres east, north of home) from a drone at `odometry`."""
+    """Bearing and distance of a place from a drone.
+
+    Args:
+        odometry: Odometry of the drone.
+        place: Metres east and north of home.
+    """
     way = np.array(place) - odometry.position[:2]
     bearing = math.remainder(math.atan2(way[1], way[0]) - odometry.yaw, math.tau)
     return RelativeTarget(bearing, float(np.hypot(*way)))
 
 
 def place_of(sighting: RelativeTarget, odometry: Odometry) -> NDArray[np.float64]:
-    """Position (2,) of a sighting from a drone at `odometry`, metres east and north of home."""
+    """Position of a sighting.
+
+    Args:
+        sighting: Bearing and distance from the drone.
+        odometry: Odometry of the drone at capture.
+
+    Returns:
+        Metres east and north of home, (2,).
+    """
     heading = odometry.yaw + sighting.bearing
     towards = np.array([math.cos(heading), math.sin(heading)])
     return np.asarray(odometry.position[:2] + sighting.distance * towards)
@@ -255,6 +280,11 @@ class TargetMotion:
 
         Such a box shows a part of the target, or a person about to fall. It is accepted if it
         persists.
+
+        Args:
+            sighting: The sighting.
+            odometry: Odometry of the drone at capture.
+            stamp: Mission time of capture, nanoseconds.
         """
         predicted = self.relative_to(odometry, stamp)
         if predicted is None or seconds(stamp - self._stamp) > _PATIENCE:
@@ -262,7 +292,13 @@ class TargetMotion:
         return sighting.distance - predicted[0].distance > _LEAP * _RANGE_NOISE * sighting.distance
 
     def observe(self, sighting: RelativeTarget, odometry: Odometry, stamp: int) -> None:
-        """Update the estimate by a sighting at `stamp` from a drone at `odometry`."""
+        """Update the estimate by a sighting.
+
+        Args:
+            sighting: Bearing and distance from the drone.
+            odometry: Odometry of the drone at capture.
+            stamp: Mission time of capture, nanoseconds.
+        """
         heading = odometry.yaw + sighting.bearing
         along = np.array([math.cos(heading), math.sin(heading)])
         across = np.array([-along[1], along[0]])
@@ -285,10 +321,15 @@ class TargetMotion:
     def relative_to(
         self, odometry: Odometry, stamp: int
     ) -> tuple[RelativeTarget, float, float] | None:
-        """Predict the target at `stamp` relative to a drone at `odometry`.
+        """Predict the target relative to a drone.
 
-        Returns the bearing and distance, and the target's velocity in m/s away from the drone
-        along the line of sight and to the left across it. None before the first observation.
+        Args:
+            odometry: Odometry of the drone.
+            stamp: Mission time to predict for, nanoseconds.
+
+        Returns:
+            Bearing and distance, and the target's velocity in m/s away from the drone along the
+            line of sight and to the left across it; None before the first observation.
         """
         if self._state is None:
             return None
@@ -347,10 +388,16 @@ class Upright:
         self._stood = None
 
     def stands(self, top: float, distance: float, stamp: int) -> bool:
-        """Add a sighting of the target's upper edge, `top` metres above home.
+        """Add a sighting of the target's upper edge.
 
-        Returns False while it moves up or down faster than a walking person's, and after a fall
-        until it is up again.
+        Args:
+            top: Height of the edge in metres above home.
+            distance: Metres to the target.
+            stamp: Mission time of capture, nanoseconds.
+
+        Returns:
+            False while the edge moves up or down faster than a walking person's, and after a fall
+            until it is up again.
         """
         before = self._before(stamp)
         self._looks.append((stamp, top))
