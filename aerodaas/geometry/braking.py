@@ -19,10 +19,14 @@ __all__ = [
 
 
 def braking_speed(distance: float, deceleration: float, reaction_time: float) -> float:
-    """The highest speed (m/s) from which one still stops within `distance` metres.
+    """The highest speed (m/s) from which a drone still stops within a distance.
 
-    One flies on for `reaction_time` seconds and then brakes: v t + v²/(2 a) = d, solved for v.
-    Zero where the distance is used up.
+    It flies on during the reaction and then brakes: v t + v²/(2 a) = d, solved for v.
+
+    Args:
+        distance: Metres; zero or less gives zero.
+        deceleration: Braking in m/s².
+        reaction_time: Seconds until braking begins.
     """
     if distance <= 0.0:
         return 0.0
@@ -31,18 +35,35 @@ def braking_speed(distance: float, deceleration: float, reaction_time: float) ->
 
 
 def braking_distance(speed: float, deceleration: float, reaction_time: float) -> float:
-    """Metres in which one stops from `speed` (m/s); the inverse of `braking_speed`."""
+    """Metres in which a drone stops; the inverse of `braking_speed`.
+
+    Args:
+        speed: Metres per second.
+        deceleration: Braking in m/s².
+        reaction_time: Seconds until braking begins.
+    """
     return speed * reaction_time + speed * speed / (2.0 * deceleration)
 
 
 def stopping_point(position: Vector, velocity: Vector, deceleration: float) -> Vector:
-    """Where a drone comes to rest that brakes now: v²/(2 a) ahead."""
+    """Where a drone comes to rest that brakes now: v²/(2 a) ahead.
+
+    Args:
+        position: Position of the drone, metres.
+        velocity: Its velocity, m/s, in the same frame.
+        deceleration: Braking in m/s².
+    """
     speed = length(velocity)
     return position + velocity * (speed / (2.0 * deceleration))
 
 
 def limit_length(vector: Vector, longest: float) -> Vector:
-    """`vector`, shortened to `longest` where it is longer."""
+    """A vector, shortened where it is too long.
+
+    Args:
+        vector: The vector.
+        longest: Greatest length, in its unit.
+    """
     long = length(vector)
     return vector if long <= longest else vector * (longest / long)
 
@@ -57,9 +78,18 @@ def velocity_towards(
     reaction_time: float,
     yaw_rate: float,
 ) -> VelocitySetpoint:
-    """The velocity that flies to `target` and stops there, or passes it at its passing speed.
+    """The velocity that flies to a target and stops there, or passes it at its passing speed.
 
-    At most `speed` m/s (or the target's own) and `yaw_rate` rad/s; it does not overshoot.
+    It does not overshoot.
+
+    Args:
+        target: The target, ENU metres.
+        position: Position of the drone, ENU metres.
+        yaw: Its yaw, radians.
+        speed: Greatest speed in m/s, unless the target has its own.
+        deceleration: Braking in m/s².
+        reaction_time: Seconds until braking begins.
+        yaw_rate: Greatest yaw rate in rad/s.
     """
     way = target.position - position
     distance = length(way)

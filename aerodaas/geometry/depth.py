@@ -28,9 +28,14 @@ _SPECKLE = 0.05
 
 
 def depth_in_box(depth: NDArray[np.uint16], box: Box) -> float | None:
-    """Metres along the optical axis to the surface in the middle of `box` (pixels), the median.
+    """Metres along the optical axis to the surface in the middle of a box, the median.
 
-    None where too little of it was measured, or the box is none.
+    Args:
+        depth: Depth picture, height x width, millimetres; 0 where not measured.
+        box: Left, top, right, bottom in its pixels.
+
+    Returns:
+        Metres, or None where too little of it was measured, or the box is none.
     """
     if not np.isfinite(box).all():
         return None

@@ -87,7 +87,13 @@ class EnergyModel:
         return self._hover_power * duration / self.endurance
 
     def leg(self, start: Vector, end: Vector, speed: float) -> float:
-        """Charge for the straight way from `start` to `end` (ENU metres) at `speed` m/s."""
+        """Charge for a straight way, as a fraction of the battery.
+
+        Args:
+            start: ENU metres.
+            end: ENU metres.
+            speed: Metres per second over ground.
+        """
         way = end - start
         distance = length(way)
         if distance == 0.0:
@@ -97,7 +103,17 @@ class EnergyModel:
     def route(
         self, start: Vector, waypoints: Iterable[Waypoint], home: Vector, speed: float
     ) -> float:
-        """Charge for visiting `waypoints` in this order, with their hovers, and coming home."""
+        """Charge for visiting waypoints in order, with their hovers, and coming home.
+
+        Args:
+            start: ENU metres.
+            waypoints: Local waypoints, in order.
+            home: ENU metres.
+            speed: Metres per second, where a waypoint has no own speed.
+
+        Returns:
+            Fraction of the battery.
+        """
         charge, here = 0.0, start
         for waypoint in waypoints:
             there = waypoint.position
@@ -107,7 +123,16 @@ class EnergyModel:
         return charge + self.way_home(here, home, speed)
 
     def way_home(self, position: Vector, home: Vector, speed: float) -> float:
-        """Charge for flying from `position` to above `home` and descending there at 0.5 m/s."""
+        """Charge for flying to above home and descending there at 0.5 m/s.
+
+        Args:
+            position: ENU metres.
+            home: ENU metres.
+            speed: Metres per second.
+
+        Returns:
+            Fraction of the battery.
+        """
         descent_speed = 0.5
         above = np.array([home[0], home[1], position[2]])
         descent = max(0.0, float(position[2] - home[2])) / descent_speed
@@ -132,7 +157,13 @@ class EnergyMeter:
         self._expected = 0.0
 
     def observe(self, fraction: float, velocity: Vector, duration: float) -> None:
-        """Take note of the battery's charge after flying at `velocity` for `duration` seconds."""
+        """Add the battery's charge after a time of flight.
+
+        Args:
+            fraction: Charge, 0 to 1.
+            velocity: Velocity of the flight, ENU m/s.
+            duration: Seconds since the last charge.
+        """
         if not (math.isfinite(fraction) and is_finite(velocity)):
             return
         if self._first is None:
@@ -153,11 +184,30 @@ class EnergyMeter:
         return self.scale * self.model.hover(duration)
 
     def way_home(self, position: Vector, home: Vector, speed: float) -> float:
-        """Charge to come home, by the model as scaled."""
+        """Charge to come home, by the model as scaled.
+
+        Args:
+            position: ENU metres.
+            home: ENU metres.
+            speed: Metres per second.
+
+        Returns:
+            Fraction of the battery.
+        """
         return self.scale * self.model.way_home(position, home, speed)
 
     def route(
         self, start: Vector, waypoints: Iterable[Waypoint], home: Vector, speed: float
     ) -> float:
-        """Charge for a route and the return home, by the scaled model."""
+        """Charge for a route and the return home, by the scaled model.
+
+        Args:
+            start: ENU metres.
+            waypoints: Local waypoints, in order.
+            home: ENU metres.
+            speed: Metres per second, where a waypoint has no own speed.
+
+        Returns:
+            Fraction of the battery.
+        """
         return self.scale * self.model.route(start, waypoints, home, speed)

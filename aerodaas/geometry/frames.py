@@ -75,7 +75,12 @@ def length(vector: Vector) -> float:
 
 
 def is_close(vector: Vector, other: Vector) -> bool:
-    """Whether two finite vectors are equal as `numpy.allclose` has it, in a tenth of its time."""
+    """Whether two finite vectors are equal as `numpy.allclose` has it, in a tenth of its time.
+
+    Args:
+        vector: Finite vector.
+        other: Another one, of the same length.
+    """
     pairs = zip(np.asarray(vector).tolist(), np.asarray(other).tolist(), strict=True)
     return all(abs(one - two) <= _ABSOLUTE + _RELATIVE * abs(two) for one, two in pairs)
 
@@ -117,21 +122,35 @@ def yaw_ned_to_enu(heading: float) -> float:
 
 
 def body_to_enu(vector: Vector, yaw: float) -> Vector:
-    """Turn a level body-frame (FLU) vector by `yaw` into the ENU frame."""
+    """Turn a level body-frame vector into the ENU frame.
+
+    Args:
+        vector: Vector in the level body frame (FLU).
+        yaw: Yaw of the body, radians.
+    """
     c, s = math.cos(yaw), math.sin(yaw)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])
 
 
 def enu_to_body(vector: Vector, yaw: float) -> Vector:
-    """Turn an ENU vector into the level body frame (FLU) of a vehicle with this `yaw`."""
+    """Turn an ENU vector into the level body frame (FLU).
+
+    Args:
+        vector: ENU vector.
+        yaw: Yaw of the body, radians.
+    """
     return body_to_enu(vector, -yaw)
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
-    """Rotation matrix (3, 3) of a body with intrinsic z-y-x angles, in radians.
+    """Rotation matrix (3, 3) of a body with intrinsic z-y-x angles.
 
-    It takes FLU body vectors to the parent frame. Positive pitch turns the nose down, positive
-    roll lowers the right side, as right-handed rotations about y (left) and x (forward) do.
+    It takes FLU body vectors to the parent frame.
+
+    Args:
+        roll: Radians; positive lowers the right side.
+        pitch: Radians; positive turns the nose down.
+        yaw: Radians about the vertical, right-handed.
     """
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)
@@ -148,10 +167,13 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float
 def angles_of_rotation(
     rotation: NDArray[np.float64], pole: float = 1e-12
 ) -> tuple[float, float, float]:
-    """Roll, pitch and yaw in radians, by which `rotation_from_rpy` gives `rotation` (3, 3).
+    """Roll, pitch and yaw in radians, by which `rotation_from_rpy` gives a rotation.
 
-    Straight up and down roll and yaw are one, and all of it is yaw: where the sine of pitch is
-    within `pole` of one.
+    Straight up and down roll and yaw are one, and all of it is yaw.
+
+    Args:
+        rotation: Rotation matrix, (3, 3).
+        pole: Difference of the sine of pitch from one that counts as straight up or down.
     """
     sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
     pitch = math.asin(sine)
@@ -173,7 +195,13 @@ class GeodeticOrigin:
     altitude: float = 0.0
 
     def to_local(self, latitude: float, longitude: float, altitude: float) -> Vector:
-        """Geodetic degrees and metres to local ENU metres."""
+        """Convert a geodetic place to local ENU metres.
+
+        Args:
+            latitude: Degrees north.
+            longitude: Degrees east.
+            altitude: Metres above the ellipsoid.
+        """
         enu = pymap3d.geodetic2enu(
             latitude, longitude, altitude, self.latitude, self.longitude, self.altitude
         )
@@ -251,7 +279,16 @@ class CameraModel:
         pitch: float = 0.0,
         yaw: float = 0.0,
     ) -> CameraModel:
-        """Square pixels and a centred principal point from a horizontal field of view in rad."""
+        """Camera with square pixels and a centred principal point.
+
+        Args:
+            width: Pixels.
+            height: Pixels.
+            horizontal_fov: Horizontal field of view in radians.
+            mount: Position in the body, FLU metres.
+            pitch: Pitch in the body, radians.
+            yaw: Yaw in the body, radians.
+        """
         focal = width / 2 / math.tan(horizontal_fov / 2)
         return cls(width, height, focal, focal, width / 2, height / 2, mount, pitch, yaw)
 
@@ -263,7 +300,12 @@ class CameraModel:
         return rotation
 
     def ray(self, u: float, v: float) -> Vector:
-        """Unit vector in the body frame (FLU) of the ray through pixel (u, v)."""
+        """Unit vector in the body frame (FLU) of the ray through a pixel.
+
+        Args:
+            u: Pixels from the left.
+            v: Pixels from the top.
+        """
         optical = np.array([(u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0])
         body: Vector = self.body_from_optical @ (optical / np.linalg.norm(optical))
         return body

@@ -18,10 +18,18 @@ Place = tuple[float, float]
 
 
 def free_path(area: BaseGeometry, start: Place, end: Place) -> list[Place] | None:
-    """Corners of the shortest way from `start` to `end` inside `area`, both ends included.
+    """Corners of the shortest way inside an area.
 
-    None where there is no way: an end lies outside, or in another part of the area. For many ways
-    in one area, a `FreeArea` is faster.
+    For many ways in one area, a `FreeArea` is faster.
+
+    Args:
+        area: Free area, metres.
+        start: First end, metres.
+        end: Other end, metres.
+
+    Returns:
+        The corners, both ends included; None where there is no way: an end lies outside, or in
+        another part of the area.
     """
     return FreeArea(area).path(start, end)
 
@@ -37,10 +45,17 @@ class FreeArea:
         self._corners = sorted(set(corners))
 
     def path(self, start: Place, end: Place) -> list[Place] | None:
-        """Corners of the shortest way from `start` to `end`, both included; None without any.
+        """Corners of the shortest way between two places.
 
         The straight line where it is free, otherwise a search (A*) over the visibility graph of the
         area's corners (Lozano-Pérez and Wesley, CACM 22(10), 1979).
+
+        Args:
+            start: First end, metres.
+            end: Other end, metres.
+
+        Returns:
+            The corners, both ends included; None without any way.
         """
         if self._visible(start, [end])[0]:
             return [start, end]
