@@ -34,11 +34,20 @@ class Actuators(Protocol):
     """The actuators of one vehicle; every method returns at once."""
 
     def move(self, actuator: str, position: str) -> int:
-        """Have an actuator take a position; returns a number of this command alone.
+        """Have an actuator take a position.
 
-        `position` is one of the configuration's `positions`; of a parachute `enable` and
-        `disable`, and never its release. The driver repeats what is not acknowledged. Raises
-        VehicleError if it certainly cannot.
+        The driver repeats what is not acknowledged.
+
+        Args:
+            actuator: Id of the actuator.
+            position: One of the configuration's `positions`; of a parachute `enable` and `disable`,
+                and never its release.
+
+        Returns:
+            A number of this command alone.
+
+        Raises:
+            VehicleError: If it certainly cannot.
         """
         ...
 

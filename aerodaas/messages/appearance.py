@@ -91,10 +91,16 @@ _BACKGROUNDS = [_grid(zone.top, zone.bottom, *_BESIDE) for zone in _ZONES]
 
 
 def appearance_in_box(image: NDArray[np.uint8], box: Box, label: str) -> bytes | None:
-    """Describe the person of whom `box` (left, top, right, bottom in pixels) shows `label`.
+    """Describe the person in a box.
 
-    `image` is height x width x 3, BGR. None for labels of other things, if the picture's edge
-    cuts the box, for who lies, and if fewer than two zones can be told.
+    Args:
+        image: Picture, height x width x 3, BGR.
+        box: Left, top, right, bottom in pixels.
+        label: What the box shows.
+
+    Returns:
+        The appearance; None for labels of other things, if the picture's edge cuts the box, for who
+        lies, and if fewer than two zones can be told.
     """
     if label not in _CHEST or not all(map(np.isfinite, box)):
         return None
@@ -127,9 +133,14 @@ def appearance_in_box(image: NDArray[np.uint8], box: Box, label: str) -> bytes |
 
 
 def unlikeness(some: Sequence[bytes], others: Sequence[bytes]) -> float | None:
-    """Difference between appearances of two people, 0 to 20, in parts of 255.
+    """Difference between appearances of two people, in parts of 255.
 
-    The median over all pairs; None if no pair can be compared.
+    Args:
+        some: Appearances of the first.
+        others: Appearances of the second.
+
+    Returns:
+        The median over all pairs, 0 to 20; None if no pair can be compared.
     """
     if not (some and others):
         return None

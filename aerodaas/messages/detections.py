@@ -83,9 +83,13 @@ class Detections(Sequence[Detection]):
 
     @classmethod
     def of(cls, frame: Frame, items: Iterable[Detection]) -> Detections:
-        """Gather `items` found in `frame`, ordered by score, with the appearance of people.
+        """Gather detections, ordered by score, with the appearance of people.
 
         Each has its depth, where that is measured.
+
+        Args:
+            frame: Frame in which they are found.
+            items: The detections.
         """
         ordered = tuple(
             replace(one, appearance=appearance_in_box(frame.image, one.box, one.label))

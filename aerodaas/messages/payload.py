@@ -256,14 +256,24 @@ class VideoCamera(PhotoCamera, Protocol):
 
 
 def zoomed(camera: CameraModel, factor: float) -> CameraModel:
-    """`camera` with a lens of `factor` times its focal length."""
+    """A camera with a zoomed lens.
+
+    Args:
+        camera: The camera, not zoomed.
+        factor: Ratio of its new focal length to the former.
+    """
     return replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
 
 
 def levelled(camera: CameraModel, attitude: GimbalAttitude, vehicle: Odometry) -> CameraModel:
-    """`camera` as the gimbal holds it while the vehicle is at `vehicle`'s attitude.
+    """A camera as the gimbal holds it.
 
     The gimbal turns about the camera's own centre, so that its place in the body stays.
+
+    Args:
+        camera: The camera on the vehicle.
+        attitude: Attitude of the gimbal, radians.
+        vehicle: Odometry of the vehicle, with its attitude.
     """
     look = rotation_from_rpy(attitude.roll, -attitude.pitch, vehicle.yaw + attitude.yaw)
     body = rotation_from_rpy(vehicle.roll, vehicle.pitch, vehicle.yaw)

@@ -137,7 +137,16 @@ def message_of_text(
     *,
     unknown_fields: Literal["forbid", "ignore"] = "forbid",
 ) -> T:
-    """Read a message from its JSON text; arguments and errors are those of `message_of`."""
+    """Read a message from its JSON text, as `message_of` reads its value.
+
+    Args:
+        kind: Class of the message.
+        text: The JSON text; it may be a stranger's.
+        unknown_fields: Whether a field that the class does not have is refused or left out.
+
+    Raises:
+        MessageError: If it is malformed, with the field's name.
+    """
     try:
         return _adapter(kind).validate_json(text, strict=True, extra=unknown_fields)
     except ValidationError as error:

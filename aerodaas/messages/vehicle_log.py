@@ -54,8 +54,17 @@ class LoggingVehicle(Vehicle, Protocol):
     def fetch_log(
         self, log: LogEntry, folder: Path, progress: Callable[[int, int], None] = ...
     ) -> Path:
-        """Fetch one into a new file of `folder`; raises VehicleError.
+        """Fetch a log into a new file.
 
-        `progress` is called with the bytes fetched and those of all.
+        Args:
+            log: The log, one of `logs`.
+            folder: Folder of the file.
+            progress: Called with the bytes fetched and those of all.
+
+        Returns:
+            Path of the file.
+
+        Raises:
+            VehicleError: If it cannot be fetched.
         """
         ...

@@ -301,9 +301,14 @@ class Waypoint:
     ) -> Waypoint:
         """Convert the waypoint to the local ENU frame of the environment.
 
-        `takeoff` is where this robot took off, ENU metres; `datum` is for heights above sea and
-        ground. Raises InvalidWaypointError if a global waypoint meets an environment without a
-        geodetic home, or one above sea or ground meets one whose own height is not known.
+        Args:
+            takeoff: Where this robot took off, ENU metres.
+            origin: Geodetic home of the environment; None if it has none.
+            datum: Heights of home and ground above the sea.
+
+        Raises:
+            InvalidWaypointError: For a global waypoint without `origin`, and for one above sea or
+                ground where home's own height is not known.
         """
         if self.look_at is not None:
             x, y, z = self.look_at
