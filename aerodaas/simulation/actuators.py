@@ -43,7 +43,15 @@ class SimulatedActuators:
         return dict(self._positions)
 
     def move(self, actuator: str, position: str) -> int:
-        """Take a position from now on."""
+        """Take a position from now on.
+
+        Args:
+            actuator: Id of the actuator.
+            position: Name of its position.
+
+        Returns:
+            Number of the move.
+        """
         self._asked += 1
         due = self._now + round(_DURATION[self._types[actuator]] * NANOSECONDS)
         self._moves.append(_Move(self._asked, actuator, position, due))

@@ -21,12 +21,17 @@ _SECONDS_PER_HOUR = 3600.0
 
 
 def flight_power(airframe: Airframe, thrust: Triple, airspeed: Triple) -> float:
-    """Electrical power in watts for a `thrust` over mass (ENU m/s^2).
+    """Electrical power in flight, watts.
 
     Momentum theory with Glauert's induced velocity in forward flight (Leishman, "Principles of
     Helicopter Aerodynamics", 2nd ed., sections 2.2 and 2.14): induced power, which falls with
-    speed, plus the useful power of thrust times airspeed, for climb and drag. Rotors do not
-    charge the battery in descent.
+    speed, plus the useful power of thrust times airspeed, for climb and drag. Rotors do not charge
+    the battery in descent.
+
+    Args:
+        airframe: Mass, rotors and avionics of the vehicle.
+        thrust: Thrust over mass, ENU m/s².
+        airspeed: ENU m/s.
     """
     size = math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2)
     if size <= 0.0:
@@ -62,7 +67,12 @@ class FlightBattery:
         return self._cells * cell
 
     def drain(self, power: float, duration: float) -> None:
-        """Draw `power` watts for `duration` seconds."""
+        """Draw power from the battery.
+
+        Args:
+            power: Watts.
+            duration: Seconds.
+        """
         rest = self._open_circuit()
         # The terminal voltage solves U (rest - U) = power * resistance; beyond the greatest
         # possible power the pack delivers that power, at half its rest voltage.

@@ -152,7 +152,12 @@ class Multirotor:
         return v[0] - w[0], v[1] - w[1], v[2] - w[2]
 
     def step(self, demand: Triple | None, yaw_rate: float) -> None:
-        """Advance by one step with a velocity `demand` (ENU m/s), or None with the motors off."""
+        """Advance by one step.
+
+        Args:
+            demand: Velocity, ENU m/s; None with the motors off.
+            yaw_rate: rad/s.
+        """
         self._wind.step()
         if demand is None:
             if self.on_ground:
@@ -303,10 +308,14 @@ _YAW_GAIN = 1.8
 
 
 def approach_speed(distance: float, max_acceleration: float) -> float:
-    """Highest speed in m/s from which the vehicle can stop within `distance` metres.
+    """Highest speed from which the vehicle can stop within `distance`, m/s.
 
     Proportional close to the target, a square root farther away, joined smoothly: ArduPilot's
     `sqrt_controller`.
+
+    Args:
+        distance: Metres.
+        max_acceleration: Of the vehicle, m/s².
     """
     braking = _BRAKING_SHARE * max_acceleration
     linear = braking / _POSITION_GAIN**2
@@ -316,7 +325,12 @@ def approach_speed(distance: float, max_acceleration: float) -> float:
 
 
 def braking_distance(speed: float, max_acceleration: float) -> float:
-    """Metres within which the vehicle stops from `speed` m/s; the inverse of `approach_speed`."""
+    """Distance within which the vehicle stops, metres; the inverse of `approach_speed`.
+
+    Args:
+        speed: m/s.
+        max_acceleration: Of the vehicle, m/s².
+    """
     braking = _BRAKING_SHARE * max_acceleration
     linear = braking / _POSITION_GAIN**2
     if speed <= _POSITION_GAIN * linear:
@@ -333,10 +347,15 @@ def velocity_towards(
     max_acceleration: float,
     passing_speed: float = 0.0,
 ) -> Triple:
-    """Velocity (ENU m/s) that leads from `position` straight to `target`.
+    """Velocity that leads from `position` straight to `target`, ENU m/s.
 
-    It stops there, or passes it at `passing_speed` m/s. `speed` bounds it horizontally and `climb`
-    vertically.
+    Args:
+        position: Where the vehicle is, ENU metres.
+        target: Where it stops, or what it passes, ENU metres.
+        speed: Bound of the horizontal speed, m/s.
+        climb: Bound of the vertical speed, m/s.
+        max_acceleration: Of the vehicle, m/s².
+        passing_speed: Speed at which the target is passed, m/s; 0 stops there.
     """
     x, y, z = target[0] - position[0], target[1] - position[1], target[2] - position[2]
     across = math.hypot(x, y)
@@ -353,5 +372,10 @@ def velocity_towards(
 
 
 def yaw_rate_towards(yaw: float, target: float) -> float:
-    """Yaw rate in rad/s that turns from `yaw` to `target` by the smaller angle."""
+    """Yaw rate that turns from `yaw` to `target` by the smaller angle, rad/s.
+
+    Args:
+        yaw: Radians.
+        target: Radians.
+    """
     return _YAW_GAIN * math.remainder(target - yaw, math.tau)

@@ -24,10 +24,19 @@ _BEGAN = datetime(2025, 1, 1, 9, tzinfo=timezone.utc)
 
 
 def write_log(path: Path, world: World, person: str, origin: GeodeticOrigin, end: float) -> None:
-    """Write one CSV row per second until `end` seconds of mission time, in a logger's format.
+    """Write one CSV row per second, in a logger's format.
 
-    Errors are a first-order Gauss-Markov process, drawn from the world's seed. Raises KeyError if
-    the world has no `person` of that name.
+    Errors are a first-order Gauss-Markov process, drawn from the world's seed.
+
+    Args:
+        path: File to write.
+        world: The world that the person walks in.
+        person: Id of the person.
+        origin: Geodetic origin of the world.
+        end: Last second of mission time.
+
+    Raises:
+        KeyError: The world has no person of that name.
     """
     draw, thing = random.Random(f"{world.seed}/phone"), world.thing(person)
     east, north = (draw.gauss(0, _SIGMA) for _ in range(2))

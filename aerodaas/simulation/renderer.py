@@ -127,9 +127,12 @@ class Renderer:
     def render(
         self, time: float, pose: Odometry, into: NDArray[np.uint8] | None = None
     ) -> NDArray[np.uint8]:
-        """Render (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`.
+        """Render a picture (height, width, 3) in BGR from a vehicle.
 
-        Into memory of its own, or `into`, which is returned.
+        Args:
+            time: Mission time, seconds.
+            pose: Of the vehicle, which carries the camera.
+            into: Memory of that shape, which is returned; None for memory of its own.
         """
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
         right, down, ahead = (body @ self._optical).T
@@ -179,7 +182,13 @@ _OVERRIDE = 100
 
 
 def renderer_for(world: World, camera: CameraModel, depth_range: float | None) -> Renderer:
-    """Create the renderer for `camera`, with depth if a range in metres is given."""
+    """Create the renderer for `camera`.
+
+    Args:
+        world: The world to render.
+        camera: Size, lens and mount of the camera.
+        depth_range: Range of depth, metres; None for a camera without depth.
+    """
     if depth_range is None:
         return Renderer(world, camera)
     return DepthRenderer(world, camera, depth_range)

@@ -111,7 +111,12 @@ class SensorNoise:
         )
 
     def gps(self, motion: KinematicState, origin: GeodeticOrigin) -> GpsFix:
-        """GPS fix with noise for a true `motion`."""
+        """GPS fix with noise.
+
+        Args:
+            motion: The true motion.
+            origin: Geodetic origin of the local frame.
+        """
         levels = self._levels
         latitude, longitude, altitude = origin.to_geodetic(np.array(motion.position) + self._gps)
         return GpsFix(
@@ -165,7 +170,13 @@ class Surface:
         self._still = [top for thing in still for top in _tops(thing, 0.0)]
 
     def heights(self, east: Floats, north: Floats, time: float) -> Floats:
-        """Heights at places of shape (N,) at mission second `time`; NaN where it is not known."""
+        """Heights of what is seen from above, metres; NaN where the ground is not known.
+
+        Args:
+            east: Metres in the local frame, (N,).
+            north: Metres in the local frame, (N,).
+            time: Mission time, seconds.
+        """
         tops = np.full(len(east), self._level)
         moving = (top for thing in self._moving for top in _tops(thing, time))
         for top in (*self._still, *moving):
@@ -193,10 +204,16 @@ class SimulatedRangefinder:
         self._seed = seed
 
     def below(self, motion: KinematicState, stamp: int) -> float | None:
-        """Metres straight down to whatever is there at mission time `stamp` in ns.
+        """Metres straight down to whatever is there.
 
-        None where nothing is within range, and from a tilt of 45 degrees on. Nearer than it can
-        measure is as near as it can.
+        Nearer than it can measure is as near as it can.
+
+        Args:
+            motion: The true motion.
+            stamp: Mission clock, nanoseconds.
+
+        Returns:
+            None where nothing is within range, and from a tilt of 45 degrees on.
         """
         down = -rotation_from_rpy(motion.roll, motion.pitch, motion.yaw)[:, 2]
         upright = -float(down[2])

@@ -117,7 +117,12 @@ class Posture:
 
 
 def joints(height: float, posture: Posture) -> NDArray[np.float64]:
-    """Positions (len(JOINTS), 3) of the joints of a person of `height` metres."""
+    """Positions of a person's joints, metres, (len(JOINTS), 3).
+
+    Args:
+        height: Height of the person, metres.
+        posture: Gait, gesture and fall at this time.
+    """
     phase = math.tau * posture.travelled / _STRIDE
     stepping = posture.stepping * (1.0 - posture.fallen)
     neck = (0.03 * stepping, 0.0, _TORSO)

@@ -62,7 +62,12 @@ class Box:
         return np.asarray(local @ turn + np.array(self.centre))
 
     def contains(self, point: tuple[float, float, float], margin: float = 0.0) -> bool:
-        """Whether an ENU point lies within the box, widened by `margin` metres."""
+        """Whether a point lies within the widened box.
+
+        Args:
+            point: ENU metres.
+            margin: By how much the box is wider on each side, metres.
+        """
         x, y, z = (here - there for here, there in zip(point, self.centre, strict=True))
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         own = (c * x + s * y, c * y - s * x, z)

@@ -44,7 +44,14 @@ _PLASTERS = ((1.0, 0.97, 0.90), (0.98, 0.90, 0.74), (0.86, 0.90, 0.92), (0.95, 0
 
 
 def add_building(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach a building with its roof, windows and a door."""
+    """Attach a building with its roof, windows and a door.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     spec = thing.spec
     if not isinstance(spec, Building):
         raise TypeError(f"{thing.id} is no building")
@@ -176,7 +183,14 @@ def _framed(opening: _Opening, wall: float, turn: float) -> list[Mesh]:
 
 
 def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mesh:
-    """A bar from one point to another."""
+    """A bar from one point to another.
+
+    Args:
+        start: Centre of one end, metres.
+        end: Centre of the other end, metres.
+        radius: Metres.
+        sides: Sides of the bar around its length.
+    """
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     length = float(np.linalg.norm(b - a))
     up = (b - a) / length
@@ -188,7 +202,14 @@ def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mes
 
 
 def add_fence(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach a fence of posts and two rails."""
+    """Attach a fence of posts and two rails.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     spec = thing.spec
     if not isinstance(spec, Fence):
         raise TypeError(f"{thing.id} is no fence")
@@ -229,7 +250,15 @@ def add_tower(
     light: Light,
     look: TowerLook,
 ) -> None:
-    """Attach a lattice tower, with aerials at its top."""
+    """Attach a lattice tower, with aerials at its top.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+        look: Construction and paint.
+    """
     spec = thing.spec
     if not isinstance(spec, Tower):
         raise TypeError(f"{thing.id} is no tower")

@@ -32,7 +32,14 @@ _FIELD_MARGIN = 0.5
 
 
 def add_ground(parent: NodePath, surface: str, palette: Palette, light: Light) -> None:
-    """Attach the ground out to the horizon."""
+    """Attach the ground out to the horizon.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        surface: Name of its texture.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     texture = palette[surface]
     near = _disc(_RADII, _TEXEL[surface]).painted(light_on_ground(light))
     near = near.painted(_patches(near.points)[:, None])
@@ -80,7 +87,14 @@ def _patches(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def add_field(parent: NodePath, spec: CropRows, palette: Palette, light: Light) -> None:
-    """Attach the soil of a field, with rows slightly darker than the furrows between them."""
+    """Attach the soil of a field, with rows slightly darker than the furrows between them.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        spec: Area and rows of the field.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     west, south, east, north = spec.area
     m = _FIELD_MARGIN
     bed = _level_sheet((west - m, south - m, east + m, north + m), _TEXEL["soil"])
@@ -98,7 +112,14 @@ def _level_sheet(area: tuple[float, float, float, float], texel: float) -> Mesh:
 
 
 def add_road(parent: NodePath, spec: Road, palette: Palette, light: Light) -> None:
-    """Attach a road with mitred corners and worn edges."""
+    """Attach a road with mitred corners and worn edges.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        spec: Points, width and surface of the road.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     line = np.array(spec.points)
     steps = np.diff(line, axis=0)
     lengths = np.hypot(*steps.T)
@@ -128,6 +149,12 @@ def add_shadow(parent: NodePath, thing: Thing, palette: Palette, light: Light) -
     """Attach the shadow of an object to `parent`, in its reference frame, level and without yaw.
 
     The parent of a static object is the world itself; a moving object carries its soft shadow.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
     """
     spec = thing.spec
     if isinstance(spec, Building):

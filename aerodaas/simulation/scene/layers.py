@@ -41,7 +41,20 @@ def attach(
     cutout: bool = False,
     both_sides: bool = False,
 ) -> NodePath:
-    """Attach `mesh` with `texture` to `parent`; `cutout` applies the texture's transparency."""
+    """Attach `mesh` with `texture` to `parent`.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        name: Name of the new node.
+        mesh: The form.
+        texture: Its texture.
+        layer: Layer in which it is drawn.
+        cutout: Whether the texture's transparency applies.
+        both_sides: Whether its back is drawn as well.
+
+    Returns:
+        The new node.
+    """
     node = parent.attach_new_node(mesh.node(name))
     node.set_texture(texture)
     node.set_two_sided(both_sides)

@@ -46,7 +46,12 @@ class Light:
 
     @classmethod
     def draw(cls, sky: Sky, seed: int) -> Light:
-        """Draw the values that the scenario leaves open from the seed."""
+        """Draw the values that the scenario leaves open from the seed.
+
+        Args:
+            sky: Values of the scenario, some left open.
+            seed: Seed of the world.
+        """
         random_ = random.Random(f"{seed}/sky")
         azimuth, elevation = random_.uniform(0, 360), random_.uniform(30, 65)
         clouds = random_.uniform(0.15, 0.6)
@@ -76,7 +81,15 @@ class Light:
 
 
 def sky_dome(parent: NodePath, light: Light) -> NodePath:
-    """Attach the sky dome, which the renderer keeps centred on the camera."""
+    """Attach the sky dome, which the renderer keeps centred on the camera.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        light: Sun and sky of the scene.
+
+    Returns:
+        The dome's node.
+    """
     dome = blob(_DOME, rings=19, sides=24, repeat=1.0)
     up = np.clip(dome.points[:, 2] / _DOME, -1.0, 1.0)
     uv = np.stack([dome.uv[:, 0], np.clip(2.0 * np.arcsin(up) / np.pi, 0.004, 0.996)], axis=-1)

@@ -58,7 +58,13 @@ class Mesh:
         return replace(self, colours=self.colours * np.asarray(colour, dtype=np.float64))
 
     def moved(self, offset: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0) -> Mesh:
-        """Copy scaled, then rotated by `yaw` radians about z, then translated."""
+        """Copy scaled, then rotated about z, then translated.
+
+        Args:
+            offset: Metres, (3,).
+            yaw: Radians.
+            scale: Factor, or one for each axis, (3,).
+        """
         c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         factor = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
@@ -110,7 +116,12 @@ def merged(meshes: Iterable[Mesh]) -> Mesh:
 
 
 def sheet(corners: ArrayLike, uv: ArrayLike = ((0, 0), (1, 0), (1, 1), (0, 1))) -> Mesh:
-    """A flat quadrangle through four corners, counter-clockwise seen from its front."""
+    """A flat quadrangle.
+
+    Args:
+        corners: Four corners, counter-clockwise seen from its front, metres, (4, 3).
+        uv: Texture coordinates of the corners, (4, 2).
+    """
     points = np.asarray(corners, dtype=np.float64)
     normal = np.cross(points[1] - points[0], points[3] - points[0])
     normal = normal / np.linalg.norm(normal)
@@ -124,7 +135,13 @@ def sheet(corners: ArrayLike, uv: ArrayLike = ((0, 0), (1, 0), (1, 1), (0, 1))) 
 
 
 def box(size: ArrayLike, *, texel: float = 1.0, bottom: bool = False) -> Mesh:
-    """A box standing centred on the origin; its texture repeats every `texel` metres."""
+    """A box standing centred on the origin.
+
+    Args:
+        size: Length, width and height, metres.
+        texel: Distance after which its texture repeats, metres.
+        bottom: Whether it has a face below.
+    """
     x, y, z = (float(extent) for extent in np.asarray(size, dtype=np.float64))
     hx, hy = x / 2, y / 2
     sides = [
@@ -148,9 +165,15 @@ def box(size: ArrayLike, *, texel: float = 1.0, bottom: bool = False) -> Mesh:
 
 
 def tube(radii: ArrayLike, heights: ArrayLike, *, sides: int = 8, flatten: float = 1.0) -> Mesh:
-    """A solid of revolution about z with `radii` at `heights`; `flatten` scales it along x.
+    """A solid of revolution about z.
 
     Texture coordinate u runs once around from the back, v from the bottom to the top.
+
+    Args:
+        radii: Radii, metres, (N,).
+        heights: Heights of the radii, metres, (N,).
+        sides: Sides around its axis.
+        flatten: Scale along x.
     """
     ring = np.asarray(radii, dtype=np.float64)
     level = np.asarray(heights, dtype=np.float64)
@@ -174,7 +197,14 @@ def tube(radii: ArrayLike, heights: ArrayLike, *, sides: int = 8, flatten: float
 
 
 def blob(radius: float, *, rings: int = 6, sides: int = 8, repeat: float = 2.0) -> Mesh:
-    """A sphere around the origin; its texture repeats `repeat` times around."""
+    """A sphere around the origin.
+
+    Args:
+        radius: Metres.
+        rings: Circles of latitude, poles included.
+        sides: Sides around its axis.
+        repeat: How often its texture repeats around.
+    """
     polar = np.linspace(-np.pi / 2, np.pi / 2, rings)
     angles = np.linspace(-np.pi, np.pi, sides + 1)
     latitude, longitude = np.meshgrid(polar, angles, indexing="ij")

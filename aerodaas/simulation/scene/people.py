@@ -93,7 +93,12 @@ class Outfit:
 
     @classmethod
     def draw(cls, spec: Person, rng: np.random.Generator) -> Outfit:
-        """Draw the outfit of a person of a scenario."""
+        """Draw the outfit of a person of a scenario.
+
+        Args:
+            spec: The person, whose vest may be given.
+            rng: Source of randomness.
+        """
         skin, hair = _choose(rng, _SKINS), _choose(rng, _HAIRS)
         shirt, trousers = _choose(rng, _SHIRTS), _choose(rng, _TROUSERS)
         vest = spec.vest if spec.vest != "any" else str(rng.choice(sorted(_VESTS)))
@@ -148,7 +153,12 @@ class PersonFigure:
         return node
 
     def pose(self, joints: NDArray[np.float64], yaw: float) -> None:
-        """Place the limbs between `joints` (len(JOINTS), 3), ENU metres."""
+        """Place the limbs between `joints`.
+
+        Args:
+            joints: ENU metres, (len(JOINTS), 3).
+            yaw: Where the person faces, radians counter-clockwise from east.
+        """
         starts, ends = np.array(self._bones).T
         along = joints[ends] - joints[starts]
         # The front of a limb pointing straight ahead is undefined, so the reference is tilted.

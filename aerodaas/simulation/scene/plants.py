@@ -35,7 +35,14 @@ def rng_of(thing: Thing) -> np.random.Generator:
 
 
 def add_tree(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach a broad-leaved tree: a trunk, and a crown of clumps of leaves."""
+    """Attach a broad-leaved tree: a trunk, and a crown of clumps of leaves.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     rng, height = rng_of(thing), thing.height
     radius, middle = CROWN_SHARE * height, 0.62 * height
     girth = 0.035 * height
@@ -90,7 +97,14 @@ def _ball(clump: _Clump, rings: int, sides: int) -> Mesh:
 
 
 def add_crops(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach the plants of a field, one node per row."""
+    """Attach the plants of a field, one node per row.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     spec = thing.spec
     if not isinstance(spec, CropRows):
         raise TypeError(f"{thing.id} is no field")

@@ -30,7 +30,14 @@ _STUFFS = (("brick", 0.5), ("plaster", 0.3), ("wood", 0.2))
 
 
 def add_rubble(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach scattered slabs and blocks, more and higher towards the middle."""
+    """Attach scattered slabs and blocks, more and higher towards the middle.
+
+    Args:
+        parent: Node of the scene to which it is attached.
+        thing: The object, with its specification, place and seed.
+        palette: Textures by name.
+        light: Sun and sky of the scene.
+    """
     spec = thing.spec
     if not isinstance(spec, Rubble):
         raise TypeError(f"{thing.id} is no rubble")

@@ -104,7 +104,12 @@ class Scene:
             self._people.append((thing, figure, feet))
 
     def update(self, time: float, eye: tuple[float, float, float]) -> None:
-        """Update the scene to `time` seconds, seen from `eye` (ENU metres)."""
+        """Update the scene to a moment.
+
+        Args:
+            time: Mission time, seconds.
+            eye: Place of the camera, ENU metres.
+        """
         self._sky.set_pos(*eye)
         for thing, figure, feet in self._people:
             state = thing.state(time)

@@ -20,8 +20,12 @@ _SIZE = 256
 def noise(size: int, roughness: float, seed: int, stretch: float = 1.0) -> Floats:
     """Noise (size, size) that repeats seamlessly, with mean 0 and standard deviation 1.
 
-    Its amplitude falls with spatial frequency to the power of `roughness`: 0 is white, 1 is
-    cloudy, 2 is smooth. `stretch` > 1 elongates it along the rows' direction.
+    Args:
+        size: Pixels along each side.
+        roughness: Power of spatial frequency with which its amplitude falls: 0 is white, 1 is
+            cloudy, 2 is smooth.
+        seed: Seed of the noise.
+        stretch: More than 1 elongates it along the rows' direction.
     """
     white = np.fft.rfft2(np.random.default_rng(seed).standard_normal((size, size)))
     fy = np.fft.fftfreq(size)[:, None]
@@ -38,7 +42,13 @@ def _blend(low: ArrayLike, high: ArrayLike, share: Floats) -> Floats:
 
 
 def texture_of(name: str, colours: Floats, alpha: Floats | None = None) -> Texture:
-    """Texture of colours (h, w, 3) in RGB and alpha (h, w), both 0 to 1; row 0 is the bottom."""
+    """Texture of colours and alpha; row 0 is the bottom.
+
+    Args:
+        name: Name of the texture.
+        colours: RGB, 0 to 1, (h, w, 3).
+        alpha: 0 to 1, (h, w); None for an opaque texture.
+    """
     height, width = colours.shape[:2]
     channels = [colours[..., ::-1]] if alpha is None else [colours[..., ::-1], alpha[..., None]]
     pixels = np.clip(np.concatenate(channels, axis=-1) * 255.0, 0, 255).astype(np.uint8)
@@ -82,7 +92,12 @@ class VestCut:
 
 
 def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
-    """A hazard vest around a torso over a shirt: silver bands, a zip, gaps at the sides."""
+    """A hazard vest around a torso over a shirt: silver bands, a zip, gaps at the sides.
+
+    Args:
+        cut: Colours, bands and gaps of the vest.
+        shirt: Colour of the shirt, RGB, 0 to 1.
+    """
     size = 64
     u, v = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size)
     cloth = np.asarray(cut.colour) * (1.0 + 0.05 * noise(size, 1.0, 7))[..., None]
