@@ -132,7 +132,15 @@ class VehicleAddressedCamera(Camera, Protocol):
 
 
 def own_memory(height: int, width: int) -> NDArray[np.uint8]:
-    """Memory for a picture that nobody else reads where it is: a `PictureMemory`."""
+    """Memory for a picture that nobody else reads where it is: a `PictureMemory`.
+
+    Args:
+        height: Pixels.
+        width: Pixels.
+
+    Returns:
+        Array, height x width x 3.
+    """
     return np.empty((height, width, 3), np.uint8)
 
 

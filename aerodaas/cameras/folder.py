@@ -96,7 +96,15 @@ class FolderCamera:
         self._model = camera_model(self._settings, first.shape[1], first.shape[0])
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the image due at `stamp`; None if it was returned already or is broken."""
+        """Return the image that is due.
+
+        Args:
+            stamp: Mission time, nanoseconds.
+            pose: Ignored.
+
+        Returns:
+            The image; None if it was returned already or is broken.
+        """
         del pose
         if self._start is None:
             self._start = stamp

@@ -64,7 +64,15 @@ class FrameAssembler:
         """Number of packets outside a frame: from before the first start code, or invalid."""
 
     def add_packet(self, packet: bytes, now: int) -> list[WholeFrame]:
-        """Add a packet received at `now` (host nanoseconds); returns the frames it completes."""
+        """Add a packet.
+
+        Args:
+            packet: Its content, a part of a frame's byte stream.
+            now: Host time at which it was received, nanoseconds.
+
+        Returns:
+            The frames that it completes.
+        """
         done: list[WholeFrame] = []
         starts = packet.startswith(_START_CODE)
         if starts and self._has_slice:

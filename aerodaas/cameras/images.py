@@ -67,10 +67,17 @@ _LAYOUTS = {
 
 
 def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - by schema
-    """Decode a message of one of `IMAGE_SCHEMAS` to height x width x 3 of BGR.
+    """Decode a message with an image.
 
-    Returns None for an image that is broken or larger than `MAX_PIXELS`; raises SourceError for
-    an unknown pixel format.
+    Args:
+        schema: Name of its schema, one of `IMAGE_SCHEMAS`.
+        value: The message: JSON, protobuf or ROS 2.
+
+    Returns:
+        Height x width x 3 of BGR, or None for an image that is broken or larger than `MAX_PIXELS`.
+
+    Raises:
+        SourceError: For an unknown pixel format.
     """
     encoded = picture_bytes(value)
     data = np.frombuffer(encoded, np.uint8)
@@ -95,7 +102,16 @@ def decode_depth(value: Any) -> NDArray[np.uint16] | None:  # noqa: ANN401 - by 
 
 
 def check_picture(value: Any, *, video: bool) -> None:  # noqa: ANN401 - by schema
-    """Raise TypeError or ValueError unless a message has the fields of a picture."""
+    """Require that a message has the fields of a picture.
+
+    Args:
+        value: The message: JSON, protobuf or ROS 2.
+        video: Whether it is a frame of a video, which has no `encoding`.
+
+    Raises:
+        TypeError: For a field of another type.
+        ValueError: For a field of another value.
+    """
     data = picture_field(value, "data")
     if isinstance(data, str):
         base64.b64decode(data, validate=True)
@@ -156,7 +172,13 @@ def picture_bytes(value: Any) -> bytes:  # noqa: ANN401
 
 
 def picture_field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
-    """A field of a JSON, protobuf or ROS 2 message; `default` if it is missing."""
+    """A field of a message.
+
+    Args:
+        value: The message: JSON, protobuf or ROS 2.
+        name: Name of the field.
+        default: Value where it is missing.
+    """
     if isinstance(value, dict):
         return value.get(name, default)
     return getattr(value, name, default)

@@ -32,7 +32,12 @@ _BARE = frozenset({0x01, *range(0xD0, 0xD8)})
 
 
 def picture_fits(width: int, height: int) -> bool:
-    """Whether a picture of this size, in pixels, may be decoded."""
+    """Whether a picture of this size may be decoded.
+
+    Args:
+        width: Pixels.
+        height: Pixels.
+    """
     return 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
 
 

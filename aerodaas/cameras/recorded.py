@@ -14,7 +14,15 @@ __all__ = ["recorded_camera"]
 
 
 def recorded_camera(sensor: SensorConfig, environment: EnvironmentConfig) -> Camera:
-    """Create the camera for the setting `path`; raises ConfigError for invalid settings."""
+    """Create the camera for the setting `path`.
+
+    Args:
+        sensor: The sensor, with its settings.
+        environment: Its environment.
+
+    Raises:
+        ConfigError: For invalid settings.
+    """
     path = camera_settings(sensor).path
     is_folder = path is None or Path(path.get_secret_value()).is_dir()
     kind = FolderCamera if is_folder else VideoCamera

@@ -18,7 +18,16 @@ def camera_settings(sensor: SensorConfig) -> CameraConfig:
 
 
 def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
-    """Return the path among the settings; raises ConfigError if it is missing."""
+    """Return the path among the settings of a camera.
+
+    Args:
+        sensor: The sensor, for the error.
+        settings: Its settings.
+        what: What the path is of, for the error.
+
+    Raises:
+        ConfigError: If it is missing.
+    """
     path = "" if settings.path is None else settings.path.get_secret_value()
     if not path:
         message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
@@ -27,7 +36,13 @@ def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> st
 
 
 def camera_model(settings: CameraConfig, width: int, height: int) -> CameraModel:
-    """Make the pinhole model of images of `width` x `height` pixels, with the mount's pose."""
+    """Make the pinhole model of a camera's images, with the mount's pose.
+
+    Args:
+        settings: Settings of the camera; its angles are in degrees.
+        width: Pixels.
+        height: Pixels.
+    """
     return CameraModel.from_fov(
         width,
         height,

@@ -86,9 +86,17 @@ class SimulatedCamera:
         self._zoom = 1.0 + (self._most_zoom - 1.0) * (percent or 0.0) / 100.0
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Render at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
+        """Render a picture.
 
-        Raises SourceError if the camera is not open.
+        Args:
+            stamp: Mission time, nanoseconds.
+            pose: True pose of the vehicle.
+
+        Returns:
+            The picture, or None while the pose is unknown.
+
+        Raises:
+            SourceError: If the camera is not open.
         """
         if self._renderer is None:
             raise SourceError(f"{self._name} is not open; call open first")

@@ -73,7 +73,15 @@ class VideoCamera:
             self._source.follow(address)
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest frame at mission time `stamp`; None if there is no new one."""
+        """Return the newest frame.
+
+        Args:
+            stamp: Mission time, nanoseconds.
+            pose: Ignored.
+
+        Returns:
+            The frame, or None if there is no new one.
+        """
         del pose
         found = self._source.newest(stamp)
         if found is None:
