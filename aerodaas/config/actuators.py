@@ -104,10 +104,15 @@ ACTUATOR_TYPES = frozenset({"gripper", "relay", "servo", "parachute"})
 def permitted(
     robot: str, actuators: Sequence[ActuatorConfig], names: Collection[str]
 ) -> list[ActuatorConfig]:
-    """The actuators of `robot` that somebody else may move: by `robot/actuator`, and no parachute.
+    """The actuators of a robot that somebody else may move; never a parachute.
 
     >>> permitted("drone", [RelayConfig(id="pump", type="relay")], ["drone/pump"])[0].id
     'pump'
+
+    Args:
+        robot: Id of the robot.
+        actuators: Its actuators.
+        names: Those that are permitted, as `robot/actuator`.
     """
     return [
         one
@@ -139,7 +144,12 @@ def actuator_objection(
 
 
 def parachute_objection(actuators: Sequence[ActuatorConfig], name: str) -> str:
-    """Why the parachute `name` is not fired; empty if it is permitted."""
+    """Why a parachute is not fired; empty if it is permitted.
+
+    Args:
+        actuators: Those of the robot.
+        name: Id of the parachute.
+    """
     chutes = {one.id: one for one in actuators if isinstance(one, ParachuteConfig)}
     if name not in chutes:
         return f"no parachute is called {name!r}{near(name, chutes)}"

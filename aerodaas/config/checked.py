@@ -41,9 +41,13 @@ __all__ = [
 
 
 def is_subclass(annotation: Any, *parents: type) -> bool:  # noqa: ANN401 - any annotation
-    """Whether an annotation is a class below one of `parents`.
+    """Whether an annotation is a class below one of some classes.
 
     On Python 3.10 `list[int]` claims to be a class, and `issubclass` raises TypeError for it.
+
+    Args:
+        annotation: Any annotation.
+        *parents: The classes.
     """
     plain = isinstance(annotation, type) and typing.get_origin(annotation) is None
     return plain and issubclass(annotation, parents)
@@ -100,7 +104,17 @@ _WORD = re.compile(r"[\w .\-]{0,40}")
 
 
 def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
-    """Make a `model` of `content`; raises ConfigError that names `place`, setting and remedy."""
+    """Make a model of some content.
+
+    Args:
+        model: Class of the model.
+        content: Plain data, such as a file's.
+        place: Where it stands, for the error.
+        hint: Text put behind the error.
+
+    Raises:
+        ConfigError: Names `place`, setting and remedy.
+    """
     try:
         return model.model_validate(content)
     except ValidationError as error:
@@ -108,7 +122,13 @@ def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
 
 
 def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
-    """The errors, setting by setting, each with its value and the allowed ones; no secrets."""
+    """The errors, setting by setting, each with its value and the allowed ones; no secrets.
+
+    Args:
+        error: Error of the validation.
+        model: Class that was validated.
+        content: Content that was validated; its secrets are left out of the text.
+    """
     problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
     text = "; ".join(_problem(one, model, content) for one in problems)
     # A validator's own words may quote what it was given.
@@ -116,7 +136,12 @@ def explained(error: ValidationError, model: type[BaseModel], content: object) -
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """Suggestion of similar names for `name`, to put behind an error."""
+    """Suggestion of a similar name, to put behind an error.
+
+    Args:
+        name: Unknown name.
+        known: Names that there are.
+    """
     choices = sorted(known)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
     meant = f"; did you mean {close[0]}?" if close else ""

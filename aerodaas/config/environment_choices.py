@@ -57,10 +57,15 @@ class EnvironmentChoices:
     compute: Sequence[dict[str, str]] = field(default=({"id": "edge", "kind": "edge"},))
 
     def document(self, schema: str, folder: Path) -> dict[str, Any]:
-        """The content of an environment file in `folder`, whose `$schema` is `schema`.
+        """The content of an environment file.
 
-        Raises UnknownIdError for an unknown vehicle, ConfigError for an address or a camera that
-        it cannot have.
+        Args:
+            schema: Its `$schema`.
+            folder: Folder of the file.
+
+        Raises:
+            UnknownIdError: For an unknown vehicle.
+            ConfigError: For an address or a camera that it cannot have.
         """
         if self.vehicle not in VEHICLES:
             raise UnknownIdError("vehicle", self.vehicle, list(VEHICLES))

@@ -59,5 +59,10 @@ def is_locked(path: Path) -> bool:
 
 
 def actor_lock(folder: Path, robot: str) -> Path:
-    """The lock file of the actor that flies `robot`, among a provider's locks in `folder`."""
+    """The lock file of the actor that flies a robot.
+
+    Args:
+        folder: Folder of a provider's locks.
+        robot: Id of the robot.
+    """
     return folder / f"{robot}.actor"

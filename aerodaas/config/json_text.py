@@ -28,15 +28,29 @@ class _OddityError(Exception):
 
 
 def read_json(path: str | Path, what: str) -> Any:  # noqa: ANN401 - any JSON
-    """Read a JSON file; raises ConfigError that names file, place and remedy.
+    """Read a JSON file.
 
-    `what` names the kind of file: `the environment file`.
+    Args:
+        path: The file.
+        what: Kind of file, for the error, such as `the environment file`.
+
+    Raises:
+        ConfigError: Names file, place and remedy.
     """
     return parse_json(read_text(path, what, "JSON"), str(path))
 
 
 def read_text(path: str | Path, what: str, encoded: str = "a text") -> str:
-    """Read a file of at most 4 MiB of UTF-8; raises ConfigError, in which it is no `encoded`."""
+    """Read a file of at most 4 MiB of UTF-8.
+
+    Args:
+        path: The file.
+        what: Kind of file, for the error, such as `the environment file`.
+        encoded: What the content is, for the error, such as `JSON`.
+
+    Raises:
+        ConfigError: If it cannot be read, is larger, or is not UTF-8.
+    """
     try:
         with Path(path).open("rb") as file:
             content = file.read(_MOST_BYTES + 1)

@@ -286,11 +286,27 @@ class EnvironmentConfig(Strict):
 
 
 def validated(content: object, place: str) -> EnvironmentConfig:
-    """Check the content of an environment file; raises ConfigError that names `place`."""
+    """Check the content of an environment file.
+
+    Args:
+        content: Plain data.
+        place: Where it stands, for the error.
+
+    Raises:
+        ConfigError: Names `place`.
+    """
     check_plain(content, place)
     return checked(EnvironmentConfig, content, place, " (see `aerodaas schema`)")
 
 
 def as_runtime_env(content: object, place: str) -> RuntimeEnvConfig:
-    """Check what an application says of a runtime_env; raises ConfigError that names `place`."""
+    """Check what an application says of a runtime_env.
+
+    Args:
+        content: Plain data.
+        place: Where it stands, for the error.
+
+    Raises:
+        ConfigError: Names `place`.
+    """
     return checked(RuntimeEnvConfig, content, f"{place}: runtime_env")

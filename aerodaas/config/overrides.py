@@ -33,12 +33,20 @@ def parse_setting(text: str) -> tuple[str, Any]:
 
 
 def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> EnvironmentConfig:
-    """Return `config` with `settings` laid over it.
+    """Return an environment with settings laid over it.
 
-    The part before the first dot is the id of a robot, a sensor (or `robot/sensor`) or a compute
-    resource, or a section of the file such as `simulation`. Parts with ambiguous ids are named
-    `robots/…`, `sensors/…` or `compute/…`. Raises ConfigError for an unknown setting,
-    UnknownIdError for an unknown id and AmbiguousIdError for one that fits several.
+    The part of a name before the first dot is the id of a robot, a sensor (or `robot/sensor`) or a
+    compute resource, or a section of the file such as `simulation`. Parts with ambiguous ids are
+    named `robots/…`, `sensors/…` or `compute/…`.
+
+    Args:
+        config: The environment.
+        settings: Values by dotted name.
+
+    Raises:
+        ConfigError: For an unknown setting.
+        UnknownIdError: For an unknown id.
+        AmbiguousIdError: For an id that fits several.
     """
     if not settings:
         return config
@@ -50,10 +58,13 @@ def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> Enviro
 
 
 def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
-    """Return `config` with the relative paths in its settings made absolute.
+    """Return an environment with the relative paths in its settings made absolute.
 
-    Paths are relative to `folder`, or else to the working directory; a path to no file stays as it
-    is. Actors have other working directories than the application.
+    Actors have other working directories than the application. A path to no file stays as it is.
+
+    Args:
+        config: The environment.
+        folder: Folder that paths are relative to, or else the working directory.
     """
     content = config.model_dump(by_alias=True)
     places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]

@@ -111,19 +111,38 @@ def plugin_names(kind: PluginKind) -> list[str]:
 
 
 def require_plugin(kind: PluginKind, name: str) -> None:
-    """Raise UnknownIdError if no plug-in is called `name`; imports nothing."""
+    """Require that there is a plug-in of some name; imports nothing.
+
+    Args:
+        kind: Kind of plug-in.
+        name: Its name.
+
+    Raises:
+        UnknownIdError: If there is none.
+    """
     _target(kind, name)
 
 
 def is_built_in(kind: PluginKind, name: str) -> bool:
-    """Whether `name` is one of the project's own plug-ins."""
+    """Whether a plug-in is one of the project's own.
+
+    Args:
+        kind: Kind of plug-in.
+        name: Its name.
+    """
     return name in _BUILT_IN[kind]
 
 
 def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class of the caller's kind
-    """Import the class called `name`.
+    """Import the class of a plug-in.
 
-    Raises UnknownIdError for an unknown name, ConfigError for one that cannot be imported.
+    Args:
+        kind: Kind of plug-in.
+        name: Registered name, or `module:Class`.
+
+    Raises:
+        UnknownIdError: For an unknown name.
+        ConfigError: For a class that cannot be imported.
     """
     target = _target(kind, name)
     module, _, attribute = target.partition(":")
@@ -136,7 +155,15 @@ def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class o
 
 
 def settings_model(kind: PluginKind, name: str) -> type[BaseModel] | None:
-    """The pydantic model of a plug-in's settings, if it has one; raises like `load_plugin`."""
+    """The pydantic model of a plug-in's settings; None if it has none.
+
+    Args:
+        kind: Kind of plug-in.
+        name: Its name.
+
+    Raises:
+        AeroDaaSError: What `load_plugin` raises.
+    """
     model = getattr(load_plugin(kind, name), "settings_model", None)
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 

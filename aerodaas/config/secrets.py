@@ -139,7 +139,12 @@ def _longer(name: str, key: str) -> str:
 
 
 def secret_texts(value: object, name: str = "") -> Iterator[str]:  # noqa: C901 - one kind each
-    """Yield the secrets in settings as texts, the parts of URLs that are not shown among them."""
+    """Yield the secrets in settings as texts, the parts of URLs that are not shown among them.
+
+    Args:
+        value: Settings: a model, plain data, or a part of them.
+        name: Name of the setting, which may tell that it is a secret.
+    """
     if isinstance(value, BaseModel):
         value = dict(value)
     if isinstance(value, Mapping):
@@ -177,7 +182,12 @@ def _parts(url: str) -> Iterator[str]:
 
 
 def cleaned(text: str, value: object) -> str:
-    """Return `text`, such as a library's error message, without the secrets in `value`."""
+    """Return a text without the secrets in some settings.
+
+    Args:
+        text: The text, such as a library's error message.
+        value: The settings.
+    """
     for secret in sorted(set(secret_texts(value)), key=len, reverse=True):
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, HIDDEN).replace(repr(secret)[1:-1], HIDDEN)

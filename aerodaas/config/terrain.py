@@ -21,7 +21,15 @@ class TerrainConfig(Strict):
     """Metres kept above the ground in flight, from the end of the take-off to the landing."""
 
     def check(self, robot: str, takeoff_height: float) -> None:
-        """Raise ValueError for a take-off that would end too near to the ground."""
+        """Refuse a take-off that would end too near to the ground.
+
+        Args:
+            robot: Id of the robot, for the error.
+            takeoff_height: Metres, the robot's `limits.takeoff_height`.
+
+        Raises:
+            ValueError: If it is less than `clearance`.
+        """
         if takeoff_height < self.clearance:
             message = (
                 f"{robot}: limits.takeoff_height ({takeoff_height:g} m) must be at least "

@@ -25,9 +25,12 @@ class XmlError(ConfigError):
 
 
 def parse_xml(content: str | bytes, kind: str, most_elements: float = math.inf) -> ET.Element:
-    """Parse an XML text of this `kind`, such as `KML`, and return its root.
+    """Parse an XML text and return its root.
 
-    Bytes are read in the encoding that they declare.
+    Args:
+        content: The text; bytes are read in the encoding that they declare.
+        kind: Kind of document, for the error, such as `KML`.
+        most_elements: Greatest number of elements.
 
     Raises:
         XmlError: If it is not XML, declares entities, has more than 40 levels or `most_elements`
