@@ -50,6 +50,10 @@ def topic(stream: str, kind: str) -> str:
     Dots and blanks become `_`; a stream already named after the kind does not repeat it. The
     marker of internal streams is removed (`/robot/state`), so a robot's sensor or analysis with
     such a name is recorded as `/robot/own.state`.
+
+    Args:
+        stream: Name of the stream.
+        kind: Kind of data.
     """
     plain_name = stream.replace(INTERNAL, "") if is_internal(stream) else stream
     name = "/" + _FORBIDDEN.sub("_", plain_name).strip("/")
@@ -70,6 +74,10 @@ def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON valu
 
     Non-finite numbers become None, large arrays their shape and type, enumeration members their
     name, objects with fields a dictionary of these fields, and other objects their `str`.
+
+    Args:
+        value: Any object.
+        depth: Levels of containers around it.
     """
     if value is None or isinstance(value, bool | int | str):
         return value

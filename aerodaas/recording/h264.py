@@ -83,9 +83,16 @@ class H264Encoder:
         self._next_key: int | None = None
 
     def encode(self, image: NDArray[np.uint8], stamp: int) -> bytes:
-        """Encode an image (BGR) captured at mission time `stamp`, nanoseconds.
+        """Encode an image.
 
-        Raises ValueError if the image cannot be encoded; the next one is then a key frame.
+        After an image that cannot be encoded, the next one is a key frame.
+
+        Args:
+            image: Picture, height x width x 3, BGR.
+            stamp: Mission time of capture, nanoseconds.
+
+        Raises:
+            ValueError: If the image cannot be encoded.
         """
         key = self._next_key is None or not self._next_key - KEY_FRAME_NS <= stamp < self._next_key
         self._next_key = stamp + KEY_FRAME_NS if key else self._next_key
@@ -130,9 +137,14 @@ class H264Decoder:
         self._picture: VideoFrame | None = None
 
     def decode(self, group: Sequence[bytes], place: int) -> NDArray[np.uint8] | None:
-        """Decode frame `place` of `group`, which starts with a key frame, to BGR.
+        """Decode one frame of a group to BGR.
 
-        Returns None for a frame that is broken or depends on a broken one.
+        Args:
+            group: Frames in order, of which the first is a key frame.
+            place: Index of the frame.
+
+        Returns:
+            Height x width x 3, or None for a frame that is broken or depends on a broken one.
         """
         from av.packet import Packet  # noqa: PLC0415 - as above
 

@@ -185,7 +185,12 @@ class LiveServer(ServerListener):
         """Port that the server listens on."""
 
     def put(self, entry: Entry, log_time: int) -> None:
-        """Send an entry with the log time `log_time`, Unix nanoseconds."""
+        """Send an entry.
+
+        Args:
+            entry: The entry.
+            log_time: Its log time, nanoseconds since the Unix epoch.
+        """
         channel = self._channels.get(entry.topic) or self._register(entry)
         if entry.schema.name not in VIDEO_SCHEMAS:
             # A repeated video message cannot be decoded before the next key frame.
@@ -194,7 +199,12 @@ class LiveServer(ServerListener):
         channel.log(entry.data, log_time=log_time)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Repeat a channel's last message for a new subscriber."""
+        """Repeat a channel's last message for a new subscriber.
+
+        Args:
+            client: Ignored.
+            channel: The channel.
+        """
         del client
         with self._lock:
             last = self._last.get(channel.topic)

@@ -88,7 +88,12 @@ class NavigationRecord:
 
     @classmethod
     def of(cls, navigation: AeroNavigation, header: Header) -> NavigationRecord:
-        """Navigation as it is recorded."""
+        """Navigation as it is recorded.
+
+        Args:
+            navigation: Result of an analysis.
+            header: Header of the message that brought it.
+        """
         return cls(
             header,
             navigation.navigation_type,

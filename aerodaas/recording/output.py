@@ -140,10 +140,14 @@ class _OnDisk:
 
 
 def keep_chunk_indexes_on_disk(writer: Writer, folder: Path) -> None:
-    """Make `writer` keep its chunk indexes in a nameless file in `folder`.
+    """Make a writer keep its chunk indexes in a nameless file.
 
     Two chunks a second, each with the places of all its channels, are 15 to 40 MB of objects an
     hour. Where a release of the library has renamed its list, they stay in memory.
+
+    Args:
+        writer: The writer.
+        folder: Folder of the file.
     """
     if hasattr(writer, _LIST):
         setattr(writer, _LIST, _OnDisk(folder))

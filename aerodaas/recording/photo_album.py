@@ -57,7 +57,15 @@ class PhotoAlbum:
         self._count = 0
 
     def add(self, robot: str, photo: Photo) -> None:
-        """Keep one picture of `robot`; raises RecordingError if that fails."""
+        """Keep one picture.
+
+        Args:
+            robot: Id of the robot that took it.
+            photo: The picture.
+
+        Raises:
+            RecordingError: If it cannot be kept.
+        """
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             self._count += 1

@@ -69,9 +69,14 @@ _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
 
 
 def camera_of(calibration: Any, mount: Any) -> CameraModel | None:  # noqa: ANN401 - protobuf
-    """The camera of a `foxglove.CameraCalibration` and a `foxglove.FrameTransform` on its body.
+    """The camera of a recorded calibration and mount.
 
-    None for what is no camera: figures that are not finite, no pixels, or no rotation.
+    Args:
+        calibration: A `foxglove.CameraCalibration`.
+        mount: A `foxglove.FrameTransform` of the camera on its body.
+
+    Returns:
+        None for what is no camera: figures that are not finite, no pixels, or no rotation.
     """
     matrix = [float(one) for one in calibration.K]
     place = tuple(float(getattr(mount.translation, axis)) for axis in "xyz")
@@ -345,7 +350,14 @@ def detections(
     since: int | None = None,
     until: int | None = None,
 ) -> Iterator[tuple[str, Detections]]:
-    """Iterate over topics and detections in the order of recording, as `Recording.records` does."""
+    """Iterate over topics and detections in the order of recording.
+
+    Args:
+        recording: The recording.
+        topics: Topics to read; None for all.
+        since: As for `Recording.records`.
+        until: As for `Recording.records`.
+    """
     for record in recording.records(
         schemas=(DETECTIONS_SCHEMA,), topics=topics, since=since, until=until
     ):

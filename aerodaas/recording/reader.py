@@ -199,7 +199,12 @@ class Recording:
         return data
 
     def extract(self, name: str, file: Path, most: int) -> None:
-        """Write the contents of an attachment of up to `most` bytes to a file, block by block.
+        """Write the contents of an attachment to a file, block by block.
+
+        Args:
+            name: Name of the attachment.
+            file: The file.
+            most: Bytes of the largest attachment that is written.
 
         Raises:
             RecordingError: If the attachment does not exist, is larger or is damaged; the file is

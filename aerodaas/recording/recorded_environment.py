@@ -223,6 +223,10 @@ def merged(recorded: dict[str, Any], local: Mapping[str, Any]) -> dict[str, Any]
 
     Robots and sensors are those of the recording, compute resources those of both. A resource of
     the kind `http` is left out where the local side gives it no endpoint.
+
+    Args:
+        recorded: What may be read of the recording.
+        local: Content of the local environment file.
     """
     content = _merged(recorded, local)
     if isinstance(content.get("compute"), list):

@@ -138,7 +138,12 @@ class FlightRecorder:
                 self._pass_on()
 
     def drops(self, stream: str, count: int = 1) -> None:
-        """Count `count` messages of `stream` that were dropped before the recorder."""
+        """Count messages that were dropped before the recorder.
+
+        Args:
+            stream: Their stream.
+            count: Their number.
+        """
         self._settle()
         self._write_drops(stream, count)
 

@@ -22,7 +22,16 @@ MAP_FRAME = "map"
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Rotation:
-    """Quaternion of intrinsic z-y-x angles in radians, as in `geometry.rotation_from_rpy`."""
+    """Quaternion of intrinsic z-y-x angles, as in `geometry.rotation_from_rpy`.
+
+    Args:
+        roll: Radians; positive lowers the right side.
+        pitch: Radians; positive turns the nose down.
+        yaw: Radians about the vertical.
+
+    Returns:
+        x, y, z, w.
+    """
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -35,7 +44,12 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Rotation:
 
 
 def compose(first: Rotation, second: Rotation) -> Rotation:
-    """Hamilton product: the rotation that applies `second`, then `first`."""
+    """Hamilton product of two rotations.
+
+    Args:
+        first: Quaternion that is applied last.
+        second: Quaternion that is applied first.
+    """
     ax, ay, az, aw = first
     bx, by, bz, bw = second
     return (

@@ -41,7 +41,13 @@ class Session:
         return Timestamp(*divmod(self.epoch_ns + stamp, NANOSECONDS))
 
     def changed(self, kind: str, stream: str, value: object) -> bool:
-        """Whether `value` differs from that of the last call for this kind and stream."""
+        """Whether a value differs from that of the last call for its kind and stream.
+
+        Args:
+            kind: Kind of value.
+            stream: Stream that it belongs to.
+            value: The value.
+        """
         key = (kind, stream)
         if key in self.last and self.last[key] == value:
             return False
@@ -51,7 +57,13 @@ class Session:
 
 @singledispatch
 def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Yield the entries of `item`: by default its JSON, for a class of the table or any other."""
+    """Yield the entries of an item: by default its JSON.
+
+    Args:
+        item: Item of any class.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     del session
     channel, header = channel_of(type(item)), message.header
     if channel is None:

@@ -67,7 +67,13 @@ class EncodedFrame:
 
 @convert.register
 def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an image, its depth, and its camera's calibration when that has changed."""
+    """Write an image, its depth, and its camera's calibration when that has changed.
+
+    Args:
+        item: The frame.
+        message: Message that brought it.
+        session: State of the recording, whose settings choose the format.
+    """
     header, stream = item.header, message.stream
     yield from _head(item, stream, session)
     if item.depth is not None and session.config.images != "none":
@@ -83,14 +89,26 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
 
 @convert.register
 def encoded_frame(item: EncodedFrame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an image as it came, and its camera's calibration when that has changed."""
+    """Write an image as it came, and its camera's calibration when that has changed.
+
+    Args:
+        item: The frame.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     yield from _head(item, message.stream, session)
     yield _image(item.data, item.format, item.header, message.stream, session)
 
 
 @convert.register
 def detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write boxes and keypoints as annotations of the image and as exact JSON."""
+    """Write boxes and keypoints as annotations of the image and as exact JSON.
+
+    Args:
+        item: The detections, in pixels.
+        message: Message that brought them.
+        session: State of the recording.
+    """
     header, stream = item.header, message.stream
     annotations = ImageAnnotations(
         # Foxglove pairs annotations with the image of exactly this time.

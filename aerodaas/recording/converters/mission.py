@@ -27,14 +27,28 @@ LOG = Log.get_schema()
 
 
 def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: str) -> Entry:
-    """One line of the recording's log, with `name` as its source."""
+    """One line of the recording's log.
+
+    Args:
+        session: State of the recording.
+        stamp: Mission time, nanoseconds.
+        level: Level of the line.
+        name: Its source.
+        text: Its text.
+    """
     line = Log(timestamp=session.time(stamp), level=level, message=text, name=name)
     return Entry("/log", LOG, line.encode(), stamp)
 
 
 @convert.register
 def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an alert to the log and, with its figures, as JSON."""
+    """Write an alert to the log and, with its figures, as JSON.
+
+    Args:
+        item: The alert.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     stamp = item.header.stamp
     yield log_entry(session, stamp, LogLevel.Warning, message.stream, f"{item.kind}: {item.text}")
     # An application's own figures may be of any class.
@@ -44,13 +58,25 @@ def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entr
 
 @convert.register
 def text(item: str, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a plain text as a line of the log."""
+    """Write a plain text as a line of the log.
+
+    Args:
+        item: The text.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     yield log_entry(session, message.stamp, LogLevel.Info, message.stream, item)
 
 
 @convert.register
 def log_record(item: logging.LogRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a record of Python's logging, with its level, file and line."""
+    """Write a record of Python's logging, with its level, file and line.
+
+    Args:
+        item: The record.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     line = Log(
         timestamp=session.time(message.stamp),
         level=_level(item.levelno),
@@ -76,7 +102,13 @@ def _level(number: int) -> LogLevel:
 
 @convert.register
 def mission_status(item: MissionStatus, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a status, a new plan, and log lines for a changed state and changed faults."""
+    """Write a status, a new plan, and log lines for a changed state and changed faults.
+
+    Args:
+        item: The status.
+        message: Message that brought it.
+        session: State of the recording, with the last state and faults.
+    """
     stream, robot = message.stream, robot_of(message)
     yield json_entry(item, stream, item.stamp, robot=robot, ahead=len(item.pending))
     if session.changed("state", stream, item.state):
@@ -101,14 +133,26 @@ def _is_new_plan(ahead: tuple[Waypoint, ...], stream: str, session: Session) -> 
 
 @convert.register
 def navigation(item: AeroNavigation, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the waypoints and commands of a navigation result."""
+    """Write the waypoints and commands of a navigation result.
+
+    Args:
+        item: The result.
+        message: Message that brought it.
+        session: Ignored.
+    """
     del session
     yield json_entry(NavigationRecord.of(item, message.header), message.stream)
 
 
 @convert.register
 def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a reading, with the number of cores in use since the last one."""
+    """Write a reading, with the number of cores in use since the last one.
+
+    Args:
+        item: The reading.
+        message: Message that brought it.
+        session: State of the recording, with the actor's last reading.
+    """
     actor, _, machine = message.header.source.partition("@")
     key = ("vitals", actor)
     before: Vitals | None = session.last.get(key)

@@ -43,7 +43,14 @@ _BALL = 0.25
 
 
 def plan_entries(plan: MissionPlan, robot: str, stream: str, session: Session) -> Iterator[Entry]:
-    """Write a plan as JSON, scene, poses and, with a home, GeoJSON."""
+    """Write a plan as JSON, scene, poses and, with a home, GeoJSON.
+
+    Args:
+        plan: The plan, ENU metres.
+        robot: Id of the robot.
+        stream: Stream of the plan.
+        session: State of the recording, with the home.
+    """
     stamp, waypoints = plan.stamp, plan.waypoints
     yield json_entry(plan, stream, stamp, robot=robot)
     time = session.time(stamp)
@@ -93,7 +100,13 @@ def plan_entries(plan: MissionPlan, robot: str, stream: str, session: Session) -
 
 
 def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterator[Entry]:
-    """Write a robot's geofence as JSON, scene and, with a home, GeoJSON."""
+    """Write a robot's geofence as JSON, scene and, with a home, GeoJSON.
+
+    Args:
+        fence: The geofence, ENU metres.
+        robot: Id of the robot.
+        session: State of the recording, with the home.
+    """
     fence_stream = internal(robot, "fence")
     yield json_entry(fence, fence_stream, 0, robot=robot)
     if not fence.polygon:

@@ -36,7 +36,13 @@ def body_frame(source: str) -> str:
 
 @convert.register
 def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a state as odometry, transform, location and JSON."""
+    """Write a state as odometry, transform, location and JSON.
+
+    Args:
+        item: The state.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     stream, robot = message.stream, robot_of(message)
     yield from _pose(item.odometry, base_link(robot), stream, item.stamp, session)
     if item.gps is not None:
@@ -46,14 +52,26 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
 
 @convert.register
 def odometry(item: Odometry, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the reading of an odometry sensor."""
+    """Write the reading of an odometry sensor.
+
+    Args:
+        item: The reading.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     header = message.header
     yield from _pose(item, body_frame(header.source), message.stream, header.stamp, session)
 
 
 @convert.register
 def gps(item: GpsFix, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the reading of a GPS sensor."""
+    """Write the reading of a GPS sensor.
+
+    Args:
+        item: The reading.
+        message: Message that brought it.
+        session: State of the recording.
+    """
     header = message.header
     yield _location(item, body_frame(header.source), message.stream, header.stamp, session)
 

@@ -157,7 +157,15 @@ class _Clamped:
 
 
 def read_index(file: BinaryIO, size: int) -> FileIndex:
-    """Index a file of `size` bytes; raises one of `BROKEN` if it is not MCAP, or is too large."""
+    """Index a file.
+
+    Args:
+        file: The file, open.
+        size: Bytes of it to be read.
+
+    Raises:
+        Exception: One of `BROKEN`, if it is not MCAP or too large.
+    """
     read_magic(ReadDataStream(file))
     clamped = cast("BinaryIO", _Clamped(file, size))
     try:
@@ -173,7 +181,15 @@ def read_index(file: BinaryIO, size: int) -> FileIndex:
 
 
 def load(file: BinaryIO, block: Block) -> Iterator[McapRecord]:
-    """Yield the records of a block; raises one of `BROKEN` if it is damaged or too large."""
+    """Yield the records of a block.
+
+    Args:
+        file: The file, open.
+        block: The block.
+
+    Raises:
+        Exception: One of `BROKEN`, if it is damaged or too large.
+    """
     file.seek(block.offset)
     data = file.read(block.length)
     if block.chunked:

@@ -100,6 +100,10 @@ class VideoFile:
         """Add an image; one that is not later than the last is left out.
 
         A gap of hours, as a false time makes, is shortened to a second.
+
+        Args:
+            image: Picture, height x width x 3, BGR.
+            stamp: Its time, nanoseconds.
         """
         width, height = self.size
         ticks = ((stamp - self._start) * _TICKS + NANOSECONDS // 2) // NANOSECONDS

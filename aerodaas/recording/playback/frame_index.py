@@ -48,7 +48,12 @@ class Captures:
         self.recorded = array("q")
 
     def add(self, captured: int, recorded: int) -> None:
-        """Add a message, in the order of recording."""
+        """Add a message, in the order of recording.
+
+        Args:
+            captured: Mission time of capture, nanoseconds.
+            recorded: Mission time of recording, nanoseconds.
+        """
         self.captured.append(captured)
         self.recorded.append(recorded)
 

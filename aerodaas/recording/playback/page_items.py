@@ -74,14 +74,27 @@ def packed_picture(
 
 
 def packed_depth(header: Header, depth: NDArray[np.uint16]) -> tuple[dict[str, Any], bytes]:
-    """A frame's depth (height x width, millimetres) as a grey PNG, with its range in metres."""
+    """A frame's depth as a grey PNG, with its range in metres.
+
+    Args:
+        header: Header of the frame.
+        depth: Depth picture, height x width, millimetres.
+
+    Returns:
+        JSON of the item, and the PNG.
+    """
     data, reach = depth_picture(depth)
     item = DepthItem.model_construct(header=header, range=reach, bytes=(len(data),))
     return _json(item), data
 
 
 def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
-    """Followed target in the frame of `header`, for a page."""
+    """Followed target in a frame, for a page.
+
+    Args:
+        header: Header of the frame.
+        target: The target.
+    """
     item = TargetItem.model_construct(header=header, state=target.state, box=target.box)
     return _json(item)
 

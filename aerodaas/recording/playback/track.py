@@ -121,7 +121,12 @@ class TrackBuilder:
             heard.append(HeardOut(since=now, aircraft=aircraft))
 
     def mission(self, status: MissionStatus, ahead: int) -> None:
-        """Take a mission's status, and how many waypoints follow its target."""
+        """Add a mission's status.
+
+        Args:
+            status: The status.
+            ahead: Number of waypoints that follow its target.
+        """
         told = StatusOut.of(status, None)
         self._flown, self._outlook = told.distance, told.outlook
         self._pending = max(0, ahead)

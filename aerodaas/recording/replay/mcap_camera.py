@@ -78,7 +78,15 @@ class McapCamera:
         raise SourceError(f"none of the pictures on {self._topic} of {self._path} can be decoded")
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest image due at `stamp`; None if already returned or broken."""
+        """Return the newest image that is due.
+
+        Args:
+            stamp: Mission time, nanoseconds.
+            pose: Ignored.
+
+        Returns:
+            The image; None if it was returned already or is broken.
+        """
         del pose
         due: RecordedImage | None = None
         while self._next is not None and self._due_at(self._next, stamp) <= stamp:

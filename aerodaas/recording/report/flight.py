@@ -95,7 +95,13 @@ class Load:
     """Megabytes of a process; fraction, 0 to 1, of a machine."""
 
     def add(self, time: float, cpu: float, memory: float) -> None:
-        """Add a reading."""
+        """Add a reading.
+
+        Args:
+            time: Mission seconds.
+            cpu: Cores in use by a process; fraction of all cores, 0 to 1, of a machine.
+            memory: Megabytes of a process; fraction, 0 to 1, of a machine.
+        """
         self.time.append(time)
         self.cpu.append(cpu)
         self.memory.append(memory)

@@ -76,7 +76,12 @@ def label_colour(label: str) -> str:
 
 
 def draw_detections(image: Image, found: Iterable[Detection]) -> None:
-    """Draw each detection into `image` (BGR, in place), in the colour of its label."""
+    """Draw detections into a picture, each in the colour of its label.
+
+    Args:
+        image: Picture, height x width x 3, BGR; changed in place.
+        found: The detections, in its pixels.
+    """
     scale = image.shape[1] / _REFERENCE
     width = max(1, round(2 * scale))
     for item in found:
@@ -94,7 +99,12 @@ def draw_detections(image: Image, found: Iterable[Detection]) -> None:
 
 
 def draw_line(image: Image, text: str) -> None:
-    """Write one line of text into the lower left corner of `image`, in place."""
+    """Write one line of text into the lower left corner of a picture.
+
+    Args:
+        image: Picture, height x width x 3, BGR; changed in place.
+        text: The line.
+    """
     scale = image.shape[1] / _REFERENCE
     _write(image, text, (round(6 * scale), image.shape[0] - round(8 * scale)), 0.5 * scale)
 

@@ -91,7 +91,12 @@ class FlightSummary:
 
     @classmethod
     def of(cls, recording: Recording, flight: RecordedFlight) -> Self:
-        """Compute the figures of a flight read from `recording`."""
+        """Compute the figures of a flight.
+
+        Args:
+            recording: Recording of the flight.
+            flight: The flight, read from it.
+        """
         return cls(
             title=recording.provenance.get("name") or recording.path.stem,
             duration_s=round(recording.duration, 3),

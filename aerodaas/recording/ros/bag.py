@@ -110,9 +110,14 @@ class SqlitePart:
     def messages(
         self, topics: Collection[str], *, as_written: bool
     ) -> Iterator[tuple[int, str, Any]]:
-        """Time (nanoseconds since 1970), topic and decoded message; broken ones are counted.
+        """Read messages; broken ones are counted.
 
-        They come in the order of their times, or `as_written`.
+        Args:
+            topics: Names of the topics to read.
+            as_written: Keep the order of writing; if False, messages come by their times.
+
+        Yields:
+            Time (nanoseconds since 1970), topic and decoded message.
         """
         wanted = {number: topic for number, topic in self._topics.items() if topic.name in topics}
         decoders = {

@@ -43,6 +43,11 @@ class MessageBuilder:
         """`nav_msgs/Odometry`: the pose in `map`, velocity and rates in the body's own axes.
 
         Of the body's rates only the turn about the vertical is known.
+
+        Args:
+            value: Odometry of the vehicle.
+            stamp: Mission time, nanoseconds.
+            robot: Id of the robot.
         """
         velocity, rates = body_twist(value)
         covariance = np.zeros(36)
@@ -72,7 +77,15 @@ class MessageBuilder:
     def transform(
         self, stamp: int, parent: str, child: str, place: Vector, rotation: Rotation
     ) -> Any:  # noqa: ANN401
-        """`tf2_msgs/TFMessage` with the pose of `child` in `parent`."""
+        """`tf2_msgs/TFMessage` with the pose of one frame in another.
+
+        Args:
+            stamp: Mission time, nanoseconds.
+            parent: Frame in which the pose is.
+            child: Frame whose pose it is.
+            place: Position, metres.
+            rotation: Quaternion x, y, z, w.
+        """
         transform = self._make(
             "geometry_msgs/msg/Transform",
             translation=self._vector(place),
@@ -87,7 +100,13 @@ class MessageBuilder:
         return self._make(typestore.TRANSFORMS, transforms=[stamped])
 
     def battery(self, value: Battery, stamp: int, robot: str) -> Any:  # noqa: ANN401
-        """`sensor_msgs/BatteryState`; a current that is drawn is negative there."""
+        """`sensor_msgs/BatteryState`; a current that is drawn is negative there.
+
+        Args:
+            value: Reading of the battery.
+            stamp: Mission time, nanoseconds.
+            robot: Id of the robot.
+        """
         kind = self._types[typestore.BATTERY]
         return kind(
             header=self.header(stamp, base_link(robot)),
@@ -109,7 +128,13 @@ class MessageBuilder:
         )
 
     def fix(self, value: GpsFix, stamp: int, robot: str) -> Any:  # noqa: ANN401
-        """`sensor_msgs/NavSatFix`: degrees, and metres above the WGS84 ellipsoid."""
+        """`sensor_msgs/NavSatFix`: degrees, and metres above the WGS84 ellipsoid.
+
+        Args:
+            value: GPS fix.
+            stamp: Mission time, nanoseconds.
+            robot: Id of the robot.
+        """
         kind, status = self._types[typestore.NAV_SAT_FIX], "sensor_msgs/msg/NavSatStatus"
         horizontal, vertical = value.horizontal_sigma**2, value.vertical_sigma**2
         return kind(
@@ -125,7 +150,14 @@ class MessageBuilder:
         )
 
     def compressed_image(self, data: bytes, kind: str, stamp: int, frame: str) -> Any:  # noqa: ANN401
-        """`sensor_msgs/CompressedImage` of a whole `jpeg`, `png` or `webp` file."""
+        """`sensor_msgs/CompressedImage` of a whole image file.
+
+        Args:
+            data: Content of the file.
+            kind: `jpeg`, `png` or `webp`.
+            stamp: Mission time, nanoseconds.
+            frame: Frame of the camera.
+        """
         return self._make(
             typestore.COMPRESSED_IMAGE,
             header=self.header(stamp, frame),
@@ -134,7 +166,13 @@ class MessageBuilder:
         )
 
     def depth_image(self, depth: NDArray[np.uint16], stamp: int, frame: str) -> Any:  # noqa: ANN401
-        """`sensor_msgs/Image` of depth by REP 118: 16UC1, millimetres, 0 where not measured."""
+        """`sensor_msgs/Image` of depth by REP 118, as 16UC1.
+
+        Args:
+            depth: Depth picture, height x width, millimetres; 0 where not measured.
+            stamp: Mission time, nanoseconds.
+            frame: Frame of the camera.
+        """
         height, width = depth.shape
         return self._make(
             typestore.IMAGE,
@@ -150,7 +188,14 @@ class MessageBuilder:
     def camera_info(
         self, size: tuple[int, int], matrix: list[float], stamp: int, frame: str
     ) -> Any:  # noqa: ANN401
-        """`sensor_msgs/CameraInfo` of an undistorted lens: width and height, and the nine of K."""
+        """`sensor_msgs/CameraInfo` of an undistorted lens.
+
+        Args:
+            size: Width and height in pixels.
+            matrix: Nine elements of K, row by row, in pixels.
+            stamp: Mission time, nanoseconds.
+            frame: Frame of the camera.
+        """
         width, height = size
         fx, _, cx, _, fy, cy, *_ = matrix
         region = self._make(
@@ -217,7 +262,12 @@ class MessageBuilder:
         return self._make(typestore.DETECTIONS, header=header, detections=found)
 
     def header(self, stamp: int, frame: str) -> Any:  # noqa: ANN401
-        """`std_msgs/Header`."""
+        """`std_msgs/Header`.
+
+        Args:
+            stamp: Mission time, nanoseconds.
+            frame: Frame of the message.
+        """
         sec, nanosec = divmod(self._epoch_ns + stamp, NANOSECONDS)
         time = self._make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
         return self._make("std_msgs/msg/Header", stamp=time, frame_id=frame)

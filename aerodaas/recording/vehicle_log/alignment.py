@@ -168,7 +168,14 @@ class Alignment:
     def of(
         cls, log: VehicleLog, clock: ClockLine, flown: tuple[float, float], *, compared: bool
     ) -> Self:
-        """Lay the ends of a log over the mission clock."""
+        """Lay the ends of a log over the mission clock.
+
+        Args:
+            log: The log.
+            clock: The autopilot's clock by mission time.
+            flown: Beginning and end of the flight in the recording, mission seconds.
+            compared: Whether the motion was compared, and not the clocks alone.
+        """
         begin, end = clock.mission_time(np.array(log.span))
         return cls(clock, float(begin), float(end), flown, compared)
 
@@ -196,6 +203,10 @@ def recorded_clocks(recording: Recording) -> dict[str, RecordedClock]:
 
 def robot_of(clocks: dict[str, RecordedClock], robot: str | None) -> str:
     """The robot whose log is meant: the only one with a clock, where none is named.
+
+    Args:
+        clocks: Clocks of the recording by robot.
+        robot: Id of the robot; None for the only one with a clock.
 
     Raises:
         UnknownIdError: If there is no such robot in the recording.

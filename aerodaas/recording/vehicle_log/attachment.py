@@ -91,6 +91,10 @@ def attached_logs(recording: Recording) -> list[AttachedLog]:
 def flight_of(recording: Path, robot: str) -> tuple[float, float]:
     """When a robot flew in a recording: from arming to disarming, seconds since the Unix epoch.
 
+    Args:
+        recording: Path of the recording.
+        robot: Id of the robot.
+
     Raises:
         RecordingError: If the recording cannot be read, or has no clock of the robot's autopilot.
         UnknownIdError: If the recording has no such robot.

@@ -102,7 +102,12 @@ def log_plots(logs: Sequence[AttachedLog]) -> list[Plot]:
 
 
 def png_of(flight: RecordedFlight, make: Callable[[RecordedFlight], Figure]) -> bytes:
-    """PNG of the plot that `make` draws of a flight."""
+    """PNG of a plot of a flight.
+
+    Args:
+        flight: The flight.
+        make: Draws the plot.
+    """
     return _png(lambda: make(_shown(flight)))
 
 

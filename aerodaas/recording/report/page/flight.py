@@ -31,7 +31,14 @@ def flight_page(
     moments: Sequence[MomentPicture],
     logs: Sequence[AttachedLog] = (),
 ) -> str:
-    """Return the report of a flight as one HTML page."""
+    """Return the report of a flight as one HTML page.
+
+    Args:
+        summary: Figures of the flight.
+        plots: Plots of the page.
+        moments: Pictures of moments of the flight.
+        logs: Logs of the vehicles.
+    """
     ages = summary.simulates_executions
     return render_page(
         "flight.html",

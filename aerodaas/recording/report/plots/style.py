@@ -52,13 +52,24 @@ def new_figure(height: float) -> Figure:
 
 
 def grid(axes: Axes, axis: str = "both") -> None:
-    """Draw light grid lines behind the data."""
+    """Draw light grid lines behind the data.
+
+    Args:
+        axes: Axes of the plot.
+        axis: `x`, `y` or `both`.
+    """
     axes.grid(visible=True, axis=axis, color="0.9")  # type: ignore[arg-type]
     axes.set_axisbelow(True)
 
 
 def legend(figure: Figure, handles: list[Artist], columns: int = 2) -> None:
-    """Add a legend below the plot."""
+    """Add a legend below the plot.
+
+    Args:
+        figure: The plot; nothing is added without entries.
+        handles: Entries of the legend.
+        columns: Number of its columns.
+    """
     if handles:
         figure.legend(
             handles=handles,
@@ -84,12 +95,26 @@ def colours_of(states: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def mark(label: str, face: str, shape: str = "o") -> Line2D:
-    """A legend entry for a mark."""
+    """A legend entry for a mark.
+
+    Args:
+        label: Its text.
+        face: Colour of the mark's inside.
+        shape: Matplotlib's letter of its shape.
+    """
     return Line2D([], [], linestyle="", marker=shape, color="black", mfc=face, label=label)
 
 
 def shade_states(axes: Axes, robot: RobotFlight) -> list[Artist]:
-    """Colour the time axis by mission state; returns the legend entries."""
+    """Colour the time axis by mission state.
+
+    Args:
+        axes: Axes of the plot.
+        robot: Robot whose states are shown.
+
+    Returns:
+        Entries of the legend.
+    """
     for band in robot.bands:
         colour = STATE_COLOURS.get(band.state, "black")
         axes.axvspan(band.start, band.end, color=colour, alpha=0.25, linewidth=0)
@@ -100,7 +125,12 @@ def shade_states(axes: Axes, robot: RobotFlight) -> list[Artist]:
 
 
 def name_states(axes: Axes, robot: RobotFlight) -> None:
-    """Write the states' names into bands that are wide enough."""
+    """Write the states' names into bands that are wide enough.
+
+    Args:
+        axes: Axes of the plot.
+        robot: Robot whose states are shown.
+    """
     span = robot.time[-1] - robot.time[0]
     for band in robot.bands:
         if band.end - band.start < _NARROW * span:

@@ -88,9 +88,12 @@ def trajectory_figure(
 ) -> Figure:
     """The flight from above: path coloured by mission state, waypoints, take-off, geofence.
 
-    A ring around a waypoint shows a state in which the drone stayed there. Small marks on the
-    path show the drone's positions at detections. `overlay` draws more onto the axes, and returns
-    its entries of the legend.
+    A ring around a waypoint shows a state in which the drone stayed there. Small marks on the path
+    show the drone's positions at detections.
+
+    Args:
+        flight: The flight.
+        overlay: Draws more onto the axes, and returns its entries of the legend.
     """
     figure = new_figure(5.4)
     axes = figure.add_subplot()
