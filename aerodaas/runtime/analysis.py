@@ -112,7 +112,12 @@ class AnalysisNode(Node):
         return self._due
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Process the items of `inputs`, or measure if that is due."""
+        """Process the items of `inputs`, or measure if that is due.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+        """
         for message in inputs:
             self._receive(message)
         for message in inputs:

@@ -88,7 +88,12 @@ class CameraNode(Node):
         return self._due
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Capture an image if one is due."""
+        """Capture an image if one is due.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+        """
         for message in inputs:
             if isinstance(message.item, VehicleState):
                 self._vehicle = message.item

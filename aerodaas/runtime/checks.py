@@ -54,10 +54,18 @@ _NAMED = 200
 
 
 def check_environment(config: EnvironmentConfig, place: str) -> None:
-    """Raise ConfigError or UnknownIdError for unknown names and settings of plug-ins.
+    """Check the names and settings of an environment's plug-ins.
 
     Plug-ins of the application are not imported, because they may be in its own file;
     `check_plugins` checks them.
+
+    Args:
+        config: The environment.
+        place: Its file, for errors.
+
+    Raises:
+        ConfigError: A setting is unknown or invalid.
+        UnknownIdError: A name is unknown.
     """
     require_plugin("trajectory_schedulers", config.schedulers.trajectory)
     for robot in config.robots:
@@ -83,11 +91,17 @@ def check_plugins(
     *,
     here: bool,
 ) -> None:
-    """Raise the project's errors for drivers and cameras that could not be opened.
+    """Check drivers and cameras for what would keep them from being opened.
 
-    Settings of any plug-in are validated by the pydantic model `settings_model` of its class, if
-    it has one; built-in plug-ins are also constructed, which opens nothing. `here` is True if
-    all actors run on this machine: then files to be played must exist on it.
+    Settings of any plug-in are validated by the pydantic model `settings_model` of its class, if it
+    has one; built-in plug-ins are also constructed, which opens nothing. The project's errors are
+    raised.
+
+    Args:
+        config: The environment.
+        robots: Robots that fly.
+        cameras: Cameras that are opened.
+        here: Whether all actors run on this machine: then files to be played must exist on it.
     """
     robots = list(robots)
     for robot in robots:
@@ -111,7 +125,10 @@ def check_plugins(
 def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]) -> None:
     """Raise the project's errors for a graph that would fail only at run time.
 
-    `flying` are the robots that navigate.
+    Args:
+        graph: The graph.
+        config: The environment, whose `runtime_env` names analyses.
+        flying: Ids of the robots that navigate.
     """
     for node in graph.nodes.values():
         if node.kind == "sensor":
@@ -148,7 +165,15 @@ def _check_process(node: Node) -> None:
 
 
 def check_places(graph: Graph, compute: Collection[str]) -> None:
-    """Raise GraphError for an analysis on a simulated resource that is not among `compute`."""
+    """Check that no analysis is deployed on a simulated resource.
+
+    Args:
+        graph: The graph.
+        compute: Ids of the resources that analyses may be deployed on.
+
+    Raises:
+        GraphError: An analysis is on another resource.
+    """
     for node in graph.nodes.values():
         if node.compute is not None and node.compute not in compute:
             raise GraphError(
@@ -159,9 +184,16 @@ def check_places(graph: Graph, compute: Collection[str]) -> None:
 
 
 def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
-    """Raise UnknownIdError for tasks and tenants of unknown analyses, which would have no effect.
+    """Check the analyses that tasks and tenants name.
 
     A file shared by several applications may name the analyses that ship with the project.
+
+    Args:
+        graph: The graph.
+        config: The environment, whose `schedulers` name them.
+
+    Raises:
+        UnknownIdError: An analysis is unknown, so that the task or tenant would have no effect.
     """
     from aerodaas import analytics  # noqa: PLC0415 - loads its modules on access
 
@@ -202,7 +234,12 @@ def _check_actuators(robot: RobotConfig, place: str) -> None:
 def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[str, Any]:
     """Properties of a sensor by name; the settings of a camera's driver with their defaults.
 
-    Raises ConfigError for an invalid setting.
+    Args:
+        config: The environment.
+        sensor: One of its sensors.
+
+    Raises:
+        ConfigError: A setting is invalid.
     """
     driver, settings = sensor.driver or "", sensor.settings
     if sensor.type == "camera":
@@ -248,7 +285,15 @@ def _check_path(sensor: SensorConfig) -> None:
 
 
 def check_served(option: str, address: str | None) -> None:
-    """Raise ConfigError for an address of a server that is malformed; None is valid."""
+    """Check the address of a server.
+
+    Args:
+        option: Option that gives it, for the error.
+        address: host:port; None is valid.
+
+    Raises:
+        ConfigError: The address is malformed.
+    """
     if address is None:
         return
     host, _, port = address.rpartition(":")

@@ -57,7 +57,13 @@ _TURNS_FAILED = 20
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
-    """Reading of one of the vehicle's own sensors; None if the vehicle does not provide it."""
+    """Reading of one of the vehicle's own sensors; None if the vehicle does not provide it.
+
+    Args:
+        sensor: Odometry, gps, battery or status.
+        state: The vehicle's state.
+        status: The mission's status.
+    """
     readings: dict[str, object] = {
         "odometry": state.odometry,
         "gps": state.gps,
@@ -211,14 +217,24 @@ class VehicleController:
             self._stepped.advance_to(stamp)
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Execute a command; one that raises is refused, with an alert."""
+        """Execute a command; one that raises is refused, with an alert.
+
+        Args:
+            command: The command.
+            now: Mission clock, nanoseconds.
+        """
         return self.mission.handle(command, now)
 
     def _raise_alert(self, now: int, kind: str, text: str) -> None:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def receive(self, message: Message[Any], now: int) -> None:
-        """Handle a received message: navigation, or a trigger's command."""
+        """Handle a received message: navigation, or a trigger's command.
+
+        Args:
+            message: The message; one of other streams or without item is ignored.
+            now: Mission clock, nanoseconds.
+        """
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
@@ -232,6 +248,13 @@ class VehicleController:
 
         A cycle that raises, because of an application's data, empties the queue and lets the
         drone hover; the error is raised only after a second of such cycles.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            neighbours: The other drones to keep away from.
+
+        Returns:
+            The setpoints requested and sent.
         """
         try:
             record = self.loop.step(now, neighbours)

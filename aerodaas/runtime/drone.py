@@ -197,7 +197,16 @@ class DroneNode(Node):
             controller.receive(message, now)
 
     def command(self, robot: str, command: Command, now: int) -> Answer:
-        """Execute a command on one robot's mission; raises MissionError if that does not fly."""
+        """Execute a command on one robot's mission.
+
+        Args:
+            robot: Id of the robot.
+            command: The command.
+            now: Mission clock, nanoseconds.
+
+        Raises:
+            MissionError: The robot does not fly.
+        """
         if robot in self.failures:
             return Answer(accepted=False, text=failure_of(robot, self.failures[robot]))
         if robot not in self._controllers:
@@ -205,7 +214,12 @@ class DroneNode(Node):
         return self._controllers[robot].handle(command, now)
 
     def return_home(self, reason: str, now: int) -> None:
-        """Have every drone return home, for `reason`."""
+        """Have every drone return home.
+
+        Args:
+            reason: Why, as its mission says it.
+            now: Mission clock, nanoseconds.
+        """
         for controller in self._controllers.values():
             controller.handle(ReturnHome(reason), now)
 
@@ -265,7 +279,12 @@ class DroneNode(Node):
         }
 
     def latencies(self, robot: str, newest: int) -> tuple[float, ...]:
-        """The `newest` latencies from capture to command of a robot, milliseconds."""
+        """Newest latencies from capture to command, milliseconds.
+
+        Args:
+            robot: Id of the robot.
+            newest: How many.
+        """
         return self._controllers[robot].latencies.newest(newest)
 
     def behaviours_alone(self) -> dict[str, str]:
@@ -281,7 +300,12 @@ class DroneNode(Node):
 
 
 def failure_of(robot: str, error: Exception) -> str:
-    """The line that tells why a robot's loop ended."""
+    """The line that tells why a robot's loop ended.
+
+    Args:
+        robot: Id of the robot.
+        error: What the loop raised.
+    """
     return f"{robot}: {failure_line(error)}"
 
 

@@ -30,8 +30,12 @@ class Growth:
 def growth(old: FlightPlan, new: FlightPlan) -> Growth:
     """Compare the running plan with that of the current graph.
 
-    Raises GraphError for an additional task of the analytics scheduler, which is impossible in
-    flight.
+    Args:
+        old: The running plan.
+        new: The plan of the current graph.
+
+    Raises:
+        GraphError: The analytics scheduler has an additional task, which is impossible in flight.
     """
     _require_same_tasks(old, new)
     running = {spec.stream for spec in (*old.cameras, *old.analyses)}

@@ -24,13 +24,20 @@ a fifth of their loop's period."""
 def by_actor(
     specs: Sequence[RobotSpec], edges: Sequence[Placement], session: Session
 ) -> tuple[tuple[RobotSpec, ...], ...]:
-    """Distribute robots, each with its place in `edges`, over drone actors.
+    """Distribute robots over drone actors.
 
     In simulated time one node flies all of them. In real time each robot has an actor, and thus a
     process, of its own, with two exceptions: robots on one link share the process that opens it,
     and the simulated ones of a large flight share actors, for the processes of fifty of them, and
-    what these tell each other, would keep a machine busy by themselves. Raises ConfigError for a
-    link that robots share from different places.
+    what these tell each other, would keep a machine busy by themselves.
+
+    Args:
+        specs: The robots.
+        edges: Place of each robot.
+        session: Its speed tells simulated from real time.
+
+    Raises:
+        ConfigError: Robots share a link from different places.
     """
     if session.speed is None:
         return (tuple(specs),)

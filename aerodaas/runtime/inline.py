@@ -53,7 +53,15 @@ class Part(Host):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert, unless it repeats another one."""
+        """Publish an alert, unless it repeats another one.
+
+        Args:
+            kind: Kind of the alert.
+            text: What it says.
+            stamp: Mission clock, nanoseconds.
+            values: Figures of the alert by name.
+            source: Name of the part that raises it; empty for this one.
+        """
         message = self.alerts.message(kind, text, stamp, values, source)
         if message is not None:
             self._executor.post(message)
@@ -220,7 +228,12 @@ class InlineExecutor:
             self._entry(node).ended = True
 
     def step(self, node: Node, now: int) -> None:
-        """Step one node at mission time `now`, and hand on what it publishes."""
+        """Step one node, and hand on what it publishes.
+
+        Args:
+            node: The node.
+            now: Mission clock, nanoseconds.
+        """
         self.clock.advance_to(now)
         self._step(self._entry(node), now)
         self.settle()

@@ -55,11 +55,22 @@ class Proxies(Protocol):
     """Maker of proxies for nodes that run in processes of their own."""
 
     def camera(self, session: Session, camera: CameraSpec) -> Node | None:
-        """Proxy of a camera; None if it runs in this process."""
+        """Proxy of a camera; None if it runs in this process.
+
+        Args:
+            session: The flight's session.
+            camera: The camera.
+        """
         ...
 
     def analysis(self, session: Session, actor: ActorPlan, spec: AnalysisSpec) -> Node | None:
-        """Proxy of an analysis of `actor`; None if it runs in this process."""
+        """Proxy of an analysis of `actor`; None if it runs in this process.
+
+        Args:
+            session: The flight's session.
+            actor: The actor of the plan that has the analysis.
+            spec: The analysis.
+        """
         ...
 
 
@@ -277,7 +288,12 @@ class InlineFlight:
     def command(self, robot: str, command: Command) -> Answer:
         """Execute a command on a robot's mission, between two moments.
 
-        Raises MissionError if the robot does not fly.
+        Args:
+            robot: Id of the robot.
+            command: The command.
+
+        Raises:
+            MissionError: The robot does not fly.
         """
         drone = self._drone
         if drone is None:
@@ -290,7 +306,12 @@ class InlineFlight:
             return Answer(accepted=False, text=f"{over}: {self._robots[robot].status.state.value}")
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert of the application; in any thread."""
+        """Publish an alert of the application; in any thread.
+
+        Args:
+            kind: Kind of the alert.
+            text: What it says.
+        """
         header = Header(len(self._notes), self._executor.clock.now(), "application")
         self._notes.append(Alert(header, kind, text))
         if self._drone is not None:
@@ -353,7 +374,12 @@ class InlineFlight:
         self._sensed = True
 
     def reader(self, stream: str, over: Callable[[], bool]) -> LiveReader | None:
-        """A reader of `stream` for the application; None if no node publishes it."""
+        """A reader of `stream` for the application; None if no node publishes it.
+
+        Args:
+            stream: Name of the stream.
+            over: Whether the flight is over.
+        """
         if not self._executor.publishes(stream):
             return None
         return LiveReader(self._executor.tap(stream), over)

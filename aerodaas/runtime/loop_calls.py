@@ -42,8 +42,13 @@ class LoopCalls:
     def ask(self, call: Callable[[], T], timeout: float) -> T:
         """Execute `call` in the loop and return its result; raises the exceptions of the call.
 
-        Raises LoopOverError if the loop is over, and SilentError if it does not answer within
-        `timeout` wall seconds; a call that has not started by then is withdrawn.
+        Args:
+            call: The call.
+            timeout: Wall seconds; a call that has not started by then is withdrawn.
+
+        Raises:
+            LoopOverError: The loop is over.
+            SilentError: The loop does not answer in time.
         """
         answer: Future[T] = Future()
         self._calls.put((call, answer))

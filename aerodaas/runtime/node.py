@@ -52,7 +52,15 @@ class Host:
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert with every parameter of `alert` given."""
+        """Publish an alert, with every parameter of `alert` given.
+
+        Args:
+            kind: Kind of the alert.
+            text: What it says.
+            stamp: Mission clock, nanoseconds.
+            values: Figures of the alert by name.
+            source: Name of the part that raises it; empty for the host's own name.
+        """
         raise NotImplementedError
 
     def wake(self) -> None:

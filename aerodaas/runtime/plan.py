@@ -411,11 +411,17 @@ def make_plan(
     here: bool = True,
     senses_only: bool = False,
 ) -> FlightPlan:
-    """Plan the actors of a graph.
+    """Plan the actors of a graph; raises the project's errors for a graph that cannot fly.
 
-    The analytics scheduler `dispatch_with`, if any, decides when and where `scheduled` analyses
-    run; `here` is False if actors may run on other machines. A graph that `senses_only` need not
-    navigate. Raises the project's errors, with remedies, for a graph that cannot fly.
+    Args:
+        session: The flight's session, with its environment.
+        graph: The graph.
+        compute: Resources of the environment.
+        scheduler: The trajectory scheduler.
+        dispatch_with: The analytics scheduler, which decides when and where `scheduled` analyses
+            run.
+        here: Whether all actors run on this machine.
+        senses_only: Whether the graph need not navigate.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots and not senses_only:

@@ -97,7 +97,12 @@ class RecorderNode(Node):
         return self._views != LiveViews()
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Write the messages."""
+        """Write the messages.
+
+        Args:
+            now: Ignored.
+            inputs: New messages, each stream's in order.
+        """
         del now
         for message in inputs:
             self.write(message)
@@ -130,7 +135,12 @@ class RecorderNode(Node):
             self.write(Message(stream, self._readings, now, header, reading.taken, (), reading))
 
     def count_drops(self, stream: str, count: int) -> None:
-        """Record at once that messages were dropped, because the run may be killed."""
+        """Record at once that messages were dropped, because the run may be killed.
+
+        Args:
+            stream: Name of the stream.
+            count: Messages dropped.
+        """
         if self._recorder is not None:
             self._recorder.drops(stream, count)
 

@@ -96,7 +96,12 @@ class SentCount:
 
     @classmethod
     def of(cls, count: int, latencies: Sequence[float]) -> SentCount:
-        """The count of `count` messages, of which the newest had these latencies in ms."""
+        """The count of a stream's messages.
+
+        Args:
+            count: Messages sent.
+            latencies: Of the newest of them, milliseconds.
+        """
         if not latencies:
             return cls(count, None, None)
         ordered = sorted(latencies)
@@ -123,7 +128,12 @@ class ActorReport:
 
 
 def sent_counts(alerts: Outlet, nodes: Iterable[Node]) -> dict[str, SentCount]:
-    """Messages published, by stream: on the stream of `alerts`, and by the nodes of one report."""
+    """Messages published, by stream.
+
+    Args:
+        alerts: Stream of alerts.
+        nodes: Nodes of one report.
+    """
     outlets = [alerts, *(outlet for node in nodes for outlet in tuple(node.outlets.values()))]
     return {outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies)) for outlet in outlets}
 

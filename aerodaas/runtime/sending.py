@@ -21,7 +21,11 @@ _MOST = 1000
 
 
 def culprit(item: object, error: Exception) -> str:
-    """Describe which part of `item` cannot be sent, and why; `error` is that of the whole.
+    """Describe which part of `item` cannot be sent, and why.
+
+    Args:
+        item: What is to be sent.
+        error: Error of the whole.
 
     >>> import threading
     >>> culprit({"lock": threading.Lock()}, TypeError("cannot pickle '_thread.lock' object"))

@@ -55,9 +55,12 @@ class Session:
     """Clock of the application's process, which the actors on its machine take over."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
-        """First timestamp later than `after` at which `source`, of `rate` Hz, is due.
+        """First timestamp at which `source` is due; NEVER after the end of its timetable.
 
-        NEVER after the end of its timetable, if it has one.
+        Args:
+            source: Stream of the source.
+            rate: Hz, for a source without timetable.
+            after: Mission clock, nanoseconds; the timestamp is later.
         """
         stamps = self.timetables.get(source)
         if stamps is None:
@@ -95,7 +98,12 @@ class Session:
 
 
 def next_due(rate: float, after: int) -> int:
-    """First timestamp later than `after` at which a source of `rate` Hz is due."""
+    """First timestamp at which a source is due, nanoseconds.
+
+    Args:
+        rate: Hz.
+        after: Mission clock, nanoseconds; the timestamp is later.
+    """
     index = int(after * rate / NANOSECONDS) + 1
     while _stamp(rate, index - 1) > after:
         index -= 1

@@ -49,7 +49,12 @@ def end_stream(camera: str) -> str:
 
 
 def trigger_stream(target: str, source: str) -> str:
-    """Name of the stream of trigger commands from `source` to a robot or analysis."""
+    """Name of the stream of trigger commands to a robot or analysis.
+
+    Args:
+        target: Id of the robot or analysis that is triggered.
+        source: Id of the analysis that triggers it.
+    """
     return f"{internal(target, 'commands')}/{source}"
 
 

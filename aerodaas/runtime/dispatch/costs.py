@@ -25,7 +25,12 @@ _SURE = 0.9
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """Smallest of `values` that at least the fraction `share`, 0 to 1, of them do not exceed."""
+    """Smallest of `values` that at least a share of them do not exceed.
+
+    Args:
+        values: At least one value.
+        share: 0 to 1.
+    """
     ordered = sorted(values)
     place = -int(-share * len(ordered) // 1) - 1
     return ordered[max(0, min(len(ordered) - 1, place))]
@@ -39,7 +44,12 @@ class LinkEstimate:
         self._transfers: deque[tuple[int, float]] = deque(maxlen=_LINK_KEPT)
 
     def observe(self, size: int, seconds: float) -> None:
-        """Add a sample: `size` bytes were sent and answered after `seconds`."""
+        """Add a sample.
+
+        Args:
+            size: Bytes that were sent.
+            seconds: Time until the answer.
+        """
         if size < _LARGE:
             self._latencies.append(max(0.0, seconds))
         else:
@@ -101,17 +111,24 @@ class Uplink:
         return size / crossing if crossing > 0 else float("inf")
 
     def depart(self, name: object, size: float, at: float, work: float = 0.0) -> None:
-        """Add a transfer of `size` bytes that starts at `at`, seconds.
+        """Add a transfer.
 
-        Its answer takes `work` seconds of execution in addition to the round trip.
+        Args:
+            name: Key of the transfer, for `arrive`.
+            size: Bytes.
+            at: When it starts, seconds.
+            work: Execution that its answer takes in addition to the round trip, seconds.
         """
         self._under_way[name] = size, at, work
 
     def arrive(self, name: object, at: float) -> None:
-        """Complete a transfer, answered at `at` less its execution, and add a sample to the link.
+        """Complete a transfer, and add a sample to the link.
 
-        Queueing behind other transfers is excluded: otherwise a queue would look like a slow
-        link.
+        Queueing behind other transfers is excluded: otherwise a queue would look like a slow link.
+
+        Args:
+            name: Key of the transfer, as `depart` was given it.
+            at: When it was answered, less its execution, seconds.
         """
         size, departed, _ = self._under_way.pop(name, (0.0, at, 0.0))
         queued = self._arrived > departed
@@ -131,7 +148,12 @@ class ExecutionEstimates:
         self._seen: dict[str, deque[float]] = {}
 
     def observe(self, model: str, seconds: float) -> None:
-        """Add the execution time of one item."""
+        """Add the execution time of one item.
+
+        Args:
+            model: Stream of the analysis.
+            seconds: The execution time.
+        """
         self._seen.setdefault(model, deque(maxlen=_KEPT)).append(seconds)
 
     def seconds(self, model: str) -> float | None:
@@ -167,9 +189,12 @@ class Estimates:
     ) -> Profile:
         """Profile for a new task of an analysis.
 
-        `told` is the environment file's profile, `open_times` are those of its times to be
-        measured, `cloud` is the expected time of the cloud in host seconds, if known, and `link`
-        that of the transfer alone of a frame sent now: a lower bound of the cloud time.
+        Args:
+            told: The environment file's profile.
+            open_times: Those of its times that are measured.
+            cloud: Expected time of the cloud, host seconds; None if not known.
+            link: The transfer alone of a frame sent now, host seconds: a lower bound of the cloud
+                time.
         """
         profile = self._told.setdefault(told.model, told)
         wanted = open_times - self._learnt

@@ -34,7 +34,12 @@ class DeadlineReserve:
         self._news = 0
 
     def travelled(self, answer: Message[object], taken: int) -> None:
-        """Add an execution on the edge of `taken` ns; the answer's last span is the work."""
+        """Add an execution on the edge.
+
+        Args:
+            answer: Its answer, whose last span is the work.
+            taken: Time from sending the task to the answer, nanoseconds.
+        """
         work = answer.spans[-1].published - answer.spans[-1].received
         self._ways.append(max(0, taken - work))
         self._refresh()

@@ -173,11 +173,21 @@ class Dispatcher(Node):
     # Host interface of `Dispatch`.
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Start an execution on the edge."""
+        """Start an execution on the edge.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         raise NotImplementedError
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Start an execution in the cloud."""
+        """Start an execution in the cloud.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         raise NotImplementedError
 
     def wake_at(self, at: int) -> None:
@@ -191,7 +201,12 @@ class Dispatcher(Node):
         self._out.append(outlet.derive(item, frame, host_time_ns(), frame.stamp))
 
     def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
-        """Publish a decision with its reason."""
+        """Publish a decision with its reason.
+
+        Args:
+            decision: The decision, with its task and reason.
+            now: Mission clock, nanoseconds.
+        """
         task = decision.task
         if isinstance(decision, Drop):
             self._reasons[task.id] = decision.reason

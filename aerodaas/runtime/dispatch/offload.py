@@ -40,6 +40,10 @@ def allowed(node: Node, compute: Mapping[str, ComputeConfig]) -> list[ComputeCon
 
     The one that it is deployed on; if deployed on an edge, every cloud node, and every endpoint
     that has a model for it.
+
+    Args:
+        node: The analysis.
+        compute: Resources by id.
     """
     own = compute[node.compute] if node.compute is not None else None
     if own is not None and own.kind != "edge":
@@ -57,9 +61,15 @@ def cloud_processes(
     compute: Mapping[str, ComputeConfig],
     envs: Mapping[str, RuntimeEnvConfig | None],
 ) -> tuple[CloudProcess, ...]:
-    """Executors for the managed analyses `nodes`, whose environments are `envs`, by id.
+    """Executors for managed analyses.
 
-    Raises GraphError if an endpoint cannot perform an analysis.
+    Args:
+        nodes: The analyses.
+        compute: Resources by id.
+        envs: Environment of each analysis, by its id.
+
+    Raises:
+        GraphError: An endpoint cannot perform an analysis.
     """
     found = []
     for resource in compute.values():
@@ -82,7 +92,12 @@ def cloud_processes(
 
 
 def priced(profile: Profile, resources: Sequence[ComputeConfig]) -> Profile:
-    """Profile with the highest cost of `resources`; without any, the benefit, so no gain."""
+    """Profile with the highest cost of `resources`; without any, the benefit, so no gain.
+
+    Args:
+        profile: Profile of the analysis.
+        resources: Cloud resources that may run it.
+    """
     costs = [
         profile.cloud_cost
         if resource.endpoint is None or resource.endpoint.cost is None

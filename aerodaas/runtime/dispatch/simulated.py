@@ -119,7 +119,12 @@ class SimulatedDispatcher(Dispatcher):
         return self._dispatch.running is not None or self._dispatch.in_cloud > 0
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Handle answers, then what is due, then frames."""
+        """Handle answers, then what is due, then frames.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+        """
         frames = []
         for message in inputs:
             if message.stream in self._by_done:
@@ -160,12 +165,22 @@ class SimulatedDispatcher(Dispatcher):
         heapq.heappush(self._events, _Event(at, kind, next(self._order), task))
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Start a task, which ends after its time on the edge."""
+        """Start a task, which ends after its time on the edge.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         ends = None if self._executions is None else now + self._executions.edge_time(task)
         self._run(task, ends)
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Start a task, which ends after its time in the cloud, or is lost on the way."""
+        """Start a task, which ends after its time in the cloud, or is lost on the way.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         executions = self._executions
         assert executions is not None  # noqa: S101 - else there is no cloud slot
         taken = executions.network.cloud_time(executions.cloud_time(task), now)
