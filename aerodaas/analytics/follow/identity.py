@@ -118,7 +118,7 @@ class TargetIdentity:
 
         Args:
             track: Id of the box's track; None without one.
-            looks: Appearances of the track.
+            looks: Appearances of the track, or else the box's own.
         """
         if self.certainty is Certainty.CERTAIN:
             # Where nobody came close, the place tells more than looks, as of who has fallen.
