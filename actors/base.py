@@ -107,7 +107,9 @@ class NodeActor:
     def prepare(self, variables: ProcessVariables | None = None, *specs: NodeMaker) -> ActorInfo:
         """Make and open the nodes of `specs`; raises what the opening of one raises.
 
-        `variables` have been set in this process by their arrival.
+        Args:
+            variables: Set in this process by their arrival.
+            *specs: Makers of the nodes.
         """
         del variables
         be_nice(min((spec.niceness for spec in specs), default=self.niceness))
@@ -175,7 +177,12 @@ class NodeActor:
         return self.info()
 
     def end_mission_when_finished(self, camera: str, ends: bool) -> None:  # noqa: FBT001 - Ray's
-        """Change whether the mission ends when `camera` has no more images."""
+        """Change whether the mission ends with a camera.
+
+        Args:
+            camera: Name of the camera's node.
+            ends: Whether it ends when the camera has no more images.
+        """
         for runner in self.runners:
             if isinstance(runner.node, CameraNode) and runner.node.name == camera:
                 runner.node.ends = ends
@@ -211,15 +218,24 @@ class NodeActor:
         self._stopping.wait()
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Deliver a message from another node to every node of this actor that reads it."""
+        """Deliver a message from another node to every node of this actor that reads it.
+
+        Args:
+            stream: Name of the stream.
+            data: The encoded message.
+        """
         for runner in self.runners:
             if runner.opened and stream in runner.subscriber.received:
                 runner.subscriber.deliver(stream, data)
 
     def hand_out(self, stream: str, seq: int) -> list[bytes]:
-        """Encoded newest messages of a published `stream`, from number `seq` on.
+        """Encoded newest messages of a published `stream`.
 
         For an application on another node, or without shared memory.
+
+        Args:
+            stream: Name of the stream; one that is not published has none.
+            seq: Number of the first message wanted.
         """
         return self.publishers[stream].since(seq) if stream in self.publishers else []
 
@@ -266,7 +282,12 @@ class NodeActor:
         return self.session.scope(ray.get_runtime_context().get_node_id())
 
     def publisher(self, stream: str, what: str = "") -> Publisher:
-        """Open a stream for writing; `what` names its items in alerts."""
+        """Open a stream for writing.
+
+        Args:
+            stream: Name of the stream.
+            what: Name of its items in alerts; empty for the stream's.
+        """
 
         def unsendable(reason: str) -> None:
             self._problem("unsendable", f"{what or stream}: {reason}")
@@ -305,7 +326,12 @@ class NodeActor:
                 self.alert(kind, text)
 
     def alert(self, kind: str, text: str) -> None:
-        """Publish an alert at the current mission time; thread-safe."""
+        """Publish an alert at the current mission time; thread-safe.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+        """
         self.publish_alert(kind, text, self.clock.now(), {})
 
     def publish_alert(
@@ -331,7 +357,12 @@ class NodeActor:
                 self.publish(again)
 
     def publish_application_alert(self, kind: str, text: str) -> None:
-        """Publish an alert of the application's process, so that it is recorded."""
+        """Publish an alert of the application's process, so that it is recorded.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+        """
         self.alert(kind, text)
 
     def reads(self) -> list[str]:

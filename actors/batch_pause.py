@@ -26,7 +26,12 @@ class BatchPause:
         self._pause = _FIRST
 
     def after(self, counts: Mapping[str, int], depths: Mapping[str, int]) -> float:
-        """The pause after a batch of so many messages by stream, whose queues have `depths`."""
+        """The pause after a batch, seconds.
+
+        Args:
+            counts: Messages of the batch, by stream.
+            depths: Depth of each stream's queue.
+        """
         if any(count > depths[stream] // _ROOM for stream, count in counts.items()):
             self._pause /= _ROOM
         else:

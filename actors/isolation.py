@@ -43,9 +43,15 @@ class _Installed:
 
 
 def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str) -> dict[str, Any]:
-    """Install the environment of the analysis `name` and return Ray's options for its process.
+    """Install the environment of an analysis and return Ray's options for its process.
 
-    Raises ConfigError, with the node's message, if a node cannot provide the environment.
+    Args:
+        env: The environment; None needs no options.
+        place: Where the process runs.
+        name: Name of the analysis, for errors.
+
+    Raises:
+        ConfigError: A node cannot provide the environment; with the node's message.
     """
     if env is None:
         return {}

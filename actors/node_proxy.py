@@ -162,7 +162,15 @@ class NodeProxy(Node):
         return self._due
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Step the node in its actor; raises MissionError if its process died."""
+        """Step the node in its actor.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+
+        Raises:
+            MissionError: Its process died.
+        """
         return self._call(self._actor.step.remote(now, inputs))
 
     def close(self) -> None:
@@ -199,13 +207,24 @@ class Proxies:
         self._everything = everything
 
     def camera(self, session: Session, camera: CameraSpec) -> Node | None:
-        """Proxy of a camera; None if it runs in the application's process."""
+        """Proxy of a camera; None if it runs in the application's process.
+
+        Args:
+            session: The flight's session.
+            camera: The camera.
+        """
         if not self._everything:
             return None
         return NodeProxy(session, camera, camera.stream, camera.place)
 
     def analysis(self, session: Session, actor: ActorPlan, spec: AnalysisSpec) -> Node | None:
-        """Proxy of an analysis of `actor`; None if it runs in the application's process."""
+        """Proxy of an analysis of `actor`; None if it runs in the application's process.
+
+        Args:
+            session: The flight's session.
+            actor: The actor of the plan that has the analysis.
+            spec: The analysis.
+        """
         if not self._everything and actor.runtime_env is None:
             return None
         return NodeProxy(session, spec, spec.stream, actor.place, actor.runtime_env)

@@ -43,11 +43,22 @@ class RunnerActor(Protocol):
     def reader(
         self, depths: Mapping[str, int], who: str = "", within: frozenset[str] = frozenset()
     ) -> Subscriber:
-        """Open streams for reading."""
+        """Open streams for reading.
+
+        Args:
+            depths: Queue depths by stream.
+            who: Name of the reader in alerts.
+            within: Streams that this actor publishes itself.
+        """
         ...
 
     def publisher(self, stream: str, what: str = "") -> Publisher:
-        """Open a stream for writing."""
+        """Open a stream for writing.
+
+        Args:
+            stream: Name of the stream.
+            what: Name of its items in alerts; empty for the stream's.
+        """
         ...
 
     def publish(self, message: Message[Any]) -> Message[Any]:
@@ -55,13 +66,26 @@ class RunnerActor(Protocol):
         ...
 
     def alert(self, kind: str, text: str) -> None:
-        """Publish an alert at the current mission time."""
+        """Publish an alert at the current mission time.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+        """
         ...
 
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
     ) -> None:
-        """Publish an alert."""
+        """Publish an alert.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+            stamp: Mission clock, nanoseconds.
+            values: Further figures by name.
+            source: Name of the part that raises it; empty for the actor's own.
+        """
         ...
 
     def fail(self, error: Exception) -> None:
@@ -107,7 +131,15 @@ class NodeRunner(Host):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert by the actor."""
+        """Publish an alert by the actor.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+            stamp: Mission clock, nanoseconds.
+            values: Further figures by name.
+            source: Name of the part that raises it; empty for the actor's own.
+        """
         self._actor.publish_alert(kind, text, stamp, values, source)
 
     def wake(self) -> None:

@@ -18,8 +18,14 @@ _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 def private_folder(name: str, base: str = _BASE) -> Path:
     """Return this user's folder `aerodaas-UID/name` in `base`, made with mode 0700 if missing.
 
-    Raises AeroDaaSError if the path is a link or belongs to another user: anybody may have put it
-    there. Rights of others on a folder of our own are taken away, with a warning.
+    Rights of others on a folder of our own are taken away, with a warning.
+
+    Args:
+        name: Name of the folder.
+        base: Folder for all users.
+
+    Raises:
+        AeroDaaSError: The path is a link or belongs to another user: anybody may have put it there.
     """
     top = Path(base, f"aerodaas-{os.geteuid()}")
     _own(top)

@@ -69,7 +69,12 @@ class ReaperHost:
         return self._reaper.ending
 
     def look_after(self, actors: Sequence[Any], helpers: Sequence[Any]) -> None:
-        """Replace the actors to be ended, after actors were added in flight."""
+        """Replace the actors to be ended, after actors were added in flight.
+
+        Args:
+            actors: Actors of the run.
+            helpers: Its other processes.
+        """
         self._reaper.look_after(actors, helpers)
 
 

@@ -105,7 +105,9 @@ def connect(
 def join(address: str, modules: Sequence[Path] = ()) -> None:
     """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError.
 
-    `modules` are those that `connect` takes.
+    Args:
+        address: Address of the cluster.
+        modules: Those that `connect` takes.
     """
     if ray.is_initialized():
         return
@@ -297,7 +299,12 @@ def home_edge() -> str:
 def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
     """Ray's options for an actor at `place`.
 
-    Raises ConfigError if no node of the cluster fits.
+    Args:
+        place: Kind of node, or one node.
+        restarts: How often Ray starts it again after its death.
+
+    Raises:
+        ConfigError: No node of the cluster fits.
     """
     nodes = nodes_at(place)
     options: dict[str, Any] = {

@@ -64,9 +64,12 @@ sys.exit(command.load()())
 
 
 def main(application: int, streams: str, words: list[str]) -> None:
-    """Run Ray, started by `ray start` with the arguments `words`, for process `application`.
+    """Run Ray, as `ray start` does.
 
-    `streams` is the folder of its streams' sockets; empty without.
+    Args:
+        application: Id of the application's process.
+        streams: Folder of its streams' sockets; empty without.
+        words: Arguments of `ray start`.
     """
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)

@@ -129,7 +129,12 @@ class LiveDispatcher(Dispatcher):
         return min(look, self._timers[0]) if self._timers else look
 
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
-        """Handle timers, answers, frames, and what has become of the executors."""
+        """Handle timers, answers, frames, and what has become of the executors.
+
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+        """
         for message in inputs:
             self._wake_scheduler(self.host.now())
             self._receive(message, self.host.now())
@@ -325,7 +330,12 @@ class LiveDispatcher(Dispatcher):
     # Host interface of `Dispatch`.
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Send a task to its analysis' executor on the edge."""
+        """Send a task to its analysis' executor on the edge.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         self._edge_since = now
         if self._turns is not None:
             self._dispatch.edge_open, self._turns.used = False, True
@@ -336,7 +346,12 @@ class LiveDispatcher(Dispatcher):
         super()._send_task(task, item)
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Send a task to the cloud."""
+        """Send a task to the cloud.
+
+        Args:
+            task: The task.
+            now: Mission clock, nanoseconds.
+        """
         if self._cloud is not None:
             left = self._session.host_seconds(task.deadline + task.reserve - now)
             self._cloud.send(task, self._frames[task.id], now, left)

@@ -68,7 +68,12 @@ class CloudExecutor:
         self._unpacked = threading.Condition()
 
     def prepare(self, variables: ProcessVariables, analyses: dict[str, Analytics[Any]]) -> None:
-        """Open the analyses, by stream; the arrival of `variables` has set them."""
+        """Open the analyses.
+
+        Args:
+            variables: Set in this process by their arrival.
+            analyses: The analyses, by stream.
+        """
         del variables
         if ray.is_initialized() and ray.get_runtime_context().get_actor_id():
             be_nice(_NICENESS)
@@ -96,10 +101,17 @@ class CloudExecutor:
     def execute(
         self, analysis: str, frame: tuple[str, int], data: bytes, budget: float | None = None
     ) -> Executed:
-        """Analyse a frame; `budget` are the seconds left, for analyses that adapt to it.
+        """Analyse a frame.
 
-        `frame` is the stream and number of its message; `data` the encoded message, or empty if
-        an earlier call carried it. Raises MissingFrameError if none did.
+        Args:
+            analysis: Stream of the analysis.
+            frame: Stream and number of the frame's message.
+            data: The encoded message; empty if an earlier call carried it.
+            budget: Seconds left, for analyses that adapt to it; None for no limit.
+
+        Raises:
+            MissingFrameError: No earlier call carried the message.
+            UnpreparedError: The executor was restarted.
         """
         if not self._analyses:
             raise UnpreparedError("the executor in the cloud was restarted")

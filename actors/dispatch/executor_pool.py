@@ -57,9 +57,13 @@ class ExecutorPool:
         return min((cloud.frame_uplink.expected for cloud in self._able(model)), default=0.0)
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
-        """Start an execution whose result is useful for `budget` seconds of the host.
+        """Start an execution; a frame that would arrive too late is not sent.
 
-        A frame that would arrive too late is not sent.
+        Args:
+            task: The task.
+            message: The frame.
+            now: Mission clock, nanoseconds.
+            budget: Host seconds for which its result is useful.
         """
         model = task.profile.model
         able = self._able(model)

@@ -88,8 +88,10 @@ class FrameUplink:
     def arrived(self, way: tuple[str, int], at: float, decoding: float) -> None:
         """Update the estimates from the call that carried a frame.
 
-        `at` is the time of its answer less the execution, `way` its name on the uplink,
-        `decoding` the seconds of decoding.
+        Args:
+            way: Name of the transfer on the uplink.
+            at: When it was answered, less the execution, seconds.
+            decoding: Time of decoding, seconds.
         """
         self._transferred = time.monotonic()
         self.uplink.arrive(way, at)

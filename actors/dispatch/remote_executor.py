@@ -148,7 +148,14 @@ class RemoteExecutor:
         return None if work is None else self.frame_uplink.expected + work
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
-        """Start an execution whose result is useful for `budget` seconds of the host."""
+        """Start an execution.
+
+        Args:
+            task: The task.
+            message: The frame.
+            now: Mission clock, nanoseconds.
+            budget: Host seconds for which its result is useful.
+        """
         patience = self._patience(task)
         sent = self._started[task.id] = _Sent(task, now, now + patience)
         self.frame_uplink.announce(message)

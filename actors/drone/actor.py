@@ -74,7 +74,12 @@ class DroneActor(NodeActor):
         self._orphaned = False
 
     def prepare(self, variables: ProcessVariables | None = None, *specs: NodeMaker) -> ActorInfo:
-        """Connect the vehicles; `variables` have been set in this process by their arrival."""
+        """Connect the vehicles.
+
+        Args:
+            variables: Set in this process by their arrival.
+            *specs: Ignored.
+        """
         del variables, specs
         return super().prepare()
 
@@ -106,7 +111,12 @@ class DroneActor(NodeActor):
     def command(self, robot: str, command: Command) -> Answer:
         """Execute a command of the application's process on one robot's mission.
 
-        Raises MissionError if the loop does not execute it in time.
+        Args:
+            robot: Id of the robot.
+            command: The command.
+
+        Raises:
+            MissionError: The loop does not execute it in time.
         """
         try:
             return self._calls.ask(
@@ -119,15 +129,25 @@ class DroneActor(NodeActor):
     def grow(self, robots: tuple[RobotSpec, ...], timeout: float) -> ActorInfo:
         """Subscribe to the streams added to `robots`; returns once the loop uses them.
 
-        Raises MissionError if the loop has ended or does not answer.
+        Args:
+            robots: The robots, with the streams added.
+            timeout: Wall seconds that the loop has to answer.
+
+        Raises:
+            MissionError: The loop has ended or does not answer.
         """
         self._calls.ask(lambda: self._grow(robots), timeout)
         return self.info()
 
     def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
-        """Use the trajectory scheduler `scheduler` for all robots from now on.
+        """Use another trajectory scheduler for all robots from now on.
 
-        Raises MissionError if the loop has ended or does not answer.
+        Args:
+            scheduler: The scheduler.
+            timeout: Wall seconds that the loop has to answer.
+
+        Raises:
+            MissionError: The loop has ended or does not answer.
         """
         # In this thread: a planner's process takes seconds to start.
         planners = self._node.planners_of(scheduler)
@@ -152,11 +172,14 @@ class DroneActor(NodeActor):
         }
 
     def await_change(self, known: int, timeout: float) -> int:
-        """Return the number of changes of the missions once it is not `known`.
+        """Return the number of changes of the missions once it is another one.
 
-        Returns it after `timeout` wall seconds at the latest. A change is one of a mission's state,
-        its reason, waypoints or faults, an alert, and the end. The call is no heartbeat: it may
-        have been made before the application froze.
+        A change is one of a mission's state, its reason, waypoints or faults, an alert, and the
+        end. The call is no heartbeat: it may have been made before the application froze.
+
+        Args:
+            known: Number of changes that the caller has seen.
+            timeout: Wall seconds after which it returns at the latest.
         """
         return self._changes.wait(known, timeout)
 
@@ -212,7 +235,15 @@ class DroneActor(NodeActor):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
     ) -> None:
-        """Publish an alert, as the base does, without delaying the loop."""
+        """Publish an alert, as the base does, without delaying the loop.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+            stamp: Mission clock, nanoseconds.
+            values: Further figures by name.
+            source: Name of the part that raises it; empty for the actor's own.
+        """
         self._background.do(partial(super().publish_alert, kind, text, stamp, dict(values), source))
 
     def _watch_application(self) -> None:

@@ -32,7 +32,12 @@ class ChangeSignal:
         self._count()
 
     def wait(self, known: int, timeout: float) -> int:
-        """Return the number of changes once it is not `known`, or after `timeout` seconds."""
+        """Return the number of changes once it is another one.
+
+        Args:
+            known: Number of changes that the caller has seen.
+            timeout: Seconds after which it returns at the latest.
+        """
         with self._changed:
             self._changed.wait_for(
                 lambda: self._number != known, _PAUSE_AT_END if self._over else timeout

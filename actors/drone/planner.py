@@ -69,11 +69,25 @@ class PlannerExecutor(Executor):
         ray.get(self._actor.load.remote(*used))
 
     def submit(self, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:  # noqa: ANN401
-        """Call `function` in the actor; the future raises RuntimeError if that hangs or dies."""
+        """Call a function in the actor.
+
+        Args:
+            function: The function.
+            *args: Its arguments.
+            **kwargs: Its arguments by name.
+
+        Returns:
+            A future, which raises RuntimeError if the call hangs or the actor dies.
+        """
         return self._caller.submit(self._call, function, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
-        """End the actor and cancel the waiting calls."""
+        """End the actor and cancel the waiting calls.
+
+        Args:
+            wait: Ignored; it never waits.
+            cancel_futures: Ignored; waiting calls are always cancelled.
+        """
         del wait, cancel_futures
         # The waiting calls first, or the next one would start as soon as the actor is dead.
         self._caller.shutdown(wait=False, cancel_futures=True)

@@ -46,9 +46,15 @@ class ActorState:
 
 
 def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
-    """Wait for the result of an actor call.
+    """Wait for the result of an actor call; raises the project's errors.
 
-    Raises the project's errors: DeadError if the actor died, SilentError after `timeout` seconds.
+    Args:
+        reference: Ray's reference of the result.
+        timeout: Seconds.
+
+    Raises:
+        DeadError: The actor died.
+        SilentError: It does not answer in time.
     """
     try:
         return ray.get(reference, timeout=timeout)
@@ -66,7 +72,12 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
 
 
 def routes(member: ActorState, members: Iterable[ActorState]) -> dict[str, list[Any]]:
-    """Readers of each stream of `member` on other nodes, or without shared memory."""
+    """Readers of each stream of `member` on other nodes, or without shared memory.
+
+    Args:
+        member: An actor that is prepared.
+        members: All actors; those that are not prepared read nothing.
+    """
     here = member.info
     assert here is not None  # noqa: S101 - prepared
     known = [(one.handle, one.info) for one in members if one.info is not None]
@@ -82,9 +93,17 @@ def routes(member: ActorState, members: Iterable[ActorState]) -> dict[str, list[
 
 
 def require_clock(name: str, info: ActorInfo, began: int) -> None:
-    """Raise MissionError if an actor's clock is not between start and end of its `prepare`.
+    """Check that an actor's clock is between start and end of its `prepare`.
 
     A deviation of up to `_CLOCKS_APART` is tolerated.
+
+    Args:
+        name: Name of the actor.
+        info: Its answer, with its clock at the end of `prepare`.
+        began: This host's clock at the start, nanoseconds.
+
+    Raises:
+        MissionError: The clock is ahead or behind.
     """
     ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
     if abs(ahead) > _CLOCKS_APART * NANOSECONDS:

@@ -376,7 +376,15 @@ class Flight:
         return self._head.address if self._head is not None and self._head.lost else ""
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Execute a command on a robot's mission; raises MissionError if that does not fly."""
+        """Execute a command on a robot's mission.
+
+        Args:
+            robot: Id of the robot.
+            command: The command.
+
+        Raises:
+            MissionError: The robot does not fly, or its actor does not answer.
+        """
         if robot not in self._drones:
             raise MissionError(f"{robot} does not fly")
         handle = self._members[self._drones[robot]].handle
@@ -400,7 +408,12 @@ class Flight:
         return None
 
     def reader(self, stream: str, over: Callable[[], bool]) -> LiveReader | None:
-        """A reader of `stream` for the application; None if no actor publishes it."""
+        """A reader of `stream` for the application; None if no actor publishes it.
+
+        Args:
+            stream: Name of the stream.
+            over: Whether the flight is over.
+        """
         publisher = self.publisher(stream)
         if publisher is None:
             return None
@@ -657,6 +670,10 @@ class Flight:
         """Publish an alert of the application's process; in any thread.
 
         It is told here at once, and recorded by way of the drones' actors, which may hang.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
         """
         stamps = [
             report.status.stamp

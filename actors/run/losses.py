@@ -50,7 +50,13 @@ class SuspensionMonitor:
 
 
 def actor_silent(name: str, report: ActorReport, seconds: float) -> MissionError:
-    """Error for the actor `name`, which has not answered for so many seconds, but has not died."""
+    """Error for an actor that has not answered for a while, but has not died.
+
+    Args:
+        name: Name of the actor.
+        report: Its last report.
+        seconds: For how long it has not answered.
+    """
     hence = "its work is not done meanwhile"
     if "path" in report.values:
         hence = "what happens meanwhile may be missing in the recording"
@@ -60,7 +66,13 @@ def actor_silent(name: str, report: ActorReport, seconds: float) -> MissionError
 
 
 def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
-    """Error for the lost drone actor `name`; `report` is its last one, `frozen` in seconds."""
+    """Error for a lost drone actor.
+
+    Args:
+        name: Name of the actor.
+        report: Its last report.
+        frozen: Seconds for which the application did not run; 0 for none.
+    """
     robots = ", ".join(name.rpartition("/")[2].split("+"))
     if frozen:
         return MissionError(

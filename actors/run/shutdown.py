@@ -31,9 +31,14 @@ def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
 
 
 def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:
-    """Stop each group of actors in turn, then end the processes of all, including `helpers`.
+    """Stop each group of actors in turn, then end the processes of all.
 
-    Returns the final reports by handle, of the actors that answered.
+    Args:
+        groups: Actors that are stopped together.
+        helpers: Actors that are ended without a stop.
+
+    Returns:
+        The final reports by handle, of the actors that answered.
     """
     reports: dict[Any, ActorReport] = {}
     killed = list(helpers)

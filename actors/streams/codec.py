@@ -91,9 +91,14 @@ class Encoded:
         self.size = self._start + self._length
 
     def size_around(self, array: NDArray[np.uint8], room: int) -> int | None:
-        """Return the size that it has in a buffer that holds `array` from byte `room` on.
+        """Return the size that it has in a buffer that holds `array`.
 
-        None if its first buffer does not begin with `array`, or the rest has not enough room.
+        Args:
+            array: The first buffer of the message.
+            room: Byte of the buffer from which it holds `array`.
+
+        Returns:
+            None if its first buffer does not begin with `array`, or the rest has not enough room.
         """
         if not self._length or _LENGTHS.size + len(self._head) > room:
             return None
@@ -101,7 +106,13 @@ class Encoded:
         return room + self._length if _address(first) == _address(array) else None
 
     def write_into(self, target: memoryview, room: int = 0) -> None:
-        """Write all into `target`; not its first buffer, if that is there, from byte `room` on."""
+        """Write all into `target`.
+
+        Args:
+            target: Memory of its size.
+            room: Byte from which its first buffer is there, which is not written then; 0 if it is
+                not.
+        """
         start = room or self._start
         target[: _LENGTHS.size] = _LENGTHS.pack(*self._lengths, start)
         target[_LENGTHS.size : _LENGTHS.size + len(self._head)] = self._head

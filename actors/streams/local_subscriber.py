@@ -160,7 +160,12 @@ class LocalSubscriber:
             self._poll.register(one, select.EPOLLIN)
 
     def subscribe(self, stream: str, depth: int) -> None:
-        """Receive what is published on `stream` from now on, the newest `depth` at a time."""
+        """Receive what is published on `stream` from now on.
+
+        Args:
+            stream: Name of the stream.
+            depth: Newest messages received at a time, at most `MAX_DEPTH`.
+        """
         self._depths[stream] = min(depth, MAX_DEPTH)
         self._listener.announce(stream, self._depths[stream])
 

@@ -75,8 +75,14 @@ class Publisher:
     def picture_memory(self, height: int, width: int) -> NDArray[np.uint8]:
         """Memory for the picture of the next message, where its readers will look at it.
 
-        A `PictureMemory` of cameras: height x width x 3. It must not be written to once the message
-        is published.
+        It must not be written to once the message is published.
+
+        Args:
+            height: Pixels.
+            width: Pixels.
+
+        Returns:
+            A `PictureMemory` of cameras, (height, width, 3).
         """
         lent = None if self._local is None else self._local.reserve(height * width * 3)
         return own_memory(height, width) if lent is None else lent.reshape(height, width, 3)

@@ -84,7 +84,13 @@ class RemoteReader:
 
 
 def send_to(readers: list[RemoteReader], stream: str, encoded: Encoded) -> None:
-    """Send a message to every reader; its arrays are copied, because they may change soon."""
+    """Send a message to every reader; its arrays are copied, because they may change soon.
+
+    Args:
+        readers: The readers.
+        stream: Name of the stream.
+        encoded: The message.
+    """
     transfer = _Transfer(stream, encoded.to_bytes(), shared=len(readers) > 1)
     for reader in readers:
         reader.send(transfer)

@@ -69,7 +69,12 @@ class Listener:
         deaf.rename(path)
 
     def announce(self, stream: str, depth: int) -> None:
-        """Let publishers of `stream` find this socket: what they publish from now on arrives."""
+        """Let publishers of `stream` find this socket: what they publish from now on arrives.
+
+        Args:
+            stream: Name of the stream.
+            depth: Newest messages that are sent at a time.
+        """
         link = self._folder / _hashed(stream) / f"{self._id}.{depth}"
         _make_in(link.parent, lambda: link.symlink_to(f"../{self._id}"))
         self._links.append(link)

@@ -73,6 +73,15 @@ class SlotPool:
 
 
 def map_slot(fd: int, offset: int, capacity: int) -> NDArray[np.uint8]:
-    """Map a slot of a publisher's file for reading. Raises ValueError if the file has no such."""
+    """Map a slot of a publisher's file for reading.
+
+    Args:
+        fd: Descriptor of the file.
+        offset: Begin of the slot, bytes.
+        capacity: Size of the slot, bytes.
+
+    Raises:
+        ValueError: The file has no such slot.
+    """
     memory = mmap.mmap(fd, capacity, prot=mmap.PROT_READ, offset=offset)
     return np.frombuffer(memory, np.uint8)

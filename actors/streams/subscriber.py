@@ -98,7 +98,12 @@ class Subscriber:
         return messages
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Add a message from another node."""
+        """Add a message from another node.
+
+        Args:
+            stream: Name of the stream.
+            data: The encoded message.
+        """
         message = self._decoded(memoryview(data))
         with self._called:
             self._delivered[stream].append(message)

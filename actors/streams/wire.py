@@ -67,7 +67,12 @@ def waiting_bytes(far: socket.socket) -> int:
 
 
 def packet(connection: socket.socket, longest: int) -> bytes | None:
-    """Return the next packet, empty at the connection's end; None if there is none yet."""
+    """Return the next packet, empty at the connection's end; None if there is none yet.
+
+    Args:
+        connection: A socket of packets.
+        longest: Most bytes of a packet.
+    """
     try:
         return connection.recv(longest, socket.MSG_DONTWAIT)
     except BlockingIOError:
@@ -77,7 +82,16 @@ def packet(connection: socket.socket, longest: int) -> bytes | None:
 
 
 def send_descriptors(connection: socket.socket, name: str, *descriptors: int) -> None:
-    """Send open files or sockets. Raises OSError if the other end is gone or takes no more."""
+    """Send open files or sockets.
+
+    Args:
+        connection: A Unix socket.
+        name: What they are called.
+        *descriptors: The descriptors.
+
+    Raises:
+        OSError: The other end is gone or takes no more.
+    """
     rights = array.array("i", descriptors)
     connection.sendmsg(
         [name.encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, rights)], socket.MSG_NOSIGNAL
@@ -85,7 +99,12 @@ def send_descriptors(connection: socket.socket, name: str, *descriptors: int) ->
 
 
 def receive_descriptors(connection: socket.socket, count: int) -> tuple[str, list[int]] | None:
-    """Return `count` open descriptors that were sent, and their name; None for anything else."""
+    """Return `count` open descriptors that were sent, and their name; None for anything else.
+
+    Args:
+        connection: A Unix socket.
+        count: How many descriptors are expected.
+    """
     try:
         name, descriptors, _, _ = socket.recv_fds(
             connection, _LONGEST_NAME, count + 1, socket.MSG_CMSG_CLOEXEC
