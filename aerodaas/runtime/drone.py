@@ -116,6 +116,10 @@ class DroneNode(Node):
     def step(self, now: int, inputs: Sequence[Message[Any]]) -> Sequence[Message[Any]]:
         """Handle messages, and execute a cycle of the loop if one is due.
 
+        Args:
+            now: Mission clock, nanoseconds.
+            inputs: New messages, each stream's in order.
+
         Raises:
             Exception: What the loop of the only robot raises for a second.
         """

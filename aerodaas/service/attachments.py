@@ -50,7 +50,16 @@ class Attachments:
         """When an attached mission was told to end, by `time.monotonic`."""
 
     def check(self, principal: Principal, wanted: MissionIn) -> None:
-        """Raise RefusedError for what cannot be attached: by the provider, its owner or itself."""
+        """Check that a mission may be attached to the one that it names.
+
+        Args:
+            principal: The account that asks.
+            wanted: The submitted mission.
+
+        Raises:
+            RefusedError: The provider, the other mission's owner or the mission itself rules it
+                out.
+        """
         if self._most == 0:
             raise RefusedError(403, "this provider shares no cameras between applications")
         if wanted.lease is not None:
@@ -68,7 +77,12 @@ class Attachments:
             raise RefusedError(409, self._full(host))
 
     def shared(self, host: ActiveMission, tenant: str) -> list[str]:
-        """Running cameras of a flying mission to which a tenant may attach missions."""
+        """Running cameras of a flying mission to which a tenant may attach missions.
+
+        Args:
+            host: The flying mission.
+            tenant: Name of the tenant.
+        """
         if self._most == 0 or host.phase is not MissionPhase.FLYING or host.attached_to:
             return []
         # Without a link of its own: requests ask for this in any thread.
@@ -110,11 +124,22 @@ class Attachments:
             self._withdraw(host, active)
 
     def grant(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
-        """Let a tenant attach missions to these cameras; what it has attached to others ends."""
+        """Let a tenant attach missions to these cameras; what it has attached to others ends.
+
+        Args:
+            host: The mission whose cameras are shared.
+            tenant: Name of the tenant.
+            sensors: Full ids of the cameras; an empty list is all of them.
+        """
         self._grant(host, tenant, {**host.grants, tenant: sensors})
 
     def withdraw_grant(self, host: ActiveMission, tenant: str) -> None:
-        """Share nothing with a tenant any more, from the next picture on."""
+        """Share nothing with a tenant any more, from the next picture on.
+
+        Args:
+            host: The mission whose cameras were shared.
+            tenant: Name of the tenant.
+        """
         others = {name: cameras for name, cameras in host.grants.items() if name != tenant}
         self._grant(host, tenant, others)
 

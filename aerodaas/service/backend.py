@@ -37,11 +37,21 @@ class ShownMissions(Protocol):
         ...
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
-        """One mission with its newest state."""
+        """One mission with its newest state.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         ...
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """Ground below a mission on the map."""
+        """Ground below a mission on the map.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         ...
 
 
@@ -49,19 +59,46 @@ class Missions(ShownMissions, Protocol):
     """Missions that fly, and obey their pilots."""
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command; returns the drone's answer. Raises MissionError if it is lost."""
+        """Give a robot a command; returns the drone's answer.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+            command: The command, which names the robot.
+
+        Raises:
+            MissionError: The mission is lost.
+        """
         ...
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
-        """Raise RefusedError unless a mission flies and the account may command it."""
+        """Check that a mission flies and the account may command it.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+
+        Raises:
+            RefusedError: It does not fly, or the account may not.
+        """
         ...
 
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
-        """Environment of a flying mission that the account may command."""
+        """Environment of a flying mission that the account may command.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         ...
 
     def flies(self, principal: Principal, mission: str) -> bool:
-        """Whether a mission is the account's own, so that its presence counts."""
+        """Whether a mission is the account's own, so that its presence counts.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         ...
 
     def record_presence(self, mission: str) -> None:
@@ -79,7 +116,16 @@ class Missions(ShownMissions, Protocol):
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
-        """Items of a flying mission's stream; raises AeroDaaSError if there is none."""
+        """Items of a flying mission's stream.
+
+        Args:
+            mission: Id of the mission.
+            stream: Name of the stream.
+            form: Form of its pictures.
+
+        Raises:
+            AeroDaaSError: There is none.
+        """
         ...
 
 

@@ -60,7 +60,13 @@ class RepeatedErrorLog:
         self._logged: dict[str, str] = {}
 
     def log_error(self, subject: str, error: Exception, *, trace: bool = False) -> None:
-        """Log a subject's trouble, with its traceback if asked, unless it is known already."""
+        """Log a subject's trouble, unless it is known already.
+
+        Args:
+            subject: What has the trouble.
+            error: The trouble.
+            trace: Whether its traceback is logged.
+        """
         said = f"{type(error).__name__}: {error}"
         if self._logged.get(subject) != said:
             self._logged[subject] = said

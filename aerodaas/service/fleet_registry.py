@@ -131,7 +131,12 @@ class FleetRegistry:
                 )
 
     def set_link(self, robots: Iterable[str], link: LinkState) -> None:
-        """Note that drones are a mission's from now on, or nobody's."""
+        """Note that drones are a mission's from now on, or nobody's.
+
+        Args:
+            robots: Ids of the drones.
+            link: State of their link.
+        """
         with self._lock:
             for name in robots:
                 self._reports[name] = VehicleReport(link=link, since=time.time())
@@ -167,7 +172,15 @@ class FleetRegistry:
             self._change(name, enabled=False)
 
     def enable(self, robot: str, *, enabled: bool) -> RobotState:
-        """Put a drone into service or out of it; raises RefusedError if there is none."""
+        """Put a drone into service or out of it.
+
+        Args:
+            robot: Id of the drone.
+            enabled: Whether it is in service.
+
+        Raises:
+            RefusedError: There is no such drone.
+        """
         if robot not in self._states:
             raise RefusedError(404, f"there is no robot {robot}")
         return self._change(robot, enabled=enabled)

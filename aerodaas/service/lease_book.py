@@ -33,6 +33,10 @@ __all__ = [
 def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
     """Refuse what this fleet cannot fulfil however long one waits.
 
+    Args:
+        wish: What is asked for.
+        fleet: Drones of the provider, by id.
+
     Raises:
         RefusedError: With status 404, 409 or 422; see `LeaseBook.request`.
     """
@@ -53,7 +57,16 @@ def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
 def lease_of(
     wish: LeaseIn, *, id_: str, number: int, tenant: str, account: str, now: float
 ) -> Lease:
-    """A wish as a queued lease."""
+    """A wish as a queued lease.
+
+    Args:
+        wish: What is asked for.
+        id_: Id of the lease.
+        number: Number by which leases are ordered.
+        tenant: Tenant that asks.
+        account: Account that asks.
+        now: When it is asked, Unix time, seconds.
+    """
     return Lease(
         id=id_,
         number=number,
@@ -112,6 +125,13 @@ def waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
     """Robots that a queued lease could use now, were they all free.
 
     All of those that it names, if each can be flown; or each one that fits.
+
+    Args:
+        lease: The queued lease.
+        fleet: Drones of the provider, by id.
+
+    Returns:
+        All of those that it names, if each can be flown; or each one that fits.
     """
     if not lease.wanted:
         return frozenset(id_ for id_, robot in fleet.items() if _fits(lease, robot))
@@ -120,7 +140,12 @@ def waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
 
 
 def distance(lease: Lease, robot: Candidate) -> float:
-    """Metres from where a lease wants any drone; infinity if it is not known where this one is."""
+    """Metres from where a lease wants any drone; infinity if it is not known where this one is.
+
+    Args:
+        lease: The lease, with the place that it wants a drone near to.
+        robot: The drone.
+    """
     return math.inf if robot.position is None else math.dist(robot.position, lease.near)
 
 
@@ -138,7 +163,12 @@ MINUTE = 60.0
 
 
 def expired(live: Iterable[Lease], now: float) -> list[Lease]:
-    """Leases whose time is over, as ended."""
+    """Leases whose time is over, as ended.
+
+    Args:
+        live: Leases that have not ended.
+        now: Unix time, seconds.
+    """
     return [
         replace(
             lease,
@@ -191,7 +221,13 @@ def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
 
 
 def is_waited_for(held: Lease, live: Iterable[Lease], fleet: Fleet) -> bool:
-    """Whether a queued lease waits for a robot that `held` holds."""
+    """Whether a queued lease waits for a robot that `held` holds.
+
+    Args:
+        held: The lease that holds robots.
+        live: Leases that have not ended.
+        fleet: Drones of the provider, by id.
+    """
     return any(
         lease.state is LeaseState.QUEUED and not waited_for(lease, fleet).isdisjoint(held.robots)
         for lease in live
@@ -342,13 +378,24 @@ class LeaseBook:
     def give_back(self, id_: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End a queued or granted lease at its tenant's wish.
 
+        Args:
+            id_: Id of the lease.
+            now: Unix time, seconds.
+            fleet: Drones of the provider, by id.
+
         Raises:
             RefusedError: With status 404 for a lease that is unknown or has ended.
         """
         return self._end(id_, LeaseEnd.GIVEN_BACK, "given back", now, fleet)
 
     def revoke(self, id_: str, reason: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
-        """End a queued or granted lease at an operator's wish, or a policy's, with the reason.
+        """End a queued or granted lease at an operator's wish, or a policy's.
+
+        Args:
+            id_: Id of the lease.
+            reason: Why, as the tenant reads it.
+            now: Unix time, seconds.
+            fleet: Drones of the provider, by id.
 
         Raises:
             RefusedError: With status 404 for a lease that is unknown or has ended.
@@ -359,6 +406,10 @@ class LeaseBook:
         """End what is over, and grant what has become free; call it every second or so.
 
         While the database fails, ends are returned, and grants wait.
+
+        Args:
+            now: Unix time, seconds.
+            fleet: Drones of the provider, by id.
         """
         with self._lock:
             self._settle(now, fleet)
@@ -384,14 +435,24 @@ class LeaseBook:
         return self._live.get(id_)
 
     def holder(self, robot: str, now: float) -> Lease | None:
-        """The granted lease that holds a robot now; None if it is free."""
+        """The granted lease that holds a robot now; None if it is free.
+
+        Args:
+            robot: Id of the robot.
+            now: Unix time, seconds.
+        """
         for lease in self.live():
             if robot in lease.robots and lease.ends is not None and now < lease.ends:
                 return lease
         return None
 
     def committed(self, tenant: str, now: float) -> float:
-        """Minutes, times robots, that a tenant's leases hold from now on or wait for."""
+        """Minutes, times robots, that a tenant's leases hold from now on or wait for.
+
+        Args:
+            tenant: Name of the tenant.
+            now: Unix time, seconds.
+        """
         total = 0.0
         for lease in self.live():
             if lease.tenant == tenant:

@@ -102,7 +102,18 @@ class LeaseService:
                 write_private(self._clock_file, _OFFSET.dump_json(self._offset))
 
     def request(self, principal: Principal, wish: LeaseIn) -> Lease:
-        """Ask for drones; raises RefusedError, also for a quota that is used up."""
+        """Ask for drones.
+
+        Args:
+            principal: The account that asks.
+            wish: What is asked for.
+
+        Returns:
+            The lease, granted or queued.
+
+        Raises:
+            RefusedError: It cannot be fulfilled, or a quota is used up.
+        """
         now = self.now()
         self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
         lease, changed = self._book.request(
@@ -112,9 +123,15 @@ class LeaseService:
         return self.lease(lease.id)
 
     def require_quota(self, tenant: str, minutes: float, *, cloud: bool = False) -> None:
-        """Raise RefusedError if a tenant may not have another `minutes`, times robots.
+        """Check that a tenant may have further flight.
 
-        `cloud` is whether what flies may call it.
+        Args:
+            tenant: Name of the tenant.
+            minutes: Minutes, times robots.
+            cloud: Whether what flies may call the cloud.
+
+        Raises:
+            RefusedError: A quota is used up.
         """
         now = self.now()
         committed = self._book.committed(tenant, now)
@@ -133,7 +150,16 @@ class LeaseService:
         return self.lease(lease.id)
 
     def require(self, principal: Principal, lease: str, robots: Collection[str]) -> None:
-        """Raise RefusedError unless a lease is the tenant's, goes on, and has these robots."""
+        """Check that a lease is the tenant's, goes on, and has these robots.
+
+        Args:
+            principal: The account that asks.
+            lease: Id of the lease.
+            robots: Ids of the robots.
+
+        Raises:
+            RefusedError: It is not.
+        """
         found = self._own(principal, lease)
         if found.state is LeaseState.ENDED:
             raise RefusedError(409, f"the lease {lease} has ended: {found.reason}")
@@ -147,7 +173,15 @@ class LeaseService:
         return self._book.get(lease) or self._store.leases.require(lease)
 
     def seen(self, principal: Principal, lease: str) -> Lease:
-        """A lease that this account may see; raises RefusedError for any other."""
+        """A lease that this account may see.
+
+        Args:
+            principal: The account that asks.
+            lease: Id of the lease.
+
+        Raises:
+            RefusedError: It is another one.
+        """
         found = self.lease(lease)
         if not sees(principal, found.tenant):
             raise RefusedError(404, f"there is no lease {lease}")
@@ -162,7 +196,16 @@ class LeaseService:
         return [one for one in self._book.live() if one.state is LeaseState.GRANTED]
 
     def extend(self, principal: Principal, lease: str, minutes: float) -> Lease:
-        """Let a lease end later; raises RefusedError."""
+        """Let a lease end later.
+
+        Args:
+            principal: The account that asks.
+            lease: Id of the lease.
+            minutes: By how much.
+
+        Raises:
+            RefusedError: The lease or the quota does not allow it.
+        """
         found, now = self._own(principal, lease), self.now()
         committed = self._book.committed(found.tenant, now)
         left = self._quotas.left(found.tenant, now, committed)
@@ -175,7 +218,15 @@ class LeaseService:
         return extended
 
     def end(self, principal: Principal, lease: str) -> Lease:
-        """Give a lease back, or revoke another tenant's as an operator; drones come home."""
+        """Give a lease back, or revoke another tenant's as an operator; drones come home.
+
+        Args:
+            principal: The account that asks.
+            lease: Id of the lease.
+
+        Raises:
+            RefusedError: The account may do neither.
+        """
         found = self.seen(principal, lease)
         if found.tenant == principal.tenant and principal.role.reaches(Role.PILOT):
             changed = self._book.give_back(lease, self.now(), self._fleet())

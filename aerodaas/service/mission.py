@@ -105,7 +105,13 @@ class ActiveMission:
         return self.phase.over
 
     def set_phase(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
-        """Change the phase, and what else changes with it."""
+        """Change the phase, and what else changes with it.
+
+        Args:
+            phase: The next phase.
+            reason: Why.
+            **changes: Further columns of its row.
+        """
         assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
         self.change(phase=phase, reason=reason, **changes)
 
@@ -140,7 +146,12 @@ class ActiveMission:
         return self._rehearsing is None and self.rehearsal.outcome() is None
 
     def rehearse(self, order: FlightOrder, models: ModelStore) -> None:
-        """Start the rehearsal, in place of what one of a former service has left."""
+        """Start the rehearsal, in place of what one of a former service has left.
+
+        Args:
+            order: Order of the flight.
+            models: Models of the tenants.
+        """
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
         self._prepare(self.rehearsal, order, models)
@@ -176,7 +187,12 @@ class ActiveMission:
             process.wait()
 
     def prepare_flight(self, order: FlightOrder, models: ModelStore) -> None:
-        """Write down the flight's order, before anything of it begins."""
+        """Write down the flight's order, before anything of it begins.
+
+        Args:
+            order: Order of the flight.
+            models: Models of the tenants.
+        """
         self._prepare(self.flight, order, models)
         self._known_lease = FlightLeaseIn(ends=order.ends)
 
@@ -318,7 +334,13 @@ def shown(active: ActiveMission) -> MissionOut:
 
 
 def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
-    """Usage of a mission that is over."""
+    """Usage of a mission that is over.
+
+    Args:
+        mission: The mission.
+        outcome: Outcome of its flight.
+        recording: File of its recording; one that is missing takes no storage.
+    """
     return Usage(
         mission=mission.id,
         tenant=mission.tenant,

@@ -122,8 +122,14 @@ class MissionService:
     ) -> MissionOut:
         """Take a mission in, or find the one that was submitted before with the same `key`.
 
-        Raises RefusedError, with the reason, for one that cannot be flown here, and with status
-        422 for another one than was submitted with this key.
+        Args:
+            principal: The account that asks.
+            submission: The document, and its lease or the mission that it is attached to.
+            key: Idempotency key; None for none.
+
+        Raises:
+            RefusedError: It cannot be flown here; with status 422 for another one than was
+                submitted with this key.
         """
         # First: what was taken in has used up its quota and its lease.
         earlier = self._submitted(principal, submission, key)
@@ -197,7 +203,12 @@ class MissionService:
         return self._with_state(row)
 
     def approve(self, principal: Principal, mission: str) -> MissionOut:
-        """Approve a mission that waits for it."""
+        """Approve a mission that waits for it.
+
+        Args:
+            principal: The account that approves.
+            mission: Id of the mission.
+        """
         with self._lock:
             active = self._open(mission)
             if active.phase is not MissionPhase.AWAITING_APPROVAL:
@@ -208,7 +219,12 @@ class MissionService:
             return shown(active)
 
     def cancel(self, principal: Principal, mission: str) -> MissionOut:
-        """Cancel a mission; drones in flight come home first."""
+        """Cancel a mission; drones in flight come home first.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         self._require_own(principal, mission)
         with self._lock:
             active = self._open(mission)
@@ -222,23 +238,52 @@ class MissionService:
         return shown(active)
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot of a flying mission a command; raises MissionError if it is lost."""
+        """Give a robot of a flying mission a command.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+            command: The command, which names the robot.
+
+        Raises:
+            MissionError: The mission is lost.
+        """
         # Without the lock, which may be held for long: a drone that is to come home comes home.
         link = self._flown(principal, mission).follow()
         return link.fly(command, operator=principal.role.reaches(Role.OPERATOR))
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
-        """Raise RefusedError unless a mission flies and this account may command it."""
+        """Check that a mission flies and this account may command it.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+
+        Raises:
+            RefusedError: It does not fly, or the account may not.
+        """
         self._flown(principal, mission)
 
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
-        """The environment of a mission that flies and that this account may command."""
+        """The environment of a mission that flies and that this account may command.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         return environment_of(FlightOrder.read(self._flown(principal, mission).flight.order))
 
     def grant(
         self, principal: Principal, mission: str, tenant: str, sensors: list[str] | None
     ) -> MissionOut:
-        """Let a tenant attach missions to a mission's cameras; none at all for `sensors` None."""
+        """Let a tenant attach missions to a mission's cameras.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+            tenant: Tenant that may attach.
+            sensors: Full ids of the cameras; None for none at all.
+        """
         self._require_own(principal, mission)
         with self._lock:
             active = self._open(mission)
@@ -249,7 +294,12 @@ class MissionService:
             return shown(active)
 
     def shared(self, robot: str, tenant: str) -> tuple[str | None, list[str]]:
-        """The mission that flies a robot, and its cameras that a tenant may attach missions to."""
+        """The mission that flies a robot, and its cameras that a tenant may attach missions to.
+
+        Args:
+            robot: Id of the robot.
+            tenant: Tenant that would attach.
+        """
         host = next((active for active in self._flying() if robot in active.row.robots), None)
         if host is None:
             return None, []
@@ -271,7 +321,12 @@ class MissionService:
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; its own user counts as present.
 
-        Raises RefusedError for any other mission.
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+
+        Raises:
+            RefusedError: It is another mission.
         """
         found = shown(self._seen(principal, mission))
         if _is_user(principal, found):
@@ -279,7 +334,12 @@ class MissionService:
         return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """Ground below a mission that this account may see."""
+        """Ground below a mission that this account may see.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         seed = self._seen(principal, mission).row.request.get("seed")
         return SceneryOut.of(self._settings.config, seed)
 
@@ -323,13 +383,25 @@ class MissionService:
         return -1 if active is None else active.version
 
     def flies(self, principal: Principal, mission: str) -> bool:
-        """Whether a mission is this account's own, so that its presence counts."""
+        """Whether a mission is this account's own, so that its presence counts.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+        """
         return _is_user(principal, self.shown(mission))
 
     def require_users_side(self, principal: Principal, mission: str) -> None:
-        """Raise RefusedError unless this account may answer for a mission's user.
+        """Check that this account may answer for a mission's user.
 
         It sees what the mission sees and steers it: its token must be as good as for submitting.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+
+        Raises:
+            RefusedError: It may not.
         """
         active = self._seen(principal, mission)
         if active.row.tenant != principal.tenant:
@@ -347,7 +419,16 @@ class MissionService:
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
-        """Items of a flying mission's stream; raises AeroDaaSError if there is none."""
+        """Items of a flying mission's stream.
+
+        Args:
+            mission: Id of the mission.
+            stream: Name of the stream.
+            form: Form of its pictures.
+
+        Raises:
+            AeroDaaSError: There is none.
+        """
         with self._lock:
             active = self._open(mission)
             if active.phase is not MissionPhase.FLYING:
@@ -370,7 +451,16 @@ class MissionService:
         return None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
-        """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
+        """The recording or the rehearsal's picture of a mission.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+            name: `recording` or `picture`.
+
+        Raises:
+            RefusedError: There is none.
+        """
         active = self._seen(principal, mission)
         files = {"recording": active.flight.recording, "picture": active.rehearsal.picture}
         if not files[name].is_file() or (name == "recording" and not active.over):
@@ -378,7 +468,15 @@ class MissionService:
         return files[name]
 
     def delete_recording(self, principal: Principal, mission: str) -> None:
-        """Remove the recording of a mission that is over; raises RefusedError."""
+        """Remove the recording of a mission that is over.
+
+        Args:
+            principal: The account that asks.
+            mission: Id of the mission.
+
+        Raises:
+            RefusedError: The mission is another tenant's, goes on, or has no recording.
+        """
         self._require_own(principal, mission)
         self.file(principal, mission, "recording").unlink(missing_ok=True)
         # A flight whose process was killed has told of no usage.

@@ -61,7 +61,12 @@ class ModelStore:
         }
 
     def has(self, tenant: str, sha256: str) -> bool:
-        """Whether a tenant has a model here, brought or shipped; one that is asked for is used."""
+        """Whether a tenant has a model here, brought or shipped; one that is asked for is used.
+
+        Args:
+            tenant: Name of the tenant.
+            sha256: SHA-256 of the model, hexadecimal.
+        """
         path = self._path(tenant, sha256)
         if sha256 in self._shipped:
             return True
@@ -74,8 +79,15 @@ class ModelStore:
     def put(self, tenant: str, sha256: str, content: bytes) -> None:
         """Keep a tenant's model, for which its longest unused ones go if need be.
 
-        Raises ConfigError if it is too large or not the one that it is called, or takes too much
-        to be run; RefusedError if there is no room.
+        Args:
+            tenant: Name of the tenant.
+            sha256: SHA-256 of the model, hexadecimal.
+            content: The ONNX file.
+
+        Raises:
+            ConfigError: It is too large or not the one that it is called, or takes too much to be
+                run.
+            RefusedError: There is no room.
         """
         if len(content) > RequestLimits.model_bytes:
             raise ConfigError(f"a model has at most {RequestLimits.model_bytes >> 20} MiB")
@@ -98,7 +110,13 @@ class ModelStore:
     def link_models(self, tenant: str, document: MissionDocument, folder: Path) -> None:
         """Put a tenant's models into `folder` as its document names them.
 
-        Raises ConfigError for a missing one.
+        Args:
+            tenant: Name of the tenant.
+            document: The mission document.
+            folder: Folder of a flight's models.
+
+        Raises:
+            ConfigError: A model is missing.
         """
         for sha256 in sorted(set(_named(document.model_dump()))):
             if not self.has(tenant, sha256):

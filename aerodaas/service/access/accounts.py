@@ -63,7 +63,12 @@ def digest_of(secret: str) -> str:
 
 
 def fits(secret: str, digest: str) -> bool:
-    """Whether a secret is the one of a digest; compared in constant time."""
+    """Whether a secret is the one of a digest; compared in constant time.
+
+    Args:
+        secret: The secret, as it was sent.
+        digest: As `digest_of` makes it.
+    """
     return hmac.compare_digest(digest_of(secret), digest)
 
 
@@ -163,6 +168,12 @@ class Accounts:
         disabled: bool | None = None,
     ) -> AccountOut:
         """Change what is not None; its tokens obey at once.
+
+        Args:
+            name: Name of the account.
+            role: Its new role.
+            scopes: Its new scopes.
+            disabled: Whether it is disabled.
 
         Raises:
             RefusedError: With status 404 for an unknown account; 409 if no administrator would

@@ -92,12 +92,23 @@ class Audit:
                     self._store.audit.trim(number - self._most + 1)
 
     def note_answer(self, who: Principal, action: str, target: str, answer: Answer) -> None:
-        """Write what a drone answered to a command: nobody in the air waits for a disk."""
+        """Write what a drone answered to a command: nobody in the air waits for a disk.
+
+        Args:
+            who: The account that gave the command.
+            action: Name of the command.
+            target: What it was given to.
+            answer: What the drone said.
+        """
         said, accepted = answer.text, answer.accepted
         self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)
 
     def newest(self, limit: int = 100, tenant: str | None = None) -> list[AuditOut]:
-        """The newest entries of a tenant, or of all, newest first; at most 1000.
+        """The newest entries of a tenant, or of all, newest first.
+
+        Args:
+            limit: Most entries, 0 to 1000.
+            tenant: Name of the tenant; None for all.
 
         Raises:
             StoreError: If the database does not answer.

@@ -30,7 +30,15 @@ _DISCOVERY = "/.well-known/openid-configuration"
 
 
 def require_secure(url: str, what: str) -> None:
-    """Raise ConfigError unless `url` is https, or http on this machine: keys must not be forged."""
+    """Check that `url` is https, or http on this machine: keys must not be forged.
+
+    Args:
+        url: The address.
+        what: What it is the address of, for the error.
+
+    Raises:
+        ConfigError: The address is another one, or a proxy would be asked.
+    """
     parts = urlsplit(url)
     secure = parts.scheme == "https" or (
         parts.scheme == "http" and is_loopback(parts.hostname or "")

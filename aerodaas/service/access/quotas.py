@@ -63,10 +63,15 @@ class Quotas:
         *,
         cloud: bool = False,
     ) -> QuotasLeft:
-        """Check that a tenant may have another `minutes`, times robots, of flight.
+        """Check that a tenant may have further flight.
 
-        Calls of the `cloud` that are used up refuse only a mission that may need it; one that has
-        begun goes on.
+        Args:
+            tenant: Name of the tenant.
+            minutes: Minutes, times robots.
+            now: Unix time, seconds.
+            committed: Minutes, times robots, that its leases hold or wait for.
+            cloud: Whether a mission may call the cloud, for which its calls must not be used up;
+                one that has begun goes on.
 
         Returns:
             What is left, without these minutes.

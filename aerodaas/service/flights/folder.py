@@ -80,7 +80,12 @@ class FlightFolder:
         self._outcome = self.path / "outcome.json"
 
     def make(self, order: FlightOrder, document: str) -> None:
-        """Create the folder with an order and the text of a document, for this user alone."""
+        """Create the folder, for this user alone.
+
+        Args:
+            order: The flight's order.
+            document: Text of the mission document.
+        """
         self.models.mkdir(parents=True, exist_ok=True, mode=0o700)
         write_private(self.document, document)
         write_private(self.order, order.model_dump_json(indent=2))
@@ -165,9 +170,12 @@ def service_free_environment(*, vehicles: bool) -> dict[str, str]:
 def start_process(folder: FlightFolder, *, tied: bool, vehicles: bool) -> subprocess.Popen[bytes]:
     """Start the process of the order in `folder`, in a session of its own.
 
-    A flight goes on when the service ends, and Ctrl-C at the service's terminal does not reach
-    it. A rehearsal is `tied`: it ends with the service, whatever ends that (see `tie`). Only what
-    is connected with `vehicles` gets their secrets.
+    A flight goes on when the service ends, and Ctrl-C at the service's terminal does not reach it.
+
+    Args:
+        folder: The folder of the flight or rehearsal.
+        tied: Whether it ends with the service, whatever ends that (see `tie`), as a rehearsal does.
+        vehicles: Whether it connects with vehicles, and gets their secrets.
     """
     with folder.log.open("ab") as log:
         return subprocess.Popen(  # noqa: S603 - our own module

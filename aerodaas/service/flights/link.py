@@ -70,7 +70,10 @@ _PATHS: dict[type[PilotCommand], str] = {
 def flight_address(path: str, role: Role, **query: str | float) -> dict[str, Any]:
     """Arguments of `unix_connect` for a WebSocket of a flight's mission, beside its socket.
 
-    The role is that as which the service asks: whoever can open the socket is the service.
+    Args:
+        path: Path of the WebSocket below the mission.
+        role: Role as which the service asks: whoever can open the socket is the service.
+        **query: Parameters of the address.
     """
     more = f"?{urlencode(query)}" if query else ""
     return {
@@ -128,11 +131,16 @@ class FlightLink:
     def fly(self, command: PilotCommand, *, operator: bool) -> Answer:
         """Give a robot a command; returns its answer, or why the flight refuses it.
 
-        Those of users wait for none of an operator's and the service's own; these wait for none
-        of users', for what a drone does not answer takes long.
+        Those of users wait for none of an operator's and the service's own; these wait for none of
+        users', for what a drone does not answer takes long. A command that was sent is not sent
+        again, for it may have been carried out.
 
-        Raises MissionError if the flight cannot be reached, or has too many to answer; a command
-        that was sent is not sent again, for it may have been carried out.
+        Args:
+            command: The command, which names the robot.
+            operator: Whether an operator or the service gives it.
+
+        Raises:
+            MissionError: The flight cannot be reached, or has too many commands to answer.
         """
         path = _PATHS[type(command)]
         if operator:
@@ -145,7 +153,12 @@ class FlightLink:
         return self._answered("PUT", "lease", lease)
 
     def share(self, mission: str, sensors: list[str]) -> Answer:
-        """Have the flight share these cameras with an attached mission, and no others."""
+        """Have the flight share these cameras with an attached mission, and no others.
+
+        Args:
+            mission: Id of the attached mission.
+            sensors: Full ids of the cameras.
+        """
         return self._answered("PUT", f"shares/{mission}", GrantIn(sensors=sensors))
 
     def withdraw(self, mission: str) -> Answer:
@@ -215,7 +228,12 @@ class FlightLink:
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
         """Yield a stream's items until the flight is over; an empty message a while without any.
 
-        Its pictures come in a form. Raises MissionError if the flight is lost.
+        Args:
+            stream: Name of the stream.
+            form: Form of its pictures.
+
+        Raises:
+            MissionError: The flight is lost.
         """
         try:
             query = {"rate": _ITEMS_RATE, "streams": stream, "pictures": form.value}

@@ -192,9 +192,15 @@ class FlightOrders:
     def check(
         self, principal: Principal, document: MissionDocument, *, attached: bool = False
     ) -> list[str]:
-        """Robots that a document flies, none for one that is `attached` to another mission.
+        """Robots that a document flies, none for one that is attached to another mission.
 
-        Raises RefusedError for what cannot be had here.
+        Args:
+            principal: The account that asks.
+            document: The mission document.
+            attached: Whether it is attached.
+
+        Raises:
+            RefusedError: The document asks for what cannot be had here.
         """
         config = self._settings.config
         robots = robots_of(document)
@@ -225,7 +231,15 @@ class FlightOrders:
         return any(entry.compute in elsewhere for entry in document.analyses)
 
     def require_scopes(self, principal: Principal, document: MissionDocument) -> None:
-        """Raise RefusedError for a token not good for what a document senses and computes."""
+        """Check that a token is good for what a document senses and computes.
+
+        Args:
+            principal: The account that asks.
+            document: The mission document.
+
+        Raises:
+            RefusedError: The token lacks a role or a scope.
+        """
         cameras = {
             sensor.full_id
             for sensor in self._settings.config.all_sensors()
@@ -279,11 +293,21 @@ class FlightOrders:
         )
 
     def flight(self, mission: Mission, lease: Lease) -> FlightOrder:
-        """The order of a mission's flight under a granted lease."""
+        """The order of a mission's flight under a granted lease.
+
+        Args:
+            mission: The mission.
+            lease: The lease, which is granted.
+        """
         return self._order(mission, lease.id, lease)
 
     def attached(self, mission: Mission, to: HostFlight) -> FlightOrder:
-        """The order of a mission that senses by the cameras of another one, in real time."""
+        """The order of a mission that senses by the cameras of another one, in real time.
+
+        Args:
+            mission: The mission.
+            to: The flight whose cameras it uses.
+        """
         order = self._order(mission, "attached", None)
         return order.model_copy(update={"attached": to, "speed": 1.0, "address": None})
 

@@ -82,7 +82,12 @@ class SharedCamera:
             raise SourceError(f"{settings.stream}: its flight does not answer: {error}") from None
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the flight's newest picture; None if there is no new one."""
+        """Return the flight's newest picture; None if there is no new one.
+
+        Args:
+            stamp: Mission clock, nanoseconds; the picture's age is subtracted.
+            pose: Ignored.
+        """
         del pose
         frame = self._next_frame()
         if frame is None:
@@ -126,6 +131,11 @@ def attached_config(
     """The environment of a mission that senses only: the shared cameras, and nothing that flies.
 
     The vehicles' drivers and settings are left out; nobody makes a vehicle of them.
+
+    Args:
+        config: The provider's environment.
+        attached: The flight whose cameras are shared.
+        mission: Id of the attached mission.
     """
     content = config.model_dump(by_alias=True)
 

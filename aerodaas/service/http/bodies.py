@@ -27,7 +27,12 @@ _parsing = ThreadPoolExecutor(1, "parsing")
 
 
 def api_router(prefix: str, tag: str) -> APIRouter:
-    """Make a router of HTTP routes below `prefix`, whose bodies are bounded."""
+    """Make a router of HTTP routes whose bodies are bounded.
+
+    Args:
+        prefix: Path below which they lie.
+        tag: Tag of the routes in the schema.
+    """
     return APIRouter(
         prefix=prefix,
         tags=[tag],

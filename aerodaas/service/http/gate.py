@@ -68,7 +68,15 @@ class Tokens(Protocol):
     """Tokens that are good, and whose they are."""
 
     def of(self, token: str, address: str) -> Principal:
-        """Account of a `token` from an `address`; raises RefusedError for a wrong one."""
+        """Account of a token.
+
+        Args:
+            token: As it was sent.
+            address: Address of the sender.
+
+        Raises:
+            RefusedError: The token is wrong.
+        """
         ...
 
 
@@ -110,7 +118,12 @@ class Admission:
     def identify(
         self, connection: HTTPConnection, count: Callable[[str], None] = lambda _: None
     ) -> Principal:
-        """As `admit`, in this thread; without `count` it is no further request."""
+        """As `admit`, in this thread.
+
+        Args:
+            connection: The request.
+            count: Counts a request of the account; by default it is no further request.
+        """
         address = address_of(connection.scope)
         principal: Principal | None = None
         try:
@@ -133,7 +146,13 @@ class Admission:
     ) -> bool:
         """Whether the sender of a request that lasts still may have it; counts as no further one.
 
-        `look` raises RefusedError for who may not. The service's own errors refuses nobody.
+        An error of the service's own refuses nobody.
+
+        Args:
+            connection: The request.
+            role: Least role that it needs.
+            scope: Scope that it needs; None for none.
+            look: Raises RefusedError for who may not.
         """
         token, address = bearer(connection.headers), address_of(connection.scope)
         try:
@@ -149,7 +168,16 @@ class Admission:
     def require(
         self, connection: HTTPConnection, role: Role, scope: Scope | None = None
     ) -> Principal:
-        """The sender of a request; raises RefusedError if they may not do this."""
+        """The sender of a request.
+
+        Args:
+            connection: The request.
+            role: Least role that it needs.
+            scope: Scope that it needs; None for none.
+
+        Raises:
+            RefusedError: The sender may not do this.
+        """
         principal: Principal = connection.scope[_SENDER]
         with self.auditing(principal, connection):
             require(principal, role, scope)
@@ -157,7 +185,12 @@ class Admission:
 
     @contextmanager
     def auditing(self, principal: Principal, connection: HTTPConnection) -> Iterator[None]:
-        """Audit what is refused to the sender of a request meanwhile."""
+        """Audit what is refused to the sender of a request meanwhile.
+
+        Args:
+            principal: The sender.
+            connection: The request.
+        """
         try:
             yield
         except RefusedError as error:
@@ -165,7 +198,14 @@ class Admission:
             raise
 
     def note_answer(self, principal: Principal, action: str, target: str, answer: Answer) -> None:
-        """Audit what a drone answered to a command."""
+        """Audit what a drone answered to a command.
+
+        Args:
+            principal: The account that gave the command.
+            action: Name of the command.
+            target: What it was given to.
+            answer: What the drone said.
+        """
         if self._audit is not None:
             self._audit.note_answer(principal, action, target, answer)
 

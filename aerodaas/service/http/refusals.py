@@ -53,7 +53,13 @@ def register_refusals(app: FastAPI) -> None:
 
 
 async def refuse(scope: Scope, send: Send, error: Exception) -> None:
-    """Refuse a request, or a WebSocket that is not accepted yet, with its status and reason."""
+    """Refuse a request, or a WebSocket that is not accepted yet, with its status and reason.
+
+    Args:
+        scope: ASGI's scope of the request.
+        send: ASGI's channel to its sender.
+        error: Why, which decides the status.
+    """
     status, text, pause = int(HTTPStatus.UNPROCESSABLE_ENTITY), str(error), None
     if isinstance(error, RefusedError):
         status = error.status

@@ -48,7 +48,12 @@ class Freshness:
         self._least = float("inf")
 
     def is_fresh(self, sent: float, received: float) -> bool:
-        """Whether a message of these moments, each in seconds of its own clock, is obeyed."""
+        """Whether a message is obeyed.
+
+        Args:
+            sent: When it was sent, in seconds of the sender's clock.
+            received: When it was received, in seconds of our clock.
+        """
         self._least = min(self._least, received - sent)
         return received - sent - self._least <= _STALE_SECONDS
 

@@ -128,6 +128,11 @@ class StreamHub:
         """Begin to watch a stream, its pictures in a form; `leave` ends it.
 
         All watchers are of one event loop, in which this is called.
+
+        Args:
+            mission: Id of the mission.
+            stream: Name of the stream.
+            form: Form of its pictures.
         """
         watcher, key = Watcher(), (mission, stream, form)
         with self._lock:
@@ -143,7 +148,14 @@ class StreamHub:
     def remove_watcher(
         self, mission: str, stream: str, form: PictureForm, watcher: Watcher
     ) -> None:
-        """End watching; the stream is read until its last watcher has left."""
+        """End watching; the stream is read until its last watcher has left.
+
+        Args:
+            mission: Id of the mission.
+            stream: Name of the stream.
+            form: Form of its pictures.
+            watcher: Who leaves.
+        """
         with self._lock:
             source = self._sources.get((mission, stream, form))
             if source is not None:

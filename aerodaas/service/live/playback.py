@@ -119,7 +119,12 @@ class Players:
         self._open: OrderedDict[str, Player] = OrderedDict()
 
     def of(self, mission: str, path: Path) -> Player:
-        """The player of a mission's recording, which lies at `path`."""
+        """The player of a mission's recording.
+
+        Args:
+            mission: Id of the mission.
+            path: File of the recording.
+        """
         with self._lock:
             known = self._open.get(mission)
             if known is None:

@@ -36,10 +36,16 @@ class SurveyPlanner:
     def plan(
         self, wanted: SurveyIn, config: EnvironmentConfig, status: StatusOut | None
     ) -> SurveyOut:
-        """Plan a survey by a robot of `config`, whose newest status is `status`.
+        """Plan a survey by a robot.
 
-        Raises MissionError for a robot that does not fly and while other surveys are planned,
-        SchedulerError for a survey that cannot be flown.
+        Args:
+            wanted: Area and settings of the survey, and the robot.
+            config: Environment of the mission.
+            status: Newest status of the robot; None if it does not fly.
+
+        Raises:
+            MissionError: The robot does not fly, or other surveys are planned.
+            SchedulerError: The survey cannot be flown.
         """
         robot = next((one for one in config.robots if one.id == wanted.robot), None)
         if robot is None or status is None:

@@ -23,7 +23,12 @@ REMOTE = "remote"
 
 
 def principal_of(account: str, role: Role) -> Principal:
-    """Make the account of a token; who watches only may have pictures, and no more."""
+    """Make the account of a token; who watches only may have pictures, and no more.
+
+    Args:
+        account: Name of the account.
+        role: Its role.
+    """
     scopes = frozenset({Scope.SENSE}) if role is Role.VIEWER else frozenset(Scope)
     return Principal(account=account, tenant=OWN, role=role, scopes=scopes, token=account)
 
@@ -76,7 +81,15 @@ class FlightTokens:
         return next(token for token, who in self._tokens.items() if who.role is role)
 
     def of(self, token: str, address: str) -> Principal:
-        """Account of a token; raises RefusedError for a wrong one, from an `address`."""
+        """Account of a token.
+
+        Args:
+            token: As it was sent.
+            address: Address of the sender, by which wrong tokens are counted.
+
+        Raises:
+            RefusedError: The token is wrong.
+        """
         if self._anybody is not None:
             return self._anybody
         # All of them are compared, each in constant time.

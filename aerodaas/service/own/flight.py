@@ -174,11 +174,21 @@ class FlightRun(Protocol):
         ...
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Execute a command on a robot's mission; raises AeroDaaSError."""
+        """Execute a command on a robot's mission; raises AeroDaaSError.
+
+        Args:
+            robot: Id of the robot.
+            command: The command.
+        """
         ...
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert."""
+        """Publish an alert.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+        """
         ...
 
     @property
@@ -225,7 +235,12 @@ class OwnFlight:
         return self._run.config
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert."""
+        """Publish an alert.
+
+        Args:
+            kind: Short machine-readable name.
+            text: One sentence for the operator.
+        """
         self._run.publish_alert(kind, text)
 
     @property
@@ -272,20 +287,36 @@ class OwnFlight:
         return [self.mission(principal, OWN)]
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
-        """The flight as a provider would show it."""
+        """The flight as a provider would show it.
+
+        Args:
+            principal: Ignored.
+            mission: The flight's id.
+        """
         del principal
         _require_own(mission)
         self._refresh()
         return self._shown()
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """Ground below the flight on the map."""
+        """Ground below the flight on the map.
+
+        Args:
+            principal: Ignored.
+            mission: The flight's id.
+        """
         del principal
         _require_own(mission)
         return self._scenery
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command, of which an alert tells; raises AeroDaaSError."""
+        """Give a robot a command, of which an alert tells; raises AeroDaaSError.
+
+        Args:
+            principal: The account that asks.
+            mission: The flight's id.
+            command: The command, which names the robot.
+        """
         self.require_pilot(principal, mission)
         given, told = _worded(command)
         if isinstance(given, AddNavigation):
@@ -307,17 +338,35 @@ class OwnFlight:
         return answer
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
-        """Raise RefusedError unless the account may command the flight."""
+        """Check that the account may command the flight.
+
+        Args:
+            principal: The account that asks.
+            mission: The flight's id.
+
+        Raises:
+            RefusedError: It may not.
+        """
         _require_own(mission)
         require(principal, Role.PILOT)
 
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
-        """The flight's environment."""
+        """The flight's environment.
+
+        Args:
+            principal: The account that asks.
+            mission: The flight's id.
+        """
         self.require_pilot(principal, mission)
         return self.config
 
     def flies(self, principal: Principal, mission: str) -> bool:
-        """False: the application, which is here, is the flight's user."""
+        """False: the application, which is here, is the flight's user.
+
+        Args:
+            principal: Ignored.
+            mission: Ignored.
+        """
         del principal, mission
         return False
 
@@ -341,14 +390,31 @@ class OwnFlight:
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
-        """Items of a stream; an empty one a while without any. Raises ConfigError if none is so."""
+        """Items of a stream; an empty one a while without any.
+
+        Args:
+            mission: Ignored.
+            stream: Name of the stream.
+            form: Form of its pictures.
+
+        Raises:
+            ConfigError: There is no such stream.
+        """
         del mission
         reader = self.reader(stream, form)
         while not self.over:
             yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
 
     def reader(self, stream: str, form: PictureForm = PictureForm.WHOLE) -> PackedReader:
-        """A reader of a stream, its pictures in a form; raises ConfigError if there is none."""
+        """A reader of a stream.
+
+        Args:
+            stream: Name of the stream.
+            form: Form of its pictures.
+
+        Raises:
+            ConfigError: There is no such stream.
+        """
         graph = self._run.graph
         if stream not in graph.nodes or graph.reader is None:
             raise ConfigError(f"no stream of this mission is called {stream!r}")

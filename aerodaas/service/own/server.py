@@ -69,7 +69,12 @@ class ApiServer(AppServer):
         return f"http://{host}:{self._port}/#token={token}"
 
     def serve(self, build: Callable[[Admission], FastAPI], alert: Callable[[str], None]) -> None:
-        """Serve what `build` makes, in a thread; `alert` alerts people of many wrong tokens."""
+        """Serve what `build` makes, in a thread.
+
+        Args:
+            build: Makes the application.
+            alert: Alerts people of many wrong tokens.
+        """
         self._tokens.alert = alert
         app = build(Admission(self._tokens))
         self.start(lambda: self._guard(app, self._host))
@@ -114,7 +119,15 @@ def flight_app(
     limits: RequestLimits = OWN_FLIGHT,
     framed: bool = False,
 ) -> FastAPI:
-    """Build the application of one flight with `further` routes; the rest as of `build_app`."""
+    """Build the application of one flight.
+
+    Args:
+        flight: The flight.
+        admission: Who may ask for what.
+        further: Further routes.
+        limits: Limits of requests.
+        framed: As of `build_app`.
+    """
     routes = (
         FleetRoutes(flight, admission),
         MissionRoutes(flight, admission),

@@ -34,10 +34,17 @@ def draw(
     minutes: float,
     others: Sequence[OtherArea] = (),
 ) -> None:
-    """Write a PNG of a rehearsed flight to `picture`; the other arguments are `judge`'s.
+    """Write a PNG of a rehearsed flight.
 
     It needs the extra `plots`. Numbered crosses mark the places of the reasons, in the verdict's
     order; reasons without a place have none.
+
+    Args:
+        recording: MCAP file of the flight.
+        picture: File to write.
+        config: Environment that it flew in.
+        minutes: Of the lease.
+        others: Areas of all other granted leases.
 
     Raises:
         RecordingError: If the recording cannot be read, or the picture cannot be written.

@@ -172,7 +172,12 @@ class Leases(Rows[Lease]):
         return self._select(Lease.state != LeaseState.ENDED, order=[Lease.number])
 
     def all(self, tenant: str | None = None, limit: int | None = None) -> list[Lease]:
-        """The newest of a tenant, or of all, newest first."""
+        """The newest of a tenant, or of all, newest first.
+
+        Args:
+            tenant: Name of the tenant; None for all.
+            limit: Most rows; None for no limit.
+        """
         return self._select(tenant=tenant, order=[Lease.number.desc()], limit=limit)
 
     def highest_number(self) -> int:
@@ -190,17 +195,32 @@ class Missions(Rows[Mission]):
         return self._select(Mission.phase.in_(still), order=[Mission.submitted])
 
     def newest(self, limit: int, tenant: str | None = None) -> list[Mission]:
-        """The newest of a tenant, or of all, newest first."""
+        """The newest of a tenant, or of all, newest first.
+
+        Args:
+            limit: Most rows.
+            tenant: Name of the tenant; None for all.
+        """
         return self._select(tenant=tenant, order=[Mission.submitted.desc()], limit=limit)
 
     def newest_shared(self, limit: int, tenant: str) -> list[Mission]:
-        """The newest of other tenants that name `tenant` in their requests, newest first."""
+        """The newest of other tenants that name `tenant` in their requests, newest first.
+
+        Args:
+            limit: Most rows.
+            tenant: Name of the tenant.
+        """
         named = type_coerce(Mission.request, Text).contains(json.dumps(tenant), autoescape=True)
         others = Mission.tenant != tenant
         return self._select(others, named, order=[Mission.submitted.desc()], limit=limit)
 
     def of_key(self, tenant: str, key: str) -> Mission | None:
-        """A tenant's mission by the idempotency key of its submission; None if there is none."""
+        """A tenant's mission by the idempotency key of its submission; None if there is none.
+
+        Args:
+            tenant: Name of the tenant.
+            key: The idempotency key.
+        """
         return next(iter(self._select(tenant=tenant, key=key)), None)
 
 
@@ -210,12 +230,23 @@ class Usages(Rows[Usage]):
     def all(
         self, tenant: str | None = None, since: float = -math.inf, limit: int | None = None
     ) -> list[Usage]:
-        """Usage of a tenant, or of all, that started at `since` or later; oldest first."""
+        """Usage of a tenant, or of all, oldest first.
+
+        Args:
+            tenant: Name of the tenant; None for all.
+            since: Earliest start, seconds since the Unix epoch.
+            limit: Most rows; None for no limit.
+        """
         later = Usage.started >= since
         return self._select(later, tenant=tenant, order=[Usage.started], limit=limit)
 
     def total(self, tenant: str, since: float) -> tuple[float, int]:
-        """Flight seconds and cloud calls of a tenant's missions that started since then."""
+        """Flight seconds and cloud calls of a tenant's missions that started since then.
+
+        Args:
+            tenant: Name of the tenant.
+            since: Earliest start, seconds since the Unix epoch.
+        """
         used = select(func.sum(Usage.flight_seconds), func.sum(Usage.cloud_calls))
         chosen = used.where(Usage.tenant == tenant, Usage.started >= since)
         with self._database.reading() as session:
@@ -250,7 +281,12 @@ class AuditLog:
         return rows[-1].number if rows else 0
 
     def all(self, tenant: str | None = None, limit: int | None = None) -> list[AuditEntry]:
-        """The newest of a tenant, or of all, newest first."""
+        """The newest of a tenant, or of all, newest first.
+
+        Args:
+            tenant: Name of the tenant; None for all.
+            limit: Most rows; None for no limit.
+        """
         statement = select(AuditEntry).order_by(AuditEntry.number.desc()).limit(limit)
         if tenant is not None:
             statement = statement.where(AuditEntry.tenant == tenant)
