@@ -51,7 +51,7 @@ def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str)
         name: Name of the analysis, for errors.
 
     Raises:
-        ConfigError: A node cannot provide the environment; with the node's message.
+        ConfigError: If a node cannot provide the environment; with the node's message.
     """
     if env is None:
         return {}

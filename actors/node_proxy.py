@@ -169,7 +169,7 @@ class NodeProxy(Node):
             inputs: New messages, each stream's in order.
 
         Raises:
-            MissionError: Its process died.
+            MissionError: If its process died.
         """
         return self._call(self._actor.step.remote(now, inputs))
 

@@ -25,7 +25,8 @@ def private_folder(name: str, base: str = _BASE) -> Path:
         base: Folder for all users.
 
     Raises:
-        AeroDaaSError: The path is a link or belongs to another user: anybody may have put it there.
+        AeroDaaSError: If the path is a link or belongs to another user: anybody may have put it
+            there.
     """
     top = Path(base, f"aerodaas-{os.geteuid()}")
     _own(top)

@@ -304,7 +304,7 @@ def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
         restarts: How often Ray starts it again after its death.
 
     Raises:
-        ConfigError: No node of the cluster fits.
+        ConfigError: If no node of the cluster fits.
     """
     nodes = nodes_at(place)
     options: dict[str, Any] = {

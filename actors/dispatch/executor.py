@@ -110,8 +110,8 @@ class CloudExecutor:
             budget: Seconds left, for analyses that adapt to it; None for no limit.
 
         Raises:
-            MissingFrameError: No earlier call carried the message.
-            UnpreparedError: The executor was restarted.
+            MissingFrameError: If no earlier call carried the message.
+            UnpreparedError: If the executor was restarted.
         """
         if not self._analyses:
             raise UnpreparedError("the executor in the cloud was restarted")

@@ -116,7 +116,7 @@ class DroneActor(NodeActor):
             command: The command.
 
         Raises:
-            MissionError: The loop does not execute it in time.
+            MissionError: If the loop does not execute it in time.
         """
         try:
             return self._calls.ask(
@@ -134,7 +134,7 @@ class DroneActor(NodeActor):
             timeout: Wall seconds that the loop has to answer.
 
         Raises:
-            MissionError: The loop has ended or does not answer.
+            MissionError: If the loop has ended or does not answer.
         """
         self._calls.ask(lambda: self._grow(robots), timeout)
         return self.info()
@@ -147,7 +147,7 @@ class DroneActor(NodeActor):
             timeout: Wall seconds that the loop has to answer.
 
         Raises:
-            MissionError: The loop has ended or does not answer.
+            MissionError: If the loop has ended or does not answer.
         """
         # In this thread: a planner's process takes seconds to start.
         planners = self._node.planners_of(scheduler)

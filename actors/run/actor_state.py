@@ -53,8 +53,8 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
         timeout: Seconds.
 
     Raises:
-        DeadError: The actor died.
-        SilentError: It does not answer in time.
+        DeadError: If the actor died.
+        SilentError: If it does not answer in time.
     """
     try:
         return ray.get(reference, timeout=timeout)
@@ -103,7 +103,7 @@ def require_clock(name: str, info: ActorInfo, began: int) -> None:
         began: This host's clock at the start, nanoseconds.
 
     Raises:
-        MissionError: The clock is ahead or behind.
+        MissionError: If the clock is ahead or behind.
     """
     ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
     if abs(ahead) > _CLOCKS_APART * NANOSECONDS:

@@ -383,7 +383,7 @@ class Flight:
             command: The command.
 
         Raises:
-            MissionError: The robot does not fly, or its actor does not answer.
+            MissionError: If the robot does not fly, or its actor does not answer.
         """
         if robot not in self._drones:
             raise MissionError(f"{robot} does not fly")

@@ -81,7 +81,7 @@ def map_slot(fd: int, offset: int, capacity: int) -> NDArray[np.uint8]:
         capacity: Size of the slot, bytes.
 
     Raises:
-        ValueError: The file has no such slot.
+        ValueError: If the file has no such slot.
     """
     memory = mmap.mmap(fd, capacity, prot=mmap.PROT_READ, offset=offset)
     return np.frombuffer(memory, np.uint8)

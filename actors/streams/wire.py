@@ -90,7 +90,7 @@ def send_descriptors(connection: socket.socket, name: str, *descriptors: int) ->
         *descriptors: The descriptors.
 
     Raises:
-        OSError: The other end is gone or takes no more.
+        OSError: If the other end is gone or takes no more.
     """
     rights = array.array("i", descriptors)
     connection.sendmsg(

@@ -39,7 +39,7 @@ def require_finite(name: str, setpoint: Setpoint) -> None:
         setpoint: The setpoint.
 
     Raises:
-        InvalidWaypointError: A number is not finite, a speed not positive, or a passing speed
+        InvalidWaypointError: If a number is not finite, a speed not positive, or a passing speed
             negative.
     """
     if isinstance(setpoint, VelocitySetpoint):

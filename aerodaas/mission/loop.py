@@ -80,7 +80,7 @@ class SetpointLoop:
             The setpoints requested and sent.
 
         Raises:
-            VehicleError: The vehicle has never given a state.
+            VehicleError: If the vehicle has never given a state.
         """
         state = self._read()
         items = self._examined(state, now)

@@ -134,7 +134,7 @@ class Navigator:
             above_ground: Metres to keep above the ground on the way to a waypoint, by its id.
 
         Raises:
-            InvalidWaypointError: An id is already queued by another source, or the index is
+            InvalidWaypointError: If an id is already queued by another source, or the index is
                 negative.
         """
         self.queue.add(

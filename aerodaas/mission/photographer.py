@@ -91,7 +91,7 @@ class PhotoCapture:
             on_the_way: Whether no waypoint waits for it.
 
         Raises:
-            VehicleError: There is no camera; beside it comes what cameras raise.
+            VehicleError: If there is no camera; beside it comes what cameras raise.
         """
         camera = self.camera
         if camera is None:

@@ -83,7 +83,7 @@ class WaypointQueue:
             above_ground: Metres to keep above the ground on the way to a waypoint, by its id.
 
         Raises:
-            InvalidWaypointError: An id is already queued by another source, or the index is
+            InvalidWaypointError: If an id is already queued by another source, or the index is
                 negative.
         """
         arriving = list(waypoints)
@@ -235,7 +235,7 @@ class WaypointQueue:
             remove: Ids of stops to remove.
 
         Raises:
-            InvalidWaypointError: Priorities contradict the order.
+            InvalidWaypointError: If priorities contradict the order.
         """
         stops = [stop for key in order if (stop := self.find(key)) is not None]
         for before, after in pairwise(stops):

@@ -38,7 +38,7 @@ def give(robot: str, commands: Iterable[Command], handle: Callable[[Command], An
         handle: The mission's answer to a command.
 
     Raises:
-        InvalidWaypointError: The mission refuses a command; the others are not tried.
+        InvalidWaypointError: If the mission refuses a command; the others are not tried.
     """
     for command in commands:
         answer = handle(command)
@@ -66,8 +66,8 @@ def rehearse(
         scheduler: The scheduler that orders the waypoints.
 
     Raises:
-        InvalidWaypointError: The mission refuses a command, or the battery does not suffice.
-        ConfigError: The fence is invalid.
+        InvalidWaypointError: If the mission refuses a command, or the battery does not suffice.
+        ConfigError: If the fence is invalid.
     """
     commands = list(commands)
     home = environment.home

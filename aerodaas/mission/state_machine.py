@@ -62,7 +62,7 @@ class MissionStateMachine:
             False if the mission is in the state already.
 
         Raises:
-            MissionError: The transition is not in TRANSITIONS.
+            MissionError: If the transition is not in TRANSITIONS.
         """
         if state is self.state:
             self.reason = reason or self.reason

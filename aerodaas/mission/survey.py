@@ -176,7 +176,7 @@ def planned_photos(
         speed: Speed on the lines, m/s.
 
     Raises:
-        SchedulerError: More than `MOST_PHOTOS` are taken.
+        SchedulerError: If more than `MOST_PHOTOS` are taken.
     """
     gaps: list[float] = []
     places: list[Place] = []
@@ -269,8 +269,8 @@ class SurveySettings:
             around: Fly around no-fly zones within the area instead of refusing them.
 
         Raises:
-            SchedulerError: Not exactly one of height and resolution is given, or the resolution is
-                none.
+            SchedulerError: If not exactly one of height and resolution is given, or the resolution
+                is none.
         """
         if (height is None) == (ground_resolution is None):
             raise SchedulerError("a survey needs a height or a ground resolution: give it one")

@@ -64,8 +64,8 @@ def check_environment(config: EnvironmentConfig, place: str) -> None:
         place: Its file, for errors.
 
     Raises:
-        ConfigError: A setting is unknown or invalid.
-        UnknownIdError: A name is unknown.
+        ConfigError: If a setting is unknown or invalid.
+        UnknownIdError: If a name is unknown.
     """
     require_plugin("trajectory_schedulers", config.schedulers.trajectory)
     for robot in config.robots:
@@ -172,7 +172,7 @@ def check_places(graph: Graph, compute: Collection[str]) -> None:
         compute: Ids of the resources that analyses may be deployed on.
 
     Raises:
-        GraphError: An analysis is on another resource.
+        GraphError: If an analysis is on another resource.
     """
     for node in graph.nodes.values():
         if node.compute is not None and node.compute not in compute:
@@ -193,7 +193,7 @@ def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
         config: The environment, whose `schedulers` name them.
 
     Raises:
-        UnknownIdError: An analysis is unknown, so that the task or tenant would have no effect.
+        UnknownIdError: If an analysis is unknown, so that the task or tenant would have no effect.
     """
     from aerodaas import analytics  # noqa: PLC0415 - loads its modules on access
 
@@ -239,7 +239,7 @@ def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[s
         sensor: One of its sensors.
 
     Raises:
-        ConfigError: A setting is invalid.
+        ConfigError: If a setting is invalid.
     """
     driver, settings = sensor.driver or "", sensor.settings
     if sensor.type == "camera":
@@ -292,7 +292,7 @@ def check_served(option: str, address: str | None) -> None:
         address: host:port; None is valid.
 
     Raises:
-        ConfigError: The address is malformed.
+        ConfigError: If the address is malformed.
     """
     if address is None:
         return

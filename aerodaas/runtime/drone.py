@@ -209,7 +209,7 @@ class DroneNode(Node):
             now: Mission clock, nanoseconds.
 
         Raises:
-            MissionError: The robot does not fly.
+            MissionError: If the robot does not fly.
         """
         if robot in self.failures:
             return Answer(accepted=False, text=failure_of(robot, self.failures[robot]))

@@ -35,7 +35,8 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
         new: The plan of the current graph.
 
     Raises:
-        GraphError: The analytics scheduler has an additional task, which is impossible in flight.
+        GraphError: If the analytics scheduler has an additional task, which is impossible in
+            flight.
     """
     _require_same_tasks(old, new)
     running = {spec.stream for spec in (*old.cameras, *old.analyses)}

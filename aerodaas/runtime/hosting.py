@@ -37,7 +37,7 @@ def by_actor(
         session: Its speed tells simulated from real time.
 
     Raises:
-        ConfigError: Robots share a link from different places.
+        ConfigError: If robots share a link from different places.
     """
     if session.speed is None:
         return (tuple(specs),)

@@ -293,7 +293,7 @@ class InlineFlight:
             command: The command.
 
         Raises:
-            MissionError: The robot does not fly.
+            MissionError: If the robot does not fly.
         """
         drone = self._drone
         if drone is None:

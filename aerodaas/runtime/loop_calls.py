@@ -47,8 +47,8 @@ class LoopCalls:
             timeout: Wall seconds; a call that has not started by then is withdrawn.
 
         Raises:
-            LoopOverError: The loop is over.
-            SilentError: The loop does not answer in time.
+            LoopOverError: If the loop is over.
+            SilentError: If the loop does not answer in time.
         """
         answer: Future[T] = Future()
         self._calls.put((call, answer))

@@ -57,7 +57,7 @@ class Attachments:
             wanted: The submitted mission.
 
         Raises:
-            RefusedError: The provider, the other mission's owner or the mission itself rules it
+            RefusedError: If the provider, the other mission's owner or the mission itself rules it
                 out.
         """
         if self._most == 0:

@@ -67,7 +67,7 @@ class Missions(ShownMissions, Protocol):
             command: The command, which names the robot.
 
         Raises:
-            MissionError: The mission is lost.
+            MissionError: If the mission is lost.
         """
         ...
 
@@ -79,7 +79,7 @@ class Missions(ShownMissions, Protocol):
             mission: Id of the mission.
 
         Raises:
-            RefusedError: It does not fly, or the account may not.
+            RefusedError: If it does not fly, or the account may not.
         """
         ...
 
@@ -124,7 +124,7 @@ class Missions(ShownMissions, Protocol):
             form: Form of its pictures.
 
         Raises:
-            AeroDaaSError: There is none.
+            AeroDaaSError: If there is none.
         """
         ...
 

@@ -179,7 +179,7 @@ class FleetRegistry:
             enabled: Whether it is in service.
 
         Raises:
-            RefusedError: There is no such drone.
+            RefusedError: If there is no such drone.
         """
         if robot not in self._states:
             raise RefusedError(404, f"there is no robot {robot}")

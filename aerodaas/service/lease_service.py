@@ -112,7 +112,7 @@ class LeaseService:
             The lease, granted or queued.
 
         Raises:
-            RefusedError: It cannot be fulfilled, or a quota is used up.
+            RefusedError: If it cannot be fulfilled, or a quota is used up.
         """
         now = self.now()
         self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
@@ -131,7 +131,7 @@ class LeaseService:
             cloud: Whether what flies may call the cloud.
 
         Raises:
-            RefusedError: A quota is used up.
+            RefusedError: If a quota is used up.
         """
         now = self.now()
         committed = self._book.committed(tenant, now)
@@ -158,7 +158,7 @@ class LeaseService:
             robots: Ids of the robots.
 
         Raises:
-            RefusedError: It is not.
+            RefusedError: If it is not.
         """
         found = self._own(principal, lease)
         if found.state is LeaseState.ENDED:
@@ -180,7 +180,7 @@ class LeaseService:
             lease: Id of the lease.
 
         Raises:
-            RefusedError: It is another one.
+            RefusedError: If it is another one.
         """
         found = self.lease(lease)
         if not sees(principal, found.tenant):
@@ -204,7 +204,7 @@ class LeaseService:
             minutes: By how much.
 
         Raises:
-            RefusedError: The lease or the quota does not allow it.
+            RefusedError: If the lease or the quota does not allow it.
         """
         found, now = self._own(principal, lease), self.now()
         committed = self._book.committed(found.tenant, now)
@@ -225,7 +225,7 @@ class LeaseService:
             lease: Id of the lease.
 
         Raises:
-            RefusedError: The account may do neither.
+            RefusedError: If the account may do neither.
         """
         found = self.seen(principal, lease)
         if found.tenant == principal.tenant and principal.role.reaches(Role.PILOT):

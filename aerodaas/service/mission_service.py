@@ -128,7 +128,7 @@ class MissionService:
             key: Idempotency key; None for none.
 
         Raises:
-            RefusedError: It cannot be flown here; with status 422 for another one than was
+            RefusedError: If it cannot be flown here; with status 422 for another one than was
                 submitted with this key.
         """
         # First: what was taken in has used up its quota and its lease.
@@ -246,7 +246,7 @@ class MissionService:
             command: The command, which names the robot.
 
         Raises:
-            MissionError: The mission is lost.
+            MissionError: If the mission is lost.
         """
         # Without the lock, which may be held for long: a drone that is to come home comes home.
         link = self._flown(principal, mission).follow()
@@ -260,7 +260,7 @@ class MissionService:
             mission: Id of the mission.
 
         Raises:
-            RefusedError: It does not fly, or the account may not.
+            RefusedError: If it does not fly, or the account may not.
         """
         self._flown(principal, mission)
 
@@ -326,7 +326,7 @@ class MissionService:
             mission: Id of the mission.
 
         Raises:
-            RefusedError: It is another mission.
+            RefusedError: If it is another mission.
         """
         found = shown(self._seen(principal, mission))
         if _is_user(principal, found):
@@ -401,7 +401,7 @@ class MissionService:
             mission: Id of the mission.
 
         Raises:
-            RefusedError: It may not.
+            RefusedError: If it may not.
         """
         active = self._seen(principal, mission)
         if active.row.tenant != principal.tenant:
@@ -427,7 +427,7 @@ class MissionService:
             form: Form of its pictures.
 
         Raises:
-            AeroDaaSError: There is none.
+            AeroDaaSError: If there is none.
         """
         with self._lock:
             active = self._open(mission)
@@ -459,7 +459,7 @@ class MissionService:
             name: `recording` or `picture`.
 
         Raises:
-            RefusedError: There is none.
+            RefusedError: If there is none.
         """
         active = self._seen(principal, mission)
         files = {"recording": active.flight.recording, "picture": active.rehearsal.picture}
@@ -475,7 +475,7 @@ class MissionService:
             mission: Id of the mission.
 
         Raises:
-            RefusedError: The mission is another tenant's, goes on, or has no recording.
+            RefusedError: If the mission is another tenant's, goes on, or has no recording.
         """
         self._require_own(principal, mission)
         self.file(principal, mission, "recording").unlink(missing_ok=True)

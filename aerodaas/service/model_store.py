@@ -85,9 +85,9 @@ class ModelStore:
             content: The ONNX file.
 
         Raises:
-            ConfigError: It is too large or not the one that it is called, or takes too much to be
-                run.
-            RefusedError: There is no room.
+            ConfigError: If it is too large or not the one that it is called, or takes too much to
+                be run.
+            RefusedError: If there is no room.
         """
         if len(content) > RequestLimits.model_bytes:
             raise ConfigError(f"a model has at most {RequestLimits.model_bytes >> 20} MiB")
@@ -116,7 +116,7 @@ class ModelStore:
             folder: Folder of a flight's models.
 
         Raises:
-            ConfigError: A model is missing.
+            ConfigError: If a model is missing.
         """
         for sha256 in sorted(set(_named(document.model_dump()))):
             if not self.has(tenant, sha256):

@@ -36,7 +36,7 @@ def write_log(path: Path, world: World, person: str, origin: GeodeticOrigin, end
         end: Last second of mission time.
 
     Raises:
-        KeyError: The world has no person of that name.
+        KeyError: If the world has no person of that name.
     """
     draw, thing = random.Random(f"{world.seed}/phone"), world.thing(person)
     east, north = (draw.gauss(0, _SIGMA) for _ in range(2))

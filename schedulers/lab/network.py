@@ -129,8 +129,8 @@ class Network:
             duration: Length of the run, nanoseconds.
 
         Raises:
-            UnknownIdError: There is no network of this name.
-            SchedulerError: A figure or a file of the name is invalid.
+            UnknownIdError: If there is no network of this name.
+            SchedulerError: If a figure or a file of the name is invalid.
         """
         network = cls(wanted)
         for part in wanted.split("+"):

@@ -199,9 +199,9 @@ def run_lab(
         progress: Called with the number of parts done and of all parts.
 
     Raises:
-        SchedulerError: There is no seed or scheduler, or a scheduler cannot be loaded, raises or
+        SchedulerError: If there is no seed or scheduler, or a scheduler cannot be loaded, raises or
             decides what cannot be done; the latter two with the seed and the edge.
-        UnknownIdError: There is no scheduler of a name.
+        UnknownIdError: If there is no scheduler of a name.
     """
     if not seeds or not schedulers:
         raise SchedulerError("a run of the lab needs at least one seed and one scheduler")

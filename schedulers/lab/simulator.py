@@ -108,7 +108,7 @@ def simulate(
         record: Whether to keep every decision, and observe the scheduler every 50 ms.
 
     Raises:
-        SchedulerError: A decision cannot be carried out.
+        SchedulerError: If a decision cannot be carried out.
     """
     resources = resources or Resources()
     host = _SimulatedHost(path, resources, record=record)

@@ -111,7 +111,7 @@ class Workload:
             duration: Length of the run, nanoseconds.
 
         Raises:
-            UnknownIdError: It is any other name.
+            UnknownIdError: If it is any other name.
         """
         match = _NAME.fullmatch(name)
         if match is None:

@@ -138,7 +138,7 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
             robot: The robot or its id; may be left out where only one flies.
 
         Raises:
-            GraphError: No robot is named where several fly.
+            GraphError: If no robot is named where several fly.
         """
         navigation = self.generate_navigation(data)
         if priority is not None:
@@ -168,7 +168,7 @@ class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
             robot: The robot or its id; may be left out where only one flies.
 
         Raises:
-            GraphError: No robot is named where several fly.
+            GraphError: If no robot is named where several fly.
         """
         named, line = _id_of(robot), application_line()
         if on is not None:

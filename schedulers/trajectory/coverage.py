@@ -103,7 +103,7 @@ def cover(
         speed: Speed on the strips, m/s; None for the robot's cruise speed.
 
     Raises:
-        SchedulerError: Not exactly one of width and camera is given, the area is none, or no-fly
+        SchedulerError: If not exactly one of width and camera is given, the area is none, or no-fly
             zones cut it in pieces that cannot all be reached.
     """
     if (width is None) == (camera is None):

@@ -49,7 +49,7 @@ def share_out(
         seed: Seed of the search.
 
     Raises:
-        SchedulerError: The fleet has no drones, or PyVRP is not there (on Python 3.10).
+        SchedulerError: If the fleet has no drones, or PyVRP is not there (on Python 3.10).
     """
     require_solver("sharing waypoints out")
     if not fleet:

@@ -82,7 +82,7 @@ class SurveyCamera:
             interval: Shortest time between two pictures, seconds; None where it is not known.
 
         Raises:
-            SchedulerError: A length is not positive.
+            SchedulerError: If a length is not positive.
         """
         width, height = sensor
         if not (focal_length > 0.0 and width > 0.0 and height > 0.0):

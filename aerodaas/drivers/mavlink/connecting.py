@@ -90,7 +90,7 @@ def require_answer(commander: Commander, name: str, pause: Callable[[], None]) -
         pause: Waits for the next messages.
 
     Raises:
-        VehicleError: The vehicle answers nothing.
+        VehicleError: If the vehicle answers nothing.
     """
     deadline = time.monotonic() + _ANSWER
     while not commander.answered:
@@ -128,7 +128,7 @@ def establish(
         pause: Waits for the next messages.
 
     Raises:
-        VehicleError: The vehicle is not ready in time, or a protection cannot be seen to.
+        VehicleError: If the vehicle is not ready in time, or a protection cannot be seen to.
     """
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)

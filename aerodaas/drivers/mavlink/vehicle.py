@@ -440,7 +440,7 @@ class MavlinkVehicle:
             progress: Called with the number of items uploaded and of all items.
 
         Raises:
-            VehicleError: The upload failed, or the vehicle is not ours to control.
+            VehicleError: If the upload failed, or the vehicle is not ours to control.
         """
         self._require_control("take a mission")
         upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
@@ -468,7 +468,7 @@ class MavlinkVehicle:
             Path of the file.
 
         Raises:
-            VehicleError: The log cannot be fetched; in flight always.
+            VehicleError: If the log cannot be fetched; in flight always.
         """
         link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
         return fetch_log(link, autopilot, log, folder, progress, ftp=self._telemetry.serves_files)

@@ -127,7 +127,7 @@ class Ros2Camera:
             pose: Ignored.
 
         Raises:
-            SourceError: The pixel format is not known.
+            SourceError: If the pixel format is not known.
         """
         del pose
         with self._lock:

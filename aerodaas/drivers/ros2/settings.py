@@ -95,7 +95,7 @@ def ros2_camera_settings(
         environment: Its robots; that of the camera gives the domain.
 
     Raises:
-        ConfigError: A setting is invalid; the message names the sensor and the setting.
+        ConfigError: If a setting is invalid; the message names the sensor and the setting.
     """
     place = f"sensor {sensor.full_id}: settings"
     settings = checked(Ros2CameraSettings, sensor.settings, place)

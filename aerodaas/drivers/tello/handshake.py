@@ -50,7 +50,7 @@ def greet(
         deadline: Monotonic seconds by which it returns or raises.
 
     Raises:
-        VehicleError: The Tello does not answer, or refuses.
+        VehicleError: If the Tello does not answer, or refuses.
     """
     if _ask(link, ENTER, deadline) is None:
         raise VehicleError(_explain_silence(link, name, settings))

@@ -69,7 +69,7 @@ def cloud_processes(
         envs: Environment of each analysis, by its id.
 
     Raises:
-        GraphError: An endpoint cannot perform an analysis.
+        GraphError: If an endpoint cannot perform an analysis.
     """
     found = []
     for resource in compute.values():

@@ -37,7 +37,7 @@ def require_secure(url: str, what: str) -> None:
         what: What it is the address of, for the error.
 
     Raises:
-        ConfigError: The address is another one, or a proxy would be asked.
+        ConfigError: If the address is another one, or a proxy would be asked.
     """
     parts = urlsplit(url)
     secure = parts.scheme == "https" or (

@@ -140,7 +140,7 @@ class FlightLink:
             operator: Whether an operator or the service gives it.
 
         Raises:
-            MissionError: The flight cannot be reached, or has too many commands to answer.
+            MissionError: If the flight cannot be reached, or has too many commands to answer.
         """
         path = _PATHS[type(command)]
         if operator:
@@ -233,7 +233,7 @@ class FlightLink:
             form: Form of its pictures.
 
         Raises:
-            MissionError: The flight is lost.
+            MissionError: If the flight is lost.
         """
         try:
             query = {"rate": _ITEMS_RATE, "streams": stream, "pictures": form.value}

@@ -200,7 +200,7 @@ class FlightOrders:
             attached: Whether it is attached.
 
         Raises:
-            RefusedError: The document asks for what cannot be had here.
+            RefusedError: If the document asks for what cannot be had here.
         """
         config = self._settings.config
         robots = robots_of(document)
@@ -238,7 +238,7 @@ class FlightOrders:
             document: The mission document.
 
         Raises:
-            RefusedError: The token lacks a role or a scope.
+            RefusedError: If the token lacks a role or a scope.
         """
         cameras = {
             sensor.full_id

@@ -75,7 +75,7 @@ class Tokens(Protocol):
             address: Address of the sender.
 
         Raises:
-            RefusedError: The token is wrong.
+            RefusedError: If the token is wrong.
         """
         ...
 
@@ -176,7 +176,7 @@ class Admission:
             scope: Scope that it needs; None for none.
 
         Raises:
-            RefusedError: The sender may not do this.
+            RefusedError: If the sender may not do this.
         """
         principal: Principal = connection.scope[_SENDER]
         with self.auditing(principal, connection):

@@ -44,8 +44,8 @@ class SurveyPlanner:
             status: Newest status of the robot; None if it does not fly.
 
         Raises:
-            MissionError: The robot does not fly, or other surveys are planned.
-            SchedulerError: The survey cannot be flown.
+            MissionError: If the robot does not fly, or other surveys are planned.
+            SchedulerError: If the survey cannot be flown.
         """
         robot = next((one for one in config.robots if one.id == wanted.robot), None)
         if robot is None or status is None:

@@ -88,7 +88,7 @@ class FlightTokens:
             address: Address of the sender, by which wrong tokens are counted.
 
         Raises:
-            RefusedError: The token is wrong.
+            RefusedError: If the token is wrong.
         """
         if self._anybody is not None:
             return self._anybody

@@ -345,7 +345,7 @@ class OwnFlight:
             mission: The flight's id.
 
         Raises:
-            RefusedError: It may not.
+            RefusedError: If it may not.
         """
         _require_own(mission)
         require(principal, Role.PILOT)
@@ -398,7 +398,7 @@ class OwnFlight:
             form: Form of its pictures.
 
         Raises:
-            ConfigError: There is no such stream.
+            ConfigError: If there is no such stream.
         """
         del mission
         reader = self.reader(stream, form)
@@ -413,7 +413,7 @@ class OwnFlight:
             form: Form of its pictures.
 
         Raises:
-            ConfigError: There is no such stream.
+            ConfigError: If there is no such stream.
         """
         graph = self._run.graph
         if stream not in graph.nodes or graph.reader is None:

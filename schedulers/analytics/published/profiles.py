@@ -59,7 +59,7 @@ def told_profile(model: str, schedulers: SchedulersConfig) -> Profile:
         schedulers: The file's figures of tasks and tenants, times in milliseconds.
 
     Raises:
-        SchedulerError: No scheduler could work with the figures.
+        SchedulerError: If no scheduler could work with the figures.
     """
     task = told(model, schedulers.tasks) or TaskConfig()
     owners = {name: one for one in schedulers.tenants for name in schedulers.tenants[one].analyses}

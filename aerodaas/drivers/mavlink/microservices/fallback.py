@@ -100,7 +100,7 @@ class Fallback:
             plan: The way home to be uploaded, if any.
 
         Raises:
-            VehicleError: It cannot be done; what was changed before has been put back.
+            VehicleError: If it cannot be done; what was changed before has been put back.
         """
         self._remind()
         if self._settings.fallback == "set" and self._settings.observe:

@@ -63,7 +63,7 @@ def upload_fence(
         progress: Called with the number of items uploaded and of all items.
 
     Raises:
-        VehicleError: The vehicle does not take the fence or a parameter.
+        VehicleError: If the vehicle does not take the fence or a parameter.
     """
     items = fence_items(fence, origin)
     upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE, progress)

@@ -183,7 +183,7 @@ class FtpClient:
             begin: First byte to read, from 0.
 
         Raises:
-            VehicleError: The file has another size, or the vehicle stops sending.
+            VehicleError: If the file has another size, or the vehicle stops sending.
         """
         yield from self._open(path, size)
         pieces = _Pieces(begin, size, sink)
@@ -213,7 +213,7 @@ class FtpClient:
             size: Size of the file, bytes, by which the time-out is reckoned.
 
         Raises:
-            VehicleError: The vehicle refuses or does not answer.
+            VehicleError: If the vehicle refuses or does not answer.
         """
         reply = yield from self._ask(
             mavlink.MAV_FTP_OPCODE_CALCFILECRC,

@@ -78,7 +78,7 @@ class MavlinkGimbal:
             The target within the gimbal's range.
 
         Raises:
-            VehicleError: An angle is not finite.
+            VehicleError: If an angle is not finite.
         """
         if not (math.isfinite(target.pitch) and math.isfinite(target.yaw)):
             raise VehicleError(f"a gimbal needs finite angles, not {target}")

@@ -39,7 +39,7 @@ class MavlinkLens:
             now: Monotonic clock, seconds.
 
         Raises:
-            VehicleError: The camera says that it has not what is asked.
+            VehicleError: If the camera says that it has not what is asked.
         """
         zooms = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
         focuses = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS

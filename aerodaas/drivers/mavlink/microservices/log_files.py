@@ -111,7 +111,7 @@ def find_log(transfer: FileTransfer, autopilot: Autopilot, log: LogEntry) -> str
         None if no file has that size, as while it is written, or several have.
 
     Raises:
-        VehicleError: The vehicle does not answer.
+        VehicleError: If the vehicle does not answer.
     """
     for folder in autopilot.log_folders:
         with contextlib.suppress(FtpRefusedError):
@@ -146,8 +146,8 @@ def fetch_file(
         progress: Called with the bytes fetched and of all bytes.
 
     Raises:
-        VehicleError: The vehicle stops sending, or its own checksum is another one.
-        OSError: The file or its part cannot be written.
+        VehicleError: If the vehicle stops sending, or its own checksum is another one.
+        OSError: If the file or its part cannot be written.
     """
     held = part.stat().st_size if part.is_file() else 0
     for begin in dict.fromkeys((held if held <= size else 0, 0)):

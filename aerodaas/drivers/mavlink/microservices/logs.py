@@ -47,7 +47,7 @@ def list_logs(link: MavlinkLink, autopilot: Autopilot, software: str) -> list[Lo
         software: Version of the autopilot, such as `1.16.1.255`; empty where it is not known.
 
     Raises:
-        VehicleError: The vehicle does not answer, or tells not all of its logs.
+        VehicleError: If the vehicle does not answer, or tells not all of its logs.
     """
     ends = not older_than(software, *autopilot.log_begin_until)
     target = link.target
@@ -95,7 +95,7 @@ def fetch_log(
         Path of the file.
 
     Raises:
-        VehicleError: The vehicle does not stand, or the log cannot be fetched.
+        VehicleError: If the vehicle does not stand, or the log cannot be fetched.
     """
 
     def told(done: int, size: int) -> None:

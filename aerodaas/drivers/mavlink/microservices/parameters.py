@@ -68,7 +68,7 @@ class Parameters:
             value: Its value, in the parameter's own unit.
 
         Raises:
-            VehicleError: It was not set.
+            VehicleError: If it was not set.
         """
         before = self._read(name)
         if before is None:

@@ -125,7 +125,7 @@ class Payload:
             on: Whether to record.
 
         Raises:
-            VehicleError: No camera answers any more, or it cannot record.
+            VehicleError: If no camera answers any more, or it cannot record.
         """
         if on or self._filmed is None:
             self._filmed = next((one for one in self._ranked() if one.camera_now(now)), None)

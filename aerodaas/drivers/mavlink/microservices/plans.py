@@ -169,7 +169,7 @@ def upload(
         progress: Called with the number of items uploaded and of all items.
 
     Raises:
-        VehicleError: The upload failed, for the reason that it gives.
+        VehicleError: If the upload failed, for the reason that it gives.
     """
     with link.listen(*Upload.messages) as inbox:
         began = time.monotonic()
@@ -195,7 +195,7 @@ def download(
         progress: Called with the number of items downloaded and of all items.
 
     Raises:
-        VehicleError: The vehicle does not answer, or says that the plan has too many items.
+        VehicleError: If the vehicle does not answer, or says that the plan has too many items.
     """
     target = link.target
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:

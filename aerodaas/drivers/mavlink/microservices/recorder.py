@@ -64,7 +64,7 @@ class MavlinkRecorder:
             on: Whether to record.
 
         Raises:
-            VehicleError: The camera says that it cannot.
+            VehicleError: If the camera says that it cannot.
         """
         if self._flags and not self._flags & mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO:
             raise VehicleError("the camera records no video")

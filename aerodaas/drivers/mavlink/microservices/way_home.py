@@ -44,7 +44,7 @@ def way_home_items(
         The items, whose heights are metres above the start.
 
     Raises:
-        VehicleError: The fence does not allow the way.
+        VehicleError: If the fence does not allow the way.
     """
     start = np.array(robot.start, dtype=np.float64)
     _require_allowed(robot, places)
@@ -77,7 +77,7 @@ def upload_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> None:
         items: Items of the plan, in order.
 
     Raises:
-        VehicleError: The vehicle refuses the plan, or holds another one.
+        VehicleError: If the vehicle refuses the plan, or holds another one.
     """
     try:
         upload(link, items)
@@ -98,7 +98,7 @@ def other_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> str:
         items: Items of the plan, in order; the first is not compared.
 
     Raises:
-        VehicleError: The vehicle does not tell its plan.
+        VehicleError: If the vehicle does not tell its plan.
     """
     held = download(link)
     if len(held) != len(items):

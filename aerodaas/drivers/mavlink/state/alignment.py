@@ -147,7 +147,7 @@ def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
         frame: Our local frame in the autopilot's.
 
     Raises:
-        VehicleError: The autopilot has no estimate now.
+        VehicleError: If the autopilot has no estimate now.
     """
     place, position = telemetry.whereabouts()
     latitude, longitude, _ = GeodeticOrigin(*place).to_geodetic(-frame.position(position))

@@ -33,7 +33,7 @@ def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
         name: Id of the robot, for errors.
 
     Raises:
-        ConfigError: The key cannot be read; the message never holds any of it.
+        ConfigError: If the key cannot be read; the message never holds any of it.
     """
     text = os.environ.get(MAVLINK_KEY, "")
     if text:

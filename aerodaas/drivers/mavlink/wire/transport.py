@@ -61,8 +61,8 @@ def open_transport(url: str, name: str) -> Transport:
         name: Id of the robot, for errors.
 
     Raises:
-        ConfigError: The address is invalid.
-        VehicleError: The address cannot be opened.
+        ConfigError: If the address is invalid.
+        VehicleError: If the address cannot be opened.
     """
     kind, _, rest = url.partition(":")
     host, _, number = rest.rpartition(":")
