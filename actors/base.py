@@ -105,11 +105,14 @@ class NodeActor:
         self._problems: list[str] = []
 
     def prepare(self, variables: ProcessVariables | None = None, *specs: NodeMaker) -> ActorInfo:
-        """Make and open the nodes of `specs`; raises what the opening of one raises.
+        """Make and open the nodes of `specs`.
 
         Args:
             variables: Set in this process by their arrival.
             *specs: Makers of the nodes.
+
+        Raises:
+            Exception: What the opening of a node raises.
         """
         del variables
         be_nice(min((spec.niceness for spec in specs), default=self.niceness))

@@ -103,11 +103,14 @@ def connect(
 
 
 def join(address: str, modules: Sequence[Path] = ()) -> None:
-    """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError.
+    """Join the cluster at `address`, without a check of its nodes.
 
     Args:
         address: Address of the cluster.
         modules: Those that `connect` takes.
+
+    Raises:
+        AeroDaaSError: If the cluster cannot be reached or joined.
     """
     if ray.is_initialized():
         return

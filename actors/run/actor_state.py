@@ -46,7 +46,7 @@ class ActorState:
 
 
 def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
-    """Wait for the result of an actor call; raises the project's errors.
+    """Wait for the result of an actor call.
 
     Args:
         reference: Ray's reference of the result.
@@ -55,6 +55,7 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
     Raises:
         DeadError: If the actor died.
         SilentError: If it does not answer in time.
+        AeroDaaSError: What the call raises; MissionError for an error of another kind.
     """
     try:
         return ray.get(reference, timeout=timeout)

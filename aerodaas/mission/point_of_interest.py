@@ -112,7 +112,7 @@ class PointOfInterest:
         self._by_nose = False
 
     def aim(self, gimbal: Gimbal | None, odometry: Odometry, now: int, yaw: float | None) -> None:
-        """Aim `gimbal` and the nose from where the drone is; raises what the gimbal raises.
+        """Aim `gimbal` and the nose from where the drone is.
 
         Args:
             gimbal: The gimbal; None aims by the nose alone.
@@ -120,6 +120,9 @@ class PointOfInterest:
             now: Mission clock, nanoseconds.
             yaw: A heading that is asked for otherwise, which the nose keeps, radians; None for
                 none.
+
+        Raises:
+            Exception: What the gimbal raises.
         """
         if self.place is None:
             return

@@ -40,7 +40,7 @@ class LoopCalls:
         self._over = ""
 
     def ask(self, call: Callable[[], T], timeout: float) -> T:
-        """Execute `call` in the loop and return its result; raises the exceptions of the call.
+        """Execute `call` in the loop and return its result.
 
         Args:
             call: The call.
@@ -49,6 +49,7 @@ class LoopCalls:
         Raises:
             LoopOverError: If the loop is over.
             SilentError: If the loop does not answer in time.
+            Exception: What the call raises.
         """
         answer: Future[T] = Future()
         self._calls.put((call, answer))

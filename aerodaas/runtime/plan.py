@@ -411,7 +411,7 @@ def make_plan(
     here: bool = True,
     senses_only: bool = False,
 ) -> FlightPlan:
-    """Plan the actors of a graph; raises the project's errors for a graph that cannot fly.
+    """Plan the actors of a graph.
 
     Args:
         session: The flight's session, with its environment.
@@ -422,6 +422,9 @@ def make_plan(
             run.
         here: Whether all actors run on this machine.
         senses_only: Whether the graph need not navigate.
+
+    Raises:
+        AeroDaaSError: If the graph cannot fly, with the remedy.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots and not senses_only:

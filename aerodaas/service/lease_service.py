@@ -158,7 +158,7 @@ class LeaseService:
             robots: Ids of the robots.
 
         Raises:
-            RefusedError: If it is not.
+            RefusedError: If one of these is not so.
         """
         found = self._own(principal, lease)
         if found.state is LeaseState.ENDED:

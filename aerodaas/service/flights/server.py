@@ -124,12 +124,15 @@ class LeasedFlight(OwnFlight):
         super().__init__(run, name)
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command, unless the lease is over; raises AeroDaaSError.
+        """Give a robot a command, unless the lease is over.
 
         Args:
             principal: The account that asks; an operator's command is given after the lease, too.
             mission: Id of the mission.
             command: The command, which names the robot.
+
+        Raises:
+            AeroDaaSError: As `OwnFlight.fly`.
         """
         if self._lease.reason and not principal.role.reaches(Role.OPERATOR):
             return self.refusal()

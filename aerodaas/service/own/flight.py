@@ -174,11 +174,14 @@ class FlightRun(Protocol):
         ...
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Execute a command on a robot's mission; raises AeroDaaSError.
+        """Execute a command on a robot's mission.
 
         Args:
             robot: Id of the robot.
             command: The command.
+
+        Raises:
+            AeroDaaSError: If the robot does not fly or does not answer.
         """
         ...
 
@@ -310,12 +313,15 @@ class OwnFlight:
         return self._scenery
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command, of which an alert tells; raises AeroDaaSError.
+        """Give a robot a command, of which an alert tells.
 
         Args:
             principal: The account that asks.
             mission: The flight's id.
             command: The command, which names the robot.
+
+        Raises:
+            AeroDaaSError: If the account may not command it, or the drone does not answer.
         """
         self.require_pilot(principal, mission)
         given, told = _worded(command)
