@@ -18,6 +18,7 @@ import numpy as np
 from aerodaas.clock import Clock, ScaledClock
 from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.mavlink.airspace.airspace import Airspace
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.completion import ClimbCompletion
 from aerodaas.drivers.mavlink.control.departure import Departure
@@ -25,15 +26,14 @@ from aerodaas.drivers.mavlink.control.mode_change import ModeChange
 from aerodaas.drivers.mavlink.control.permission import flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
+from aerodaas.drivers.mavlink.logs.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
-from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
-from aerodaas.drivers.mavlink.microservices.payload import Payload
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.one_link import check_links, link_of
+from aerodaas.drivers.mavlink.payload.payload import Payload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.state.phase import PROTECTIVE, FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport

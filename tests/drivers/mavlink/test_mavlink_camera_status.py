@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.config.preflight import PreflightConfig
-from aerodaas.drivers.mavlink.microservices.camera_status import (
+from aerodaas.drivers.mavlink.payload.camera_status import (
     camera_model_told,
     capture_status,
 )

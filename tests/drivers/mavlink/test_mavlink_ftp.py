@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.drivers.mavlink.microservices.ftp import (
+from aerodaas.drivers.mavlink.logs.ftp import (
     FtpClient,
     FtpEntry,
     FtpPacket,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure

@@ -12,7 +12,7 @@ from bench import Bench
 from emulated import FAMILIES, Stepped
 
 from aerodaas.config.remote_id import RemoteIdConfig
-from aerodaas.drivers.mavlink.microservices.remote_id import RemoteId
+from aerodaas.drivers.mavlink.airspace.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.messages.mission import MissionState as S

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.config.traffic import TrafficConfig
-from aerodaas.drivers.mavlink.microservices.traffic import TrafficTable
+from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.mission import MissionState as S

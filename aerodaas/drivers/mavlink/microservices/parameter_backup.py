@@ -1,4 +1,4 @@
-"""Journal of what was changed on a vehicle and is to be put back, which outlives this process."""
+"""Changes on a vehicle that are to be restored, in a file that outlives this process."""
 
 from __future__ import annotations
 

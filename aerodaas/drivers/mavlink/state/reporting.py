@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.drivers.mavlink.airspace.airspace import Airspace
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
-from aerodaas.drivers.mavlink.microservices.airspace import Airspace
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightPhase

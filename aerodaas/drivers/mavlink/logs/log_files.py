@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
-from aerodaas.drivers.mavlink.microservices.ftp import (
+from aerodaas.drivers.mavlink.logs.ftp import (
     FtpClient,
     FtpEntry,
     FtpPacket,

@@ -13,14 +13,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from aerodaas.drivers.mavlink.microservices.camera_status import CaptureStatus
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
-from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
-from aerodaas.drivers.mavlink.microservices.recorder import MavlinkRecorder
+from aerodaas.drivers.mavlink.payload.camera_status import CaptureStatus
+from aerodaas.drivers.mavlink.payload.lens import MavlinkLens
+from aerodaas.drivers.mavlink.payload.video_recorder import MavlinkRecorder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.messages.odometry import Odometry

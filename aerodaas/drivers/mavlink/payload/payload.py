@@ -18,10 +18,10 @@ from typing import ClassVar
 
 from aerodaas.clock import Clock
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.microservices.components import PayloadComponent
-from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
-from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera
-from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream
+from aerodaas.drivers.mavlink.payload.components import PayloadComponent
+from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.payload.photo_camera import MavlinkCamera
+from aerodaas.drivers.mavlink.payload.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
 from aerodaas.geometry.frames import yaw_enu_to_ned

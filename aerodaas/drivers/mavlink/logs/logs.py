@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, older_than
-from aerodaas.drivers.mavlink.microservices.log_files import FileTransfer, fetch_file, find_log
+from aerodaas.drivers.mavlink.logs.log_files import FileTransfer, fetch_file, find_log
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.errors import VehicleError

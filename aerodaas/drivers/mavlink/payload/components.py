@@ -10,23 +10,23 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from aerodaas.drivers.mavlink.microservices.camera_status import (
-    CameraModelTold,
-    CaptureStatus,
-    camera_model_told,
-    capture_status,
-)
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
-from aerodaas.drivers.mavlink.microservices.gimbal import MavlinkGimbal
-from aerodaas.drivers.mavlink.microservices.lens import MavlinkLens
-from aerodaas.drivers.mavlink.microservices.photo_camera import MavlinkCamera, Moment
-from aerodaas.drivers.mavlink.microservices.recorder import MavlinkRecorder
-from aerodaas.drivers.mavlink.microservices.storage import CardState, card_state
-from aerodaas.drivers.mavlink.microservices.video_streams import VideoStream, video_stream
+from aerodaas.drivers.mavlink.payload.camera_status import (
+    CameraModelTold,
+    CaptureStatus,
+    camera_model_told,
+    capture_status,
+)
+from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
+from aerodaas.drivers.mavlink.payload.lens import MavlinkLens
+from aerodaas.drivers.mavlink.payload.photo_camera import MavlinkCamera, Moment
+from aerodaas.drivers.mavlink.payload.storage import CardState, card_state
+from aerodaas.drivers.mavlink.payload.video_recorder import MavlinkRecorder
+from aerodaas.drivers.mavlink.payload.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.mavlink.wire.senders import CAMERAS

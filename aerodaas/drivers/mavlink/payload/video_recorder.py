@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-from aerodaas.drivers.mavlink.microservices.camera_status import CaptureStatus
 from aerodaas.drivers.mavlink.microservices.commander import (
     Commander,
     CommandResult,
     PendingCommand,
 )
+from aerodaas.drivers.mavlink.payload.camera_status import CaptureStatus
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 

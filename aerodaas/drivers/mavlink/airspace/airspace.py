@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.config.robot import RobotConfig
+from aerodaas.drivers.mavlink.airspace.remote_id import OperatorPlace, RemoteId
+from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
 from aerodaas.drivers.mavlink.microservices.commander import Commander, PendingCommand
-from aerodaas.drivers.mavlink.microservices.remote_id import OperatorPlace, RemoteId
-from aerodaas.drivers.mavlink.microservices.traffic import TrafficTable
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

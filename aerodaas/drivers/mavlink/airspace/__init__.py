@@ -1,0 +1,1 @@
+"""Remote ID, and traffic that a MAVLink vehicle hears of."""

@@ -1,0 +1,1 @@
+"""Logs on an autopilot's card: listed and downloaded."""

@@ -1,0 +1,1 @@
+"""Gimbals and cameras of a MAVLink vehicle: found, commanded and watched."""
