@@ -125,7 +125,7 @@ class StreamHub:
         """Missions' streams of which it was told that items are left out."""
 
     def add_watcher(self, mission: str, stream: str, form: PictureForm) -> Watcher:
-        """Begin to watch a stream, its pictures in a form; `leave` ends it.
+        """Begin to watch a stream, its pictures in a form; `remove_watcher` ends it.
 
         All watchers are of one event loop, in which this is called.
 

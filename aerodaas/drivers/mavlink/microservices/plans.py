@@ -74,7 +74,7 @@ def _ignore(_: int, __: int) -> None:
 
 
 class Upload:
-    """Upload of one plan, a message at a time: `take` the vehicle's, and `turn` when it is due."""
+    """Upload of one plan: give it messages by `on_message`, and call `step` when it is due."""
 
     messages: ClassVar[frozenset[str]] = frozenset(
         {"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"}
@@ -97,7 +97,7 @@ class Upload:
         self.failure = ""
         """Why it has not; empty as long as it may yet."""
         self.due = now
-        """Monotonic seconds at which `turn` has something to do."""
+        """Monotonic seconds at which `step` has something to do."""
         self._send = send
         self._target = target
         self._items = items
