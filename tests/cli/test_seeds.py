@@ -87,6 +87,16 @@ def test_each_run_is_that_of_its_seed_alone(
         assert [row["waypoints"] for row in csv.DictReader(file)] == ["1", "", "1"]
 
 
+def test_seeds_of_an_application_with_a_remote_user_share_no_port(flyer: Flyer) -> None:
+    """All of them fly: nobody steers seeds that fly side by side, so that none of them listens."""
+    flyer.write(FLAT)
+    remote = "from aerodaas.analytics import RemoteAnalytics" + HOP % 4
+    deployed = "RemoteAnalytics(env.env_data).deploy(env.get_compute_resource_by_id('edge'))"
+    remote = remote.replace("drone.start", f"{deployed}.instantiate()\ndrone.start")
+    (flyer.folder / "app.py").write_text(remote.replace("seed == 4", "seed == 40"))
+    assert run(flyer.folder, "--jobs", "3") == 0
+
+
 def test_a_row_tells_what_became_of_the_scheduler_s_tasks() -> None:
     """Of all that ended, how many in time; of those begun, how many in the cloud."""
     counts = {"edge": 30, "cloud": 10, "done": 33, "late": 2, "timeout": 1, "failed": 1,

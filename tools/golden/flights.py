@@ -73,7 +73,9 @@ def _run(folder: Path, *words: str, **variables: str) -> str:
 
 
 def _application(name: str, seed: int) -> Callable[[Path], dict[str, Any]]:
-    return lambda folder: _flown(folder, name, "--speed", "max", "--seed", str(seed))
+    # Seeds fly side by side, and one application serves a remote user.
+    port = ("--set", f"remote.port={8350 + seed}")
+    return lambda folder: _flown(folder, name, "--speed", "max", "--seed", str(seed), *port)
 
 
 def _own(folder: Path) -> dict[str, Any]:

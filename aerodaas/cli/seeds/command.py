@@ -80,7 +80,12 @@ def _shared_options(run: ApplicationRun) -> RunOptions:
         raise ConfigError("with --seeds, --record names a folder: each run gets one below it")
     record = options.record or recording_folder(run.application.stem)
     return replace(
-        options, simulated_time=True, record=record.absolute(), view=False, report="figures"
+        options,
+        simulated_time=True,
+        record=record.absolute(),
+        view=False,
+        remote=False,  # they would all listen at one port
+        report="figures",
     )
 
 
