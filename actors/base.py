@@ -285,12 +285,7 @@ class NodeActor:
         return self.session.scope(ray.get_runtime_context().get_node_id())
 
     def publisher(self, stream: str, what: str = "") -> Publisher:
-        """Open a stream for writing.
-
-        Args:
-            stream: Name of the stream.
-            what: Name of its items in alerts; empty for the stream's.
-        """
+        """Open a stream for writing."""
 
         def unsendable(reason: str) -> None:
             self._problem("unsendable", f"{what or stream}: {reason}")
@@ -301,13 +296,7 @@ class NodeActor:
     def reader(
         self, depths: Mapping[str, int], who: str = "", within: frozenset[str] = frozenset()
     ) -> Subscriber:
-        """Open streams for reading.
-
-        Args:
-            depths: Queue depths by stream.
-            who: Name of the reader in alerts.
-            within: Streams that this actor publishes itself.
-        """
+        """Open streams for reading."""
 
         def unreadable(reason: str) -> None:
             self._problem("unreadable", f"{who or self.name} cannot read {reason}")
@@ -329,12 +318,7 @@ class NodeActor:
                 self.alert(kind, text)
 
     def alert(self, kind: str, text: str) -> None:
-        """Publish an alert at the current mission time; thread-safe.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-        """
+        """Publish an alert at the current mission time; thread-safe."""
         self.publish_alert(kind, text, self.clock.now(), {})
 
     def publish_alert(
@@ -343,13 +327,6 @@ class NodeActor:
         """Publish an alert; thread-safe.
 
         An alert of the same source with the same text within the last seconds is suppressed.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-            stamp: Mission time in nanoseconds.
-            values: Further figures by name.
-            source: Whose alert it is; empty for this actor's own.
         """
         with self._alerting:
             message = self.alerts.message(kind, text, stamp, values, source)

@@ -207,24 +207,13 @@ class Proxies:
         self._everything = everything
 
     def camera(self, session: Session, camera: CameraSpec) -> Node | None:
-        """Proxy of a camera; None if it runs in the application's process.
-
-        Args:
-            session: The flight's session.
-            camera: The camera.
-        """
+        """Proxy of a camera; None if it runs in the application's process."""
         if not self._everything:
             return None
         return NodeProxy(session, camera, camera.stream, camera.place)
 
     def analysis(self, session: Session, actor: ActorPlan, spec: AnalysisSpec) -> Node | None:
-        """Proxy of an analysis of `actor`; None if it runs in the application's process.
-
-        Args:
-            session: The flight's session.
-            actor: The actor of the plan that has the analysis.
-            spec: The analysis.
-        """
+        """Proxy of an analysis of `actor`; None if it runs in the application's process."""
         if not self._everything and actor.runtime_env is None:
             return None
         return NodeProxy(session, spec, spec.stream, actor.place, actor.runtime_env)

@@ -131,15 +131,7 @@ class NodeRunner(Host):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert by the actor.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-            stamp: Mission clock, nanoseconds.
-            values: Further figures by name.
-            source: Name of the part that raises it; empty for the actor's own.
-        """
+        """Publish an alert by the actor."""
         self._actor.publish_alert(kind, text, stamp, values, source)
 
     def wake(self) -> None:

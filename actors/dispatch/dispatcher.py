@@ -330,12 +330,7 @@ class LiveDispatcher(Dispatcher):
     # Host interface of `Dispatch`.
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Send a task to its analysis' executor on the edge.
-
-        Args:
-            task: The task.
-            now: Mission clock, nanoseconds.
-        """
+        """Send a task to its analysis' executor on the edge."""
         self._edge_since = now
         if self._turns is not None:
             self._dispatch.edge_open, self._turns.used = False, True
@@ -346,12 +341,7 @@ class LiveDispatcher(Dispatcher):
         super()._send_task(task, item)
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Send a task to the cloud.
-
-        Args:
-            task: The task.
-            now: Mission clock, nanoseconds.
-        """
+        """Send a task to the cloud."""
         if self._cloud is not None:
             left = self._session.host_seconds(task.deadline + task.reserve - now)
             self._cloud.send(task, self._frames[task.id], now, left)

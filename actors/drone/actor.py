@@ -74,12 +74,7 @@ class DroneActor(NodeActor):
         self._orphaned = False
 
     def prepare(self, variables: ProcessVariables | None = None, *specs: NodeMaker) -> ActorInfo:
-        """Connect the vehicles.
-
-        Args:
-            variables: Set in this process by their arrival.
-            *specs: Ignored.
-        """
+        """Connect the vehicles."""
         del variables, specs
         return super().prepare()
 
@@ -235,15 +230,7 @@ class DroneActor(NodeActor):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str = ""
     ) -> None:
-        """Publish an alert, as the base does, without delaying the loop.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-            stamp: Mission clock, nanoseconds.
-            values: Further figures by name.
-            source: Name of the part that raises it; empty for the actor's own.
-        """
+        """Publish an alert, as the base does, without delaying the loop."""
         self._background.do(partial(super().publish_alert, kind, text, stamp, dict(values), source))
 
     def _watch_application(self) -> None:

@@ -65,9 +65,4 @@ class RemoteAnalytics(NavigableAnalytics):
             )
 
     def process(self, item: object, context: Context) -> None:
-        """Do nothing: waypoints arrive by the API.
-
-        Args:
-            item: Ignored.
-            context: Ignored.
-        """
+        """Do nothing: waypoints arrive by the API."""

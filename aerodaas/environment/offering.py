@@ -141,12 +141,7 @@ class BuildOnlyMission(MissionRun):
         raise BuildEndedError
 
     def command(self, robot: str, command: Command) -> NoReturn:
-        """Refuse a command.
-
-        Args:
-            robot: Ignored.
-            command: Ignored.
-        """
+        """Refuse a command."""
         del robot, command
         self.refuse()
 

@@ -298,28 +298,12 @@ class Run:
             self._flight.end_sensing()
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert of this process; nothing once the run is over.
-
-        Args:
-            kind: Kind of the alert.
-            text: Its text.
-        """
+        """Publish an alert of this process; nothing once the run is over."""
         if self._flight is not None and not self._finished.is_set():
             self._flight.publish_alert(kind, text)
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Send a robot's mission a command.
-
-        Args:
-            robot: Id of the robot.
-            command: The command, carried out as a whole.
-
-        Returns:
-            The robot's answer.
-
-        Raises:
-            MissionError: Once the run is over.
-        """
+        """Send a robot's mission a command."""
         if self._flight is None or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)

@@ -184,30 +184,11 @@ class EnergyMeter:
         return self.scale * self.model.hover(duration)
 
     def way_home(self, position: Vector, home: Vector, speed: float) -> float:
-        """Charge to come home, by the model as scaled.
-
-        Args:
-            position: ENU metres.
-            home: ENU metres.
-            speed: Metres per second.
-
-        Returns:
-            Fraction of the battery.
-        """
+        """Charge as `EnergyModel.way_home` has it, by the scaled model."""
         return self.scale * self.model.way_home(position, home, speed)
 
     def route(
         self, start: Vector, waypoints: Iterable[Waypoint], home: Vector, speed: float
     ) -> float:
-        """Charge for a route and the return home, by the scaled model.
-
-        Args:
-            start: ENU metres.
-            waypoints: Local waypoints, in order.
-            home: ENU metres.
-            speed: Metres per second, where a waypoint has no own speed.
-
-        Returns:
-            Fraction of the battery.
-        """
+        """Charge as `EnergyModel.route` has it, by the scaled model."""
         return self.scale * self.model.route(start, waypoints, home, speed)

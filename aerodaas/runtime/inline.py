@@ -53,15 +53,7 @@ class Part(Host):
     def publish_alert(
         self, kind: str, text: str, stamp: int, values: Mapping[str, Any], source: str
     ) -> None:
-        """Publish an alert, unless it repeats another one.
-
-        Args:
-            kind: Kind of the alert.
-            text: What it says.
-            stamp: Mission clock, nanoseconds.
-            values: Figures of the alert by name.
-            source: Name of the part that raises it; empty for this one.
-        """
+        """Publish an alert, unless it repeats another one."""
         message = self.alerts.message(kind, text, stamp, values, source)
         if message is not None:
             self._executor.post(message)

@@ -238,39 +238,17 @@ class MissionService:
         return shown(active)
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot of a flying mission a command.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-            command: The command, which names the robot.
-
-        Raises:
-            MissionError: If the mission is lost.
-        """
+        """Give a robot of a flying mission a command."""
         # Without the lock, which may be held for long: a drone that is to come home comes home.
         link = self._flown(principal, mission).follow()
         return link.fly(command, operator=principal.role.reaches(Role.OPERATOR))
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
-        """Check that a mission flies and this account may command it.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-
-        Raises:
-            RefusedError: If it does not fly, or the account may not.
-        """
+        """Check that a mission flies and this account may command it."""
         self._flown(principal, mission)
 
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
-        """The environment of a mission that flies and that this account may command.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-        """
+        """The environment of a mission that flies and that this account may command."""
         return environment_of(FlightOrder.read(self._flown(principal, mission).flight.order))
 
     def grant(
@@ -334,12 +312,7 @@ class MissionService:
         return found
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """Ground below a mission that this account may see.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-        """
+        """Ground below a mission that this account may see."""
         seed = self._seen(principal, mission).row.request.get("seed")
         return SceneryOut.of(self._settings.config, seed)
 
@@ -383,12 +356,7 @@ class MissionService:
         return -1 if active is None else active.version
 
     def flies(self, principal: Principal, mission: str) -> bool:
-        """Whether a mission is this account's own, so that its presence counts.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-        """
+        """Whether a mission is this account's own, so that its presence counts."""
         return _is_user(principal, self.shown(mission))
 
     def require_users_side(self, principal: Principal, mission: str) -> None:
@@ -419,16 +387,7 @@ class MissionService:
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
-        """Items of a flying mission's stream.
-
-        Args:
-            mission: Id of the mission.
-            stream: Name of the stream.
-            form: Form of its pictures.
-
-        Raises:
-            AeroDaaSError: If there is none.
-        """
+        """Items of a flying mission's stream."""
         with self._lock:
             active = self._open(mission)
             if active.phase is not MissionPhase.FLYING:

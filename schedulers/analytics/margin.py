@@ -105,22 +105,12 @@ class Margin(AnalyticsScheduler):
         self._stale = True
 
     def start(self, resources: Resources, now: int) -> None:
-        """Begin a run.
-
-        Args:
-            resources: The edge executor and the cloud of the run.
-            now: Time of the event, nanoseconds.
-        """
+        """Begin a run."""
         super().start(resources, now)
         self.cloud.resources = resources
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Let the task wait for as long as that can pay, or send it as a probe.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Let the task wait for as long as that can pay, or send it as a probe."""
         model = self._models.get(task.profile.model) or self._model(task.profile)
         model.quality.arrival(task.arrival)
         model.rate = model.rate * exp((model.seen - now) / _MEMORY) + 1 / _MEMORY
@@ -209,12 +199,7 @@ class Margin(AnalyticsScheduler):
         return [RunOnEdge(task, STOLEN if bound_for_cloud else "most valuable plan")]
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """Learn from the result.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """Learn from the result."""
         task = result.task
         model = self._models.get(task.profile.model) or self._model(task.profile)
         model.quality.ended(task.arrival, in_time=result.outcome is TaskOutcome.DONE)
@@ -230,12 +215,7 @@ class Margin(AnalyticsScheduler):
         return ()
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
-        """Plan for a cloud that is gone, or back: earlier estimates of it are void.
-
-        Args:
-            resources: The resources from now on.
-            now: Time of the event, nanoseconds.
-        """
+        """Plan for a cloud that is gone, or back: earlier estimates of it are void."""
         self.cloud.resources = resources
         self.cloud.silent_since = None
         self._stale = True

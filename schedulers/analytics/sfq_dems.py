@@ -82,12 +82,7 @@ class SfqDems(AnalyticsScheduler):
         """Between whom the edge is divided."""
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Give the task to its tenant's DEMS.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Give the task to its tenant's DEMS."""
         name = task.profile.tenant
         tenant = self._tenants.get(name)
         if tenant is None:
@@ -113,12 +108,7 @@ class SfqDems(AnalyticsScheduler):
         return decisions
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """Tell the tenant's DEMS, and give a free slot to whose turn it is.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """Tell the tenant's DEMS, and give a free slot to whose turn it is."""
         name = result.task.profile.tenant
         tenant = self._tenants[name]
         if result.place is TaskPlace.EDGE:
@@ -139,12 +129,7 @@ class SfqDems(AnalyticsScheduler):
         return decisions + self._fill(now)
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
-        """Tell all tenants' DEMS; without a cloud, nothing waits for it.
-
-        Args:
-            resources: The resources from now on.
-            now: Time of the event, nanoseconds.
-        """
+        """Tell all tenants' DEMS; without a cloud, nothing waits for it."""
         self.resources = resources
         decisions: list[Decision] = []
         for name, tenant in self._tenants.items():

@@ -22,12 +22,7 @@ class DeadlineScheduler(TrajectoryScheduler):
     """
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Order `pending`; none is left out.
-
-        Args:
-            pending: Waypoints that may be reordered, in local ENU.
-            situation: Where the drone is, its charge and its speed.
-        """
+        """Order `pending`; none is left out."""
         travel = TravelCosts.of(pending, situation)
         timed = [i for i in range(len(pending)) if np.isfinite(travel.deadline[i])]
         order: list[int] = []

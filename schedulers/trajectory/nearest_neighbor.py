@@ -24,12 +24,7 @@ class NearestNeighborScheduler(TrajectoryScheduler):
     isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Chain nearest neighbours.
-
-        Args:
-            pending: Waypoints that may be reordered, in local ENU.
-            situation: Where the drone is, its charge and its speed.
-        """
+        """Chain nearest neighbours."""
         before = {
             later: earlier for group in situation.ordered for earlier, later in pairwise(group)
         }

@@ -72,12 +72,7 @@ class OptimalScheduler(TrajectoryScheduler):
         self._seed = seed
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Order `pending`; unreachable waypoints are left out.
-
-        Args:
-            pending: Waypoints that may be reordered, in local ENU.
-            situation: Where the drone is, its charge and its speed.
-        """
+        """Order `pending`; unreachable waypoints are left out."""
         if not pending:
             return []
         travel = TravelCosts.of(pending, situation)

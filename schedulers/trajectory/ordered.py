@@ -16,10 +16,5 @@ class OrderedScheduler(TrajectoryScheduler):
     isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:  # noqa: ARG002
-        """Keep the order.
-
-        Args:
-            pending: Waypoints that may be reordered, in local ENU.
-            situation: Where the drone is, its charge and its speed.
-        """
+        """Keep the order."""
         return pending

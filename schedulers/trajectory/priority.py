@@ -20,12 +20,7 @@ class PriorityScheduler(TrajectoryScheduler):
     isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Sort by priority and deadline; the nearest of equals comes next, seen from each stop.
-
-        Args:
-            pending: Waypoints that may be reordered, in local ENU.
-            situation: Where the drone is, its charge and its speed.
-        """
+        """Sort by priority and deadline; the nearest of equals comes next, seen from each stop."""
         left = list(pending)
         route: list[Waypoint] = []
         here = situation.position

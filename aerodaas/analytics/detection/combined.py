@@ -62,12 +62,7 @@ class CombinedDetector(Analytics[Detections]):
             one.close()
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Detect what each network finds in one frame.
-
-        Args:
-            item: The frame.
-            context: Ignored.
-        """
+        """Detect what each network finds in one frame."""
         del context
         found = (one.detect([item])[0] for one in self.detectors)
         return Detections.of(item, (box for boxes in found for box in boxes))

@@ -177,12 +177,7 @@ class OnnxDetector(Analytics[Detections]):
         self._session = None
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Detect the objects in one frame.
-
-        Args:
-            item: The frame.
-            context: Ignored.
-        """
+        """Detect the objects in one frame."""
         del context
         return self.detect([item])[0]
 

@@ -299,12 +299,7 @@ class TrackingAnalytics(Analytics[Detections]):
         self.tracker = Tracker(max_age=max_age, min_hits=min_hits)
 
     def process(self, item: Detections, context: Context) -> Detections:
-        """Return the same boxes with the track ids of confirmed tracks.
-
-        Args:
-            item: Boxes of one frame.
-            context: Ignored.
-        """
+        """Return the same boxes with the track ids of confirmed tracks."""
         del context
         return self.tracker.update(item)
 

@@ -167,12 +167,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None without a target.
-
-        Args:
-            boxes: Boxes of one frame.
-            context: Services of its node.
-        """
+        """Return one velocity command, or None without a target."""
         item = boxes
         if item.camera is None:
             self.explain_once(item, context)

@@ -144,12 +144,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         return super().process(item, context)
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None without a tower to inspect.
-
-        Args:
-            boxes: Boxes of one frame.
-            context: Services of its node.
-        """
+        """Return one velocity command, or None without a tower to inspect."""
         if boxes.camera is None or boxes.odometry is None:
             self.explain_once(boxes, context)
             return None

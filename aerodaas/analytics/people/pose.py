@@ -106,12 +106,7 @@ class PoseAnalytics(Analytics[Detections]):
         self.keypoints.close()
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Detect the people in one frame, with keypoints of (17, 3): u, v, confidence.
-
-        Args:
-            item: The frame.
-            context: Ignored.
-        """
+        """Detect the people in one frame, with keypoints of (17, 3): u, v, confidence."""
         del context
         return self.detect(item)
 

@@ -141,18 +141,7 @@ class ProvidedRun:
             callback()
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Send a robot's mission a command.
-
-        Args:
-            robot: Id of the robot.
-            command: The command, carried out as a whole.
-
-        Returns:
-            The robot's answer.
-
-        Raises:
-            MissionError: Once the run is over.
-        """
+        """Send a robot's mission a command."""
         if self.over or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return send_command(self._client, self._id, robot, command)

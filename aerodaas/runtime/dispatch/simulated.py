@@ -165,22 +165,12 @@ class SimulatedDispatcher(Dispatcher):
         heapq.heappush(self._events, _Event(at, kind, next(self._order), task))
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Start a task, which ends after its time on the edge.
-
-        Args:
-            task: The task.
-            now: Mission clock, nanoseconds.
-        """
+        """Start a task, which ends after its time on the edge."""
         ends = None if self._executions is None else now + self._executions.edge_time(task)
         self._run(task, ends)
 
     def run_cloud(self, task: Task, now: int) -> None:
-        """Start a task, which ends after its time in the cloud, or is lost on the way.
-
-        Args:
-            task: The task.
-            now: Mission clock, nanoseconds.
-        """
+        """Start a task, which ends after its time in the cloud, or is lost on the way."""
         executions = self._executions
         assert executions is not None  # noqa: S101 - else there is no cloud slot
         taken = executions.network.cloud_time(executions.cloud_time(task), now)

@@ -290,24 +290,14 @@ class OwnFlight:
         return [self.mission(principal, OWN)]
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
-        """The flight as a provider would show it.
-
-        Args:
-            principal: Ignored.
-            mission: The flight's id.
-        """
+        """The flight as a provider would show it."""
         del principal
         _require_own(mission)
         self._refresh()
         return self._shown()
 
     def scenery(self, principal: Principal, mission: str) -> SceneryOut:
-        """Ground below the flight on the map.
-
-        Args:
-            principal: Ignored.
-            mission: The flight's id.
-        """
+        """Ground below the flight on the map."""
         del principal
         _require_own(mission)
         return self._scenery
@@ -344,35 +334,17 @@ class OwnFlight:
         return answer
 
     def require_pilot(self, principal: Principal, mission: str) -> None:
-        """Check that the account may command the flight.
-
-        Args:
-            principal: The account that asks.
-            mission: The flight's id.
-
-        Raises:
-            RefusedError: If it may not.
-        """
+        """Check that the account may command the flight."""
         _require_own(mission)
         require(principal, Role.PILOT)
 
     def environment(self, principal: Principal, mission: str) -> EnvironmentConfig:
-        """The flight's environment.
-
-        Args:
-            principal: The account that asks.
-            mission: The flight's id.
-        """
+        """The flight's environment."""
         self.require_pilot(principal, mission)
         return self.config
 
     def flies(self, principal: Principal, mission: str) -> bool:
-        """False: the application, which is here, is the flight's user.
-
-        Args:
-            principal: Ignored.
-            mission: Ignored.
-        """
+        """False: the application, which is here, is the flight's user."""
         del principal, mission
         return False
 

@@ -13,12 +13,7 @@ class CloudOnly(AnalyticsScheduler):
     """Sends each task that pays in the cloud and drops the others."""
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Send or drop at once.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Send or drop at once."""
         latest = task.deadline - task.profile.cloud_time
         if task.profile.cloud_gain <= 0 or not self.resources.cloud_slots:
             return [Drop(task, "the cloud costs more than the result is worth")]

@@ -18,12 +18,7 @@ class Dedas(Sjf):
     """
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Insert, swap for one victim, or send to the cloud.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Insert, swap for one victim, or send to the cloud."""
         place, finish = self.slot(task, now)
         if finish >= task.deadline:
             return self.to_cloud(task, now)
@@ -46,13 +41,7 @@ class Dedas(Sjf):
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """The cloud if the task fits in its slack there, at any cost, else drop.
-
-        Args:
-            task: The task that the edge does not run.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """The cloud if the task fits in its slack there, at any cost, else drop."""
         if not self.resources.cloud_slots or now + self.cloud_time(task) > task.deadline:
             return [self.drop(task, now, "no time left for the cloud")]
         return [self.send(task, reason)]

@@ -19,12 +19,7 @@ class Dem(EdgeCloudEdf):
     """
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Insert, insert and migrate the victims, or send the newcomer down the cloud path.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Insert, insert and migrate the victims, or send the newcomer down the cloud path."""
         place, finish = self.slot(task, now)
         if finish >= task.deadline:
             return self.to_cloud(task, now)

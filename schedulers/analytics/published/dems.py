@@ -40,13 +40,7 @@ class Dems(Dem):
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """Let the task wait until its latest start in the cloud, or on the edge.
-
-        Args:
-            task: The task that the edge does not run.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """Let the task wait until its latest start in the cloud, or on the edge."""
         profile = task.profile
         pays = profile.cloud_gain > 0 and self.resources.cloud_slots > 0
         takes = self.cloud_time(task) if pays else profile.edge_time

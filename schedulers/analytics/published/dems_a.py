@@ -75,23 +75,12 @@ class DemsA(Dems):
         """Estimates at their arrival of the tasks that have not ended."""
 
     def drop(self, task: Task, now: int, reason: str) -> Drop:
-        """Forget the task's estimate.
-
-        Args:
-            task: The task that is given up.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """Forget the task's estimate."""
         self._fixed.pop(task, None)
         return super().drop(task, now, reason)
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Fix the estimate of the new task, then as DEMS.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Fix the estimate of the new task, then as DEMS."""
         model = self._model(task)
         if self.adapts:
             self._fixed[task] = model.cloud_time
@@ -105,13 +94,7 @@ class DemsA(Dems):
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """As DEMS, but a task that the estimate alone keeps away may be a probe.
-
-        Args:
-            task: The task that the edge does not run.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """As DEMS, but a task that the estimate alone keeps away may be a probe."""
         static = now + task.profile.cloud_time <= task.deadline
         if static and task.profile.cloud_gain > 0 and now + self.cloud_time(task) > task.deadline:
             model = self._model(task)
@@ -124,12 +107,7 @@ class DemsA(Dems):
         return super().to_cloud(task, now, reason)
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """Learn from a result of the cloud.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """Learn from a result of the cloud."""
         task = result.task
         self._fixed.pop(task, None)
         model = self._model(task)

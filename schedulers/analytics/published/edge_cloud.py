@@ -25,12 +25,7 @@ class EdgeCloudEdf(EdgeQueue):
         return task.profile.deadline if self.published else task.deadline
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Edge if the newcomer finishes before its deadline there, else the cloud path.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Edge if the newcomer finishes before its deadline there, else the cloud path."""
         place, finish = self.slot(task, now)
         if finish < task.deadline:
             self.insert(place, task)

@@ -39,12 +39,7 @@ class EdgeQueue(AnalyticsScheduler):
         return task.deadline
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
-        """Queue the task.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Queue the task."""
         self.insert(bisect_right(self.queue, self.key(task), key=self.key), task)
         return ()
 
@@ -155,12 +150,7 @@ class EdgeQueue(AnalyticsScheduler):
         self._lengths = [self.occupied(task) for task in self.queue]
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """The edge is free as soon as its task is back.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """The edge is free as soon as its task is back."""
         if result.started + result.task.profile.edge_time == self.free_at:
             self.free_at = now
         return ()

@@ -39,23 +39,12 @@ class Gems(DemsA):
         self._changed = False
 
     def drop(self, task: Task, now: int, reason: str) -> Drop:
-        """Count a drop.
-
-        Args:
-            task: The task that is given up.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """Count a drop."""
         self._count(task, now, done=False)
         return super().drop(task, now, reason)
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """As DEMS-A, then rescue.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """As DEMS-A, then rescue."""
         return self._and_rescue(super().task_arrived(task, now), now)
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
@@ -67,25 +56,14 @@ class Gems(DemsA):
         return self._and_rescue(super().timer(now), now)
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """Count the end, learn as DEMS-A unless as published, then rescue.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """Count the end, learn as DEMS-A unless as published, then rescue."""
         self._count(result.task, now, done=result.outcome is TaskOutcome.DONE)
         return self._and_rescue(super().task_finished(result, now), now)
 
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """As DEMS-A; as published, tasks that lose money in the cloud never wait.
-
-        Args:
-            task: The task that the edge does not run.
-            now: Time of the event, nanoseconds.
-            reason: Why, for the decision.
-        """
+        """As DEMS-A; as published, tasks that lose money in the cloud never wait."""
         if self.published and task.profile.cloud_gain < 0:
             return [self.drop(task, now, "the cloud costs more than the result is worth")]
         return super().to_cloud(task, now, reason)

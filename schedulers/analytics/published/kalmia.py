@@ -30,12 +30,7 @@ class Kalmia(Fifo):
         return self._extended.get(task, task.deadline)
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
-        """Edge, cloud, the same with an extension, or drop.
-
-        Args:
-            task: The task that has arrived.
-            now: Time of the event, nanoseconds.
-        """
+        """Edge, cloud, the same with an extension, or drop."""
         decisions = self._place(task, now)
         if decisions is None and not task.profile.urgent:
             self._extended[task] = task.deadline + int(EXTENSION * task.profile.deadline)
@@ -46,12 +41,7 @@ class Kalmia(Fifo):
         return decisions
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
-        """Forget the task's extension.
-
-        Args:
-            result: The task, where it ran, and how it ended.
-            now: Time of the event, nanoseconds.
-        """
+        """Forget the task's extension."""
         self._extended.pop(result.task, None)
         return super().task_finished(result, now)
 

@@ -130,12 +130,7 @@ class ArduPilot(Autopilot):
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """Guided first, then arm, then climb: it takes off in guided mode only.
-
-        Args:
-            height: Height to climb, metres.
-            telemetry: Ignored.
-        """
+        """Guided first, then arm, then climb: it takes off in guided mode only."""
         del telemetry
         climb = PendingCommand(
             mavlink.MAV_CMD_NAV_TAKEOFF,
@@ -154,12 +149,7 @@ class ArduPilot(Autopilot):
         return bool(sensors.health & check)
 
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Its PreArm texts.
-
-        Args:
-            telemetry: What the vehicle has told so far.
-            now: Monotonic clock, seconds.
-        """
+        """Its PreArm texts."""
         if self.ready(telemetry) is not False:
             return []
         said = [
@@ -182,22 +172,12 @@ class ArduPilot(Autopilot):
         return [telemetry.breach, *telling] if telemetry.breach else telling
 
     def encode(self, value: float, kind: int) -> float:
-        """Every parameter travels as a float.
-
-        Args:
-            value: The parameter's value.
-            kind: Ignored.
-        """
+        """Every parameter travels as a float."""
         del kind
         return value
 
     def decode(self, value: float, kind: int) -> float:
-        """Every parameter travels as a float.
-
-        Args:
-            value: As PARAM_VALUE carries it.
-            kind: Ignored.
-        """
+        """Every parameter travels as a float."""
         del kind
         return value
 
@@ -262,12 +242,7 @@ class ArduPilot(Autopilot):
         )
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
-        """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types.
-
-        Args:
-            action: What the vehicle does at the fence.
-            ceiling: Metres above home.
-        """
+        """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types."""
         code = {"warn": 0.0, "hold": 4.0, "return": 1.0, "land": 2.0}[action]
         altitude_and_polygon = 5.0
         return {

@@ -116,12 +116,7 @@ class PX4(Autopilot):
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """From hold, where no sticks are needed: arm, then climb to an altitude above the sea.
-
-        Args:
-            height: Height to climb, metres.
-            telemetry: What the vehicle has told so far.
-        """
+        """From hold, where no sticks are needed: arm, then climb to an altitude above the sea."""
         altitude = (telemetry.altitude or 0.0) + height
         climb = PendingCommand(
             mavlink.MAV_CMD_NAV_TAKEOFF,
@@ -139,12 +134,7 @@ class PX4(Autopilot):
         return bool(telemetry.sensors.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Complaints of its latest report of the arming checks.
-
-        Args:
-            telemetry: What the vehicle has told so far.
-            now: Ignored.
-        """
+        """Complaints of its latest report of the arming checks."""
         del now
         if telemetry.altitude is None:
             unknown = "PX4 does not know its altitude above the sea yet"
@@ -173,24 +163,14 @@ class PX4(Autopilot):
         return [*telemetry.events.new_objections(now, seconds), *said]
 
     def encode(self, value: float, kind: int) -> float:
-        """Integers travel as the float of the same bytes.
-
-        Args:
-            value: The parameter's value.
-            kind: Its MAV_PARAM_TYPE.
-        """
+        """Integers travel as the float of the same bytes."""
         if kind not in _INTEGER:
             return value
         (encoded,) = struct.unpack("<f", struct.pack("<i", round(value)))
         return float(encoded)
 
     def decode(self, value: float, kind: int) -> float:
-        """Integers travel as the float of the same bytes.
-
-        Args:
-            value: As PARAM_VALUE carries it.
-            kind: Its MAV_PARAM_TYPE.
-        """
+        """Integers travel as the float of the same bytes."""
         if kind not in _INTEGER:
             return value
         (decoded,) = struct.unpack("<i", struct.pack("<f", value))
@@ -243,11 +223,6 @@ class PX4(Autopilot):
         return tuple(wanted)
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
-        """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land.
-
-        Args:
-            action: What the vehicle does at the fence.
-            ceiling: Metres above home.
-        """
+        """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land."""
         code = {"warn": 1.0, "hold": 2.0, "return": 3.0, "land": 5.0}[action]
         return {"GF_ACTION": code, "GF_MAX_VER_DIST": ceiling}

@@ -114,12 +114,7 @@ class WireShare:
         return arrived
 
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        """Send a packet; drops unsendable ones.
-
-        Args:
-            packet: The packet's bytes.
-            peers: Addresses to send to, if the wire has several.
-        """
+        """Send a packet; drops unsendable ones."""
         self._owner.send(packet, peers)
 
     def close(self) -> None:
