@@ -205,7 +205,7 @@ class DroneActor(NodeActor):
 
     def _loop(self) -> None:
         (runner,) = self.runners
-        node, slack = self._node, IdleGarbageCollector()
+        node, collector = self._node, IdleGarbageCollector()
         while not (self.stopping or node.over):
             messages = runner.receive()
             self._calls.serve()
@@ -218,7 +218,7 @@ class DroneActor(NodeActor):
             self._watch_application()
             self._publish_reports()
             if node.due > self.clock.now():
-                slack.use()
+                collector.use()
         if node.failures:
             raise MissionError("; ".join(failure_of(*one) for one in node.failures.items()))
 

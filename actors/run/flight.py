@@ -444,7 +444,7 @@ class Flight:
             self._recordings.append(Path(path))
 
     def detach(self) -> None:
-        """Leave the drones and all other actors to the orphan reaper."""
+        """Hand the drones and all other actors over to the orphan reaper."""
         self._watch_no_longer()
 
     def _watch_no_longer(self) -> None:

@@ -298,7 +298,7 @@ class LocalPublisher:
         self._news.register(reader.control, select.EPOLLIN)
 
     def _receive_releases(self) -> None:
-        """Hear who has gone, and which slots are given back."""
+        """Receive which readers have gone, and which slots are given back."""
         while news := self._news.poll(0):
             for descriptor, _ in news:
                 reader = self._readers.get(descriptor)

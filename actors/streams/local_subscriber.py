@@ -241,7 +241,7 @@ class LocalSubscriber:
     def _read_link(
         self, link: _PublisherLink, found: dict[_PublisherLink, deque[memoryview]]
     ) -> int:
-        """Take what is complete of a link; returns how many messages that are."""
+        """Read the complete messages of a link; returns how many there are."""
         count = 0
         while link.behind:
             try:

@@ -169,11 +169,11 @@ class FlightProcess:
 
     @property
     def state(self) -> FlightState | None:
-        """What a look has found last."""
+        """State of the last poll."""
         return None if self._run is None else self._run.state
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Look at the drones, and bring them home once their lease has ended."""
+        """Poll the drones, and bring them home once their lease has ended."""
         if self._run is None:
             raise MissionError("the flight has not begun")
         state = self._run.poll(newest)
@@ -211,7 +211,7 @@ class FlightProcess:
         return self._run.command(robot, command)
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Tell nobody of a command: the service has written down who has given it."""
+        """Do nothing: the service has recorded who gave a command."""
 
     @property
     def over(self) -> bool:

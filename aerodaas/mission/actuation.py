@@ -108,7 +108,7 @@ class Actuation:
         return Answer(accepted=True)
 
     def poll(self, now: int) -> None:
-        """Take note of what became of commands, and withdraw those of a stop that was left.
+        """Process the results of commands, and withdraw those of a stop that was left.
 
         `now` is the mission clock, nanoseconds.
         """

@@ -82,7 +82,7 @@ class Filming:
             self._order_camera(_Order(on=False, where="at the end of the mission", since=now), now)
 
     def poll(self, now: int) -> None:
-        """Take note of what the camera says, at `now` (mission clock, ns)."""
+        """Process the camera's status at `now` (mission clock, ns)."""
         order = self._order
         if order is None or order.over:
             return

@@ -70,7 +70,7 @@ class SetpointLoop:
         self._asked_at = 0
 
     def step(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
-        """Take one turn of the loop.
+        """Execute one cycle of the loop.
 
         Args:
             now: Mission clock, nanoseconds.

@@ -121,7 +121,7 @@ class PhotoCapture:
             self._miss(label, 1, failure_line(error), now)
 
     def poll(self, now: int) -> None:
-        """Take note of pictures that were taken, and of those that failed, at `now` (ns)."""
+        """Process the outcomes of pictures at `now` (ns): taken, or failed."""
         try:
             camera = self.camera
             for outcome in () if camera is None else camera.outcomes():
@@ -204,7 +204,7 @@ class Photographer:
         self._timeout = timeout
         self._shutter = PhotoCapture(self._vehicle, log, timeout)
         self._filming = Filming(self._vehicle, log, timeout)
-        self._gaze = PointOfInterest()
+        self._point_of_interest = PointOfInterest()
         self._tasks: dict[str, _Task] = {}
         """By waypoint, so that a stop that was interrupted goes on where it was."""
         self._served: _Task | None = None
@@ -224,7 +224,7 @@ class Photographer:
     @property
     def looks(self) -> bool:
         """Whether gimbal or nose are kept on a place."""
-        return self._gaze.place is not None
+        return self._point_of_interest.place is not None
 
     def steer(self, place: Vector, odometry: Odometry, now: int) -> tuple[Vector, float | None]:
         """Where to fly for the pictures' sake on the way to `place`, and where the nose looks.
@@ -238,7 +238,7 @@ class Photographer:
             The place in ENU metres, and the heading in radians counter-clockwise from east; None as
             the drone flies.
         """
-        task, heading = self._served, self._gaze.heading
+        task, heading = self._served, self._point_of_interest.heading
         if task is None:
             return place, heading
         straight = np.array_equal(place, task.stop.waypoint.position)
@@ -268,7 +268,7 @@ class Photographer:
         return task.trigger if task is not None and task.stop is stop else None
 
     def poll(self, now: int) -> None:
-        """Take note of pictures and video that were taken, and of what failed, at `now` (ns)."""
+        """Process the outcomes of pictures and video at `now` (ns): taken, or failed."""
         self._shutter.poll(now)
         self._filming.poll(now)
 
@@ -326,16 +326,16 @@ class Photographer:
             task.over = waypoint.gimbal is None and waypoint.lens is None and not waypoint.photo
         self._served = task
         if waypoint.look_at is not None:
-            self._gaze.at(np.array(waypoint.look_at))
+            self._point_of_interest.at(np.array(waypoint.look_at))
         elif waypoint.gimbal is not None:
-            self._gaze.at(None)
+            self._point_of_interest.at(None)
         return task
 
     def _keep_looking(self, task: _Task, odometry: Odometry, now: int) -> None:
-        if self._gaze.place is None:
+        if self._point_of_interest.place is None:
             return
         try:
-            self._gaze.aim(self._gimbal(), odometry, now, task.stop.waypoint.yaw)
+            self._point_of_interest.aim(self._gimbal(), odometry, now, task.stop.waypoint.yaw)
         except Exception as error:  # noqa: BLE001 - a driver's gimbal must not end a flight
             self._log.alert(now, "photo", f"the gimbal: {failure_line(error)}")
 
@@ -362,7 +362,7 @@ class Photographer:
         if task.stop.waypoint.photo and self._shutter.camera is None:
             raise VehicleError(NO_CAMERA)
         lens = self._lens_set(task)
-        there = self._gaze.place is None or self._gaze.there
+        there = self._point_of_interest.place is None or self._point_of_interest.there
         if gimbal is not None and task.aim is not None:
             there = self._aims(task, gimbal, now)
         if task.began is None:

@@ -150,7 +150,7 @@ class PointOfInterest:
         self.there = attitude is not None and near(attitude, aim)
 
     def _command_gimbal(self, gimbal: Gimbal, target: GimbalTarget, now: int) -> GimbalTarget:
-        """Tell the gimbal where that is due; returns the target within its range."""
+        """Command the gimbal where that is due; returns the target within its range."""
         told, clipped = self._told, self._clipped
         if told is not None and clipped is not None:
             moved = max(

@@ -184,7 +184,7 @@ class DroneNode(Node):
             self.host.alert("drone_failed", failure_of(controller.id, error))
 
     def _publish_whereabouts(self, now: int) -> None:
-        """Tell the other drones' nodes where the robots of this one are."""
+        """Publish where this node's robots are, for the other drones' nodes."""
         outlet = self.outlet(whereabouts_stream(self.name))
         header = Header(outlet.sent, now, outlet.stream)
         places = self._whereabouts.of(self._controllers)

@@ -102,7 +102,7 @@ class Missions(ShownMissions, Protocol):
         ...
 
     def record_presence(self, mission: str) -> None:
-        """Note that the user of a mission is there."""
+        """Record that the user of a mission is there."""
         ...
 
     def version(self, mission: str) -> int:

@@ -379,7 +379,7 @@ class MissionService:
         self._orders.require_scopes(principal, active.document())
 
     def record_presence(self, mission: str) -> None:
-        """Note that the user of a mission is there."""
+        """Record that the user of a mission is there."""
         active = self._missions.get(mission)
         if active is not None and active.phase is MissionPhase.FLYING:
             active.follow().record_presence()

@@ -70,7 +70,7 @@ class Renderer:
     """
 
     def __init__(
-        self, world: World, camera: CameraModel, looks: ObjectAppearance | None = None
+        self, world: World, camera: CameraModel, appearance: ObjectAppearance | None = None
     ) -> None:
         """Build the scene and an offscreen buffer of the camera's size."""
         load_prc_file_data("aerodaas", _SETTINGS)
@@ -90,7 +90,7 @@ class Renderer:
         # A separate engine, so that rendering one camera does not render all others of the process.
         self._pipe = pipe
         self._engine = GraphicsEngine(pipe)
-        self._scene = Scene(world, looks)
+        self._scene = Scene(world, appearance)
         self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
         self._pixels = self._open(self._eye, HAZE)
 

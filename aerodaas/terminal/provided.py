@@ -67,7 +67,7 @@ class ProvidedView:
             self._view.__exit__(None, None, None)
 
     def show_message(self, text: str) -> None:
-        """Tell of something on this side, in any thread."""
+        """Show a message of this side, in any thread."""
         with self._lock:
             self._notes.append(text)
         if self._view is None or not self._view.live:

@@ -58,10 +58,10 @@ class LabellingRenderer(Renderer):
     """Renders the picture and, beside it, the number of the thing that each pixel shows."""
 
     def __init__(
-        self, world: World, camera: CameraModel, looks: ObjectAppearance | None = None
+        self, world: World, camera: CameraModel, appearance: ObjectAppearance | None = None
     ) -> None:
         """Build the scene, and a second buffer that shares its camera."""
-        super().__init__(world, camera, looks)
+        super().__init__(world, camera, appearance)
         self._world = world
         self.things = _labelled(self._scene.root)
         self._codes = self._open(self._eye.attach_new_node(self._code_camera()), np.zeros(3))

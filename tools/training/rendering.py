@@ -40,12 +40,16 @@ _AS_FLOWN = 3
 
 
 def render_world(
-    seed: int, views: int = VIEWS, *, plain: bool = False, looks: ObjectAppearance | None = None
+    seed: int,
+    views: int = VIEWS,
+    *,
+    plain: bool = False,
+    appearance: ObjectAppearance | None = None,
 ) -> Iterator[Sample]:
     """Pictures of the world of this seed, 416 pixels wide; `plain` leaves them as rendered."""
     rng = np.random.default_rng([seed, 1])
     world, camera = draw_world(seed), draw_camera(rng)
-    renderer = LabellingRenderer(world, camera, looks or VariousLooks())
+    renderer = LabellingRenderer(world, camera, appearance or VariousLooks())
     for _ in range(rng.integers(0, 16)):
         x, y = rng.uniform(-14, 14, 2).tolist()
         add_clutter(renderer.scene, renderer.palette, (x, y), rng)
@@ -66,7 +70,7 @@ def render_world(
 def _world(seed: int) -> Iterator[Sample]:
     if seed % _AS_FLOWN:
         return render_world(seed)
-    return render_world(seed, plain=True, looks=ObjectAppearance())
+    return render_world(seed, plain=True, appearance=ObjectAppearance())
 
 
 def render_shards(folder: Path, first: int, worlds: int, processes: int = 1) -> Iterator[int]:

@@ -134,8 +134,8 @@ def establish(
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
     # Now: its place may be lost again, which changes nothing any more, while the rest is seen to.
     alignment = Alignment(_frame(telemetry, robot, settings, home, pause), telemetry)
-    journal = ParameterBackup(_own_name(autopilot, telemetry, settings, link.target[0], pause))
-    fallback = Fallback(link, autopilot, settings, name=robot.id, journal=journal)
+    backup = ParameterBackup(_own_name(autopilot, telemetry, settings, link.target[0], pause))
+    fallback = Fallback(link, autopilot, settings, name=robot.id, backup=backup)
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
         if settings.fence != "off" and not settings.observe:

@@ -290,7 +290,7 @@ class Ros2Vehicle:
                 self._loop.land(None if self._stale else self._odometry)
 
     def _run(self) -> None:
-        """Turn the loop 20 times a second until the link is closed."""
+        """Step the loop 20 times a second until the link is closed."""
         closing = self._closing
         while not closing.wait(_PERIOD):
             with self._lock:

@@ -68,7 +68,7 @@ class Neighbours:
         drones of one node ask at one moment."""
 
     def update(self, name: str, where: Whereabouts | None) -> None:
-        """Take what the drone `name` tells; None, a place unknown to it, leaves the last.
+        """Update the whereabouts of the drone `name`; None, a place unknown to it, keeps the last.
 
         Args:
             name: Id of the drone.

@@ -63,7 +63,7 @@ class DecisionSums:
         return [*self._rows, *self._row(self._last)]
 
     def add(self, decision: Decision) -> None:
-        """Take one decision or outcome."""
+        """Add one decision or outcome."""
         now, action = seconds(decision.stamp), decision.action
         if action == "drop":
             # A task that its scheduler gives up ends by that.
@@ -93,7 +93,7 @@ class DecisionSums:
 def read_flight(
     recording: Recording, tell: Callable[[float], None] = lambda _: None
 ) -> tuple[RecordedOut, FrameIndex]:
-    """Read an open recording, which the film goes on reading.
+    """Read an open recording, which the frame index goes on reading.
 
     Args:
         recording: The recording.
@@ -146,8 +146,8 @@ class _Reading:
             for name, (calibration, mount) in self._mounts.items()
         }
         pictures, found, flown = map(self._named, (self._pictures, self._found, self._flown))
-        film = FrameIndex(recording, pictures, found, flown, mounts)
-        return self._told_of(first or 0, last), film
+        frames = FrameIndex(recording, pictures, found, flown, mounts)
+        return self._told_of(first or 0, last), frames
 
     def _named(self, streams: dict[str, str]) -> dict[str, tuple[str, Captures]]:
         return {name: (topic, self._captures[topic]) for name, topic in streams.items()}

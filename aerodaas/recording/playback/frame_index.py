@@ -109,7 +109,7 @@ class FrameIndex:
         self._navigation = navigation
         self._mounts = mounts
         self._schemas = {name: one.schema for name, one in recording.topics.items()}
-        self._reels: dict[str, _TopicReader] = {}
+        self._readers: dict[str, _TopicReader] = {}
 
     def at(self, stream: str, time: int, *, depth: bool = False) -> list[Packed]:
         """The picture of a stream that was the last one captured at or before a time.
@@ -136,21 +136,23 @@ class FrameIndex:
         return []
 
     def _shot(self, topic: str, captures: Captures, place: int) -> RecordedImage | None:
-        reel = self._reels.get(topic)
-        if reel is not None and reel.place == place:
-            return reel.shot
-        if reel is None or not self._comes(captures, reel.place, place):
+        reader = self._readers.get(topic)
+        if reader is not None and reader.place == place:
+            return reader.shot
+        if reader is None or not self._comes(captures, reader.place, place):
             since = self._start(topic, captures, place)
-            reel = self._reels[topic] = _TopicReader(shots(self._recording, [topic], since), place)
+            reader = self._readers[topic] = _TopicReader(
+                shots(self._recording, [topic], since), place
+            )
         captured, recorded = captures.captured[place], captures.recorded[place]
-        for shot in reel.shots:
+        for shot in reader.shots:
             if shot.record.captured == captured and shot.record.stamp == recorded:
-                reel.place, reel.shot = place, shot
+                reader.place, reader.shot = place, shot
                 return shot
             if shot.record.stamp > recorded:
                 break
         # It is broken, and what comes after it has been read.
-        del self._reels[topic]
+        del self._readers[topic]
         return None
 
     @staticmethod

@@ -112,7 +112,7 @@ class TrackBuilder:
                 del rows[1::2]
 
     def _add_traffic(self, now: float, told: Sequence[Traffic]) -> None:
-        """Take the other aircraft of a state, once a second and when the last one is gone."""
+        """Add the other aircraft of a state, once a second and when the last one is gone."""
         heard = self._track.traffic
         aircraft = [TrafficOut.of(one) for one in told[:_MOST_AIRCRAFT] if _is_placed(one)]
         due = not heard or now >= heard[-1].since + _HEARD_SECONDS or not aircraft

@@ -97,11 +97,11 @@ def import_bag(
     if not bag.topics:
         raise RecordingError(f"{bag.path} holds no whole message: it is empty, or was cut off")
     topics.check(bag.topics)
-    beginning = BagPreview(bag, topics)
-    environment = _environment(bag.path, beginning)
+    preview = BagPreview(bag, topics)
+    environment = _environment(bag.path, preview)
     # No revision: it is that of an application.
     provenance = Provenance(
-        started_ns=beginning.epoch_ns,
+        started_ns=preview.epoch_ns,
         name=bag.path.stem,
         config=public_document(environment),
         versions=package_versions(),
@@ -109,9 +109,9 @@ def import_bag(
     config = images or RecordingConfig()
     try:
         with FlightRecorder(
-            path, config=config, provenance=provenance, home=beginning.home
+            path, config=config, provenance=provenance, home=preview.home
         ) as recorder:
-            work = _Import(beginning, recorder)
+            work = _Import(preview, recorder)
             work.run(bag)
             if not work.taken:
                 raise RecordingError(f"nothing of {bag.path} could be read: {_why(bag, work)}")
@@ -120,8 +120,7 @@ def import_bag(
         path.unlink(missing_ok=True)
         raise
     lenses = {
-        camera: "horizontal_fov" in beginning.camera(topic)
-        for camera, topic in topics.camera.items()
+        camera: "horizontal_fov" in preview.camera(topic) for camera, topic in topics.camera.items()
     }
     return ImportedBag(summary, work.skipped, bag.damaged, bag.complete, bag.leaps, lenses)
 
@@ -134,19 +133,19 @@ def _why(bag: RosBag, work: _Import) -> str:
 class _Import:
     """One pass over the bag, message by message."""
 
-    def __init__(self, beginning: BagPreview, recorder: FlightRecorder) -> None:
+    def __init__(self, preview: BagPreview, recorder: FlightRecorder) -> None:
         self.skipped: dict[str, tuple[int, str]] = {}
         self.taken = 0
-        self._beginning = beginning
+        self._preview = preview
         self._recorder = recorder
-        topics = self._topics = beginning.topics
+        topics = self._topics = preview.topics
         self._streams = {one.topic: f"{topics.robot}/{one.name}" for one in topics.taken()}
         self._models: dict[str, CameraModel | None] = {}
         self._sequences: Counter[str] = Counter()
         self._newest: dict[str, int] = {}
         self._odometry: Odometry | None = None
-        self._battery = beginning.battery
-        self._fix = beginning.fix
+        self._battery = preview.battery
+        self._fix = preview.fix
         self._flying = False
         self._ground: float | None = None
         """Height at which it stood first, metres."""
@@ -163,10 +162,10 @@ class _Import:
             "detections": self._detections,
         }
         uses = {one.topic: takers[one.use] for one in self._topics.taken()}
-        epoch = self._beginning.epoch_ns
+        epoch = self._preview.epoch_ns
         for message in bag.messages(uses.keys()):
             try:
-                captured, recorded = self._beginning.times(message)
+                captured, recorded = self._preview.times(message)
                 if captured <= self._newest.get(message.topic, captured - 1):
                     raise ValueError("it is not newer than the one before")  # noqa: TRY301
                 uses[message.topic](message, captured - epoch, recorded - epoch)
@@ -235,7 +234,7 @@ class _Import:
     def _model(self, topic: str, width: int, height: int) -> CameraModel | None:
         known = self._models.get(topic)
         if topic not in self._models or (known and (known.width, known.height) != (width, height)):
-            settings = self._beginning.camera(topic)
+            settings = self._preview.camera(topic)
             self._models[topic] = None
             if "horizontal_fov" in settings:
                 lens = checked(CameraConfig, settings, f"the camera on {topic}")
@@ -243,7 +242,7 @@ class _Import:
         return self._models[topic]
 
     def _detections(self, message: BagMessage, captured: int, recorded: int) -> None:
-        topic = self._beginning.camera_of_frame(message.value.header.frame_id)
+        topic = self._preview.camera_of_frame(message.value.header.frame_id)
         picture = self._recent.get(topic or "", OrderedDict()).get(captured)
         if topic is None or picture is None:
             raise ValueError("no picture of this stamp and frame was taken")
@@ -258,25 +257,25 @@ class _Import:
         self._recorder.write(Message(stream, sequence, recorded, header, 0, (), item))
 
 
-def _environment(path: Path, beginning: BagPreview) -> EnvironmentConfig:
+def _environment(path: Path, preview: BagPreview) -> EnvironmentConfig:
     """The environment that a run with these sensors would have had."""
-    topics = beginning.topics
+    topics = preview.topics
     sensors: list[dict[str, Any]] = []
     for use, name, topic in topics.taken():
         if use == "detections":
             continue
         sensor: dict[str, Any] = {"id": name, "type": use}
-        rate = beginning.rate(topic)
+        rate = preview.rate(topic)
         if rate is not None:
             sensor["rate"] = rate
         if use == "camera":
-            sensor |= {"driver": "mcap", "settings": beginning.camera(topic)}
+            sensor |= {"driver": "mcap", "settings": preview.camera(topic)}
         sensors.append(sensor)
     # The bag may begin in the air, above which nothing has to be reached for a take-off.
     limits = {"takeoff_height": LimitsConfig().arrival_radius}
     robot = {"id": topics.robot, "sensors": sensors, "limits": limits}
     content: dict[str, Any] = {"robots": [robot]}
-    home = beginning.home
+    home = preview.home
     if home is not None:
         content["home"] = {
             "latitude": home.latitude,

@@ -135,7 +135,7 @@ class RecordedClock:
     """Mission seconds of the states with motors armed."""
 
     def add_state(self, state: VehicleState) -> None:
-        """Take a state."""
+        """Add a vehicle's state."""
         now = seconds(state.stamp)
         clock = state.extra.get("autopilot_time", np.nan)
         if np.isfinite(clock):

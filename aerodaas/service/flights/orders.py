@@ -257,7 +257,7 @@ class FlightOrders:
             f"{entry.robot}/{name}"
             for entry in document.navigation
             for waypoint in entry.waypoints
-            for name, _ in waypoint.actuate
+            for name in waypoint.moves
         }
         if refused := sorted(asked - may):
             raise RefusedError(

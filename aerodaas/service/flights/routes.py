@@ -68,7 +68,7 @@ class FlightRoutes:
         return self._flight.fly(principal, OWN, body)
 
     def record_presence(self, request: Request) -> Answer:
-        """Note that the user is there."""
+        """Record that the user is there."""
         self._admission.require(request, Role.OPERATOR)
         self._lease.record_presence()
         return Answer(accepted=True)

@@ -74,7 +74,7 @@ class LeaseWatch:
         self._over.set()
 
     def record_presence(self) -> None:
-        """Note that the user has been heard of."""
+        """Record that the user has been heard of."""
         with self._lock:
             self._heard = time.monotonic()
 

@@ -29,7 +29,7 @@ class Player:
         self._path = path
         self._recording = recording
         self._lock = threading.Lock()
-        self._film: FrameIndex | None = None
+        self._frames: FrameIndex | None = None
         self._closed = False
         self._problem = ""
         self._read = 0.0
@@ -60,10 +60,10 @@ class Player:
         """
         self._require_readable()
         with self._lock:
-            if self._film is None or self._closed:
+            if self._frames is None or self._closed:
                 raise RecordingError("the recording is being read; ask again in a moment")
             try:
-                items = self._film.at(stream, time, depth=depth)
+                items = self._frames.at(stream, time, depth=depth)
             except KeyError:
                 raise ConfigError(f"the recording shows no camera {stream!r}") from None
             except OSError as error:
@@ -76,7 +76,7 @@ class Player:
         with self._lock:
             self._closed = True
             # While it is read for the first time, its reader closes it.
-            if self._recording is not None and (self._film is not None or self._problem):
+            if self._recording is not None and (self._frames is not None or self._problem):
                 self._recording.close()
 
     def _require_readable(self) -> None:
@@ -84,11 +84,11 @@ class Player:
             raise RecordingError(self._problem)
 
     def _begin(self) -> None:
-        problem, film, text, recording = "", None, b"", self._recording
+        problem, frames, text, recording = "", None, b"", self._recording
         try:
             # One that was cut off is scanned whole, which may take a while.
             recording = recording or Recording.open(self._path)
-            flight, film = read_flight(recording, self._set_progress)
+            flight, frames = read_flight(recording, self._set_progress)
             text = PlaybackOut(read=1.0, flight=flight).model_dump_json().encode()
         except AeroDaaSError as error:
             # Where it lies at a provider is nobody else's business.
@@ -99,7 +99,7 @@ class Player:
             problem = f"{self._path.name} cannot be read"
             _log.exception("reading %s", self._path)
         with self._lock:
-            self._recording, self._film, self._text = recording, film, text
+            self._recording, self._frames, self._text = recording, frames, text
             self._problem = problem
             if self._closed and recording is not None:
                 recording.close()

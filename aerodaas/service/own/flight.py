@@ -80,7 +80,7 @@ class FlightMeter:
         return max((one.time for one in self.status.values()), default=0.0)
 
     def record(self, state: FlightState) -> None:
-        """Take over a state of the run."""
+        """Record a state of the run."""
         told = {}
         for name, report in state.robots.items():
             now, before = seconds(report.status.stamp), self.status.get(name)
@@ -221,7 +221,7 @@ class OwnFlight:
         threading.Thread(target=self._poll_while_watched, name="console", daemon=True).start()
 
     def end(self) -> None:
-        """Look no more: the flight is over."""
+        """Poll no more: the flight is over."""
         if self._run.state is not None:
             self._record(self._run.state)
         self._closed.set()
@@ -445,7 +445,7 @@ class OwnFlight:
         )
 
     def _refresh(self) -> None:
-        """Look at the drones, unless somebody watches, so that it is done anyway.
+        """Poll the drones, unless somebody watches, so that it is done anyway.
 
         Who commands and then reads sees its own command's effect.
         """

@@ -59,11 +59,11 @@ class ObjectAppearance:
 class Scene:
     """Scene nodes of a world; `update` moves the moving objects."""
 
-    def __init__(self, world: World, looks: ObjectAppearance | None = None) -> None:
+    def __init__(self, world: World, appearance: ObjectAppearance | None = None) -> None:
         """Build the static objects, and the figures of moving ones."""
-        self.looks = looks or ObjectAppearance()
+        self.appearance = appearance or ObjectAppearance()
         self.root = NodePath("world")
-        self.palette = self.looks.palette(world)
+        self.palette = self.appearance.palette(world)
         self._light = Light.draw(world.scenario.sky, world.seed)
         self._sky = sky_dome(self.root, self._light)
         add_ground(self.root, world.scenario.ground.surface, self.palette, self._light)
@@ -92,15 +92,15 @@ class Scene:
             add_rubble(root, thing, palette, light)
         elif isinstance(spec, Tower):
             add_shadow(root, thing, palette, light)
-            add_tower(root, thing, palette, light, self.looks.tower(thing))
+            add_tower(root, thing, palette, light, self.appearance.tower(thing))
         elif isinstance(spec, Car):
-            car = CarFigure(root, thing, palette, self.looks.car(thing))
+            car = CarFigure(root, thing, palette, self.appearance.car(thing))
             add_shadow(car.node, thing, palette, light)
             self._cars.append((thing, car))
         elif isinstance(spec, Person):
             feet = root.attach_new_node("feet")
             add_shadow(feet, thing, palette, light)
-            figure = PersonFigure(root, thing, palette, self.looks.outfit(thing))
+            figure = PersonFigure(root, thing, palette, self.appearance.outfit(thing))
             self._people.append((thing, figure, feet))
 
     def update(self, time: float, eye: tuple[float, float, float]) -> None:

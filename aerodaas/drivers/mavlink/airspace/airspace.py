@@ -72,7 +72,7 @@ class Airspace:
             self._traffic.update(message, now, origin, sea_level, self._here)
 
     def step(self, now: float) -> None:
-        """Tell the transmitter what is due, and ask for traffic."""
+        """Send the transmitter the messages that are due, and request traffic."""
         if self._link is None or self._commander is None:
             return
         for message in self._remote_id.due_messages(now, self._place, self._link.target[0]):

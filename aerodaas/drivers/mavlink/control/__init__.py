@@ -1,1 +1,1 @@
-"""Control of a vehicle: take-off and its withdrawal, setpoints, guidance, and the watchdog."""
+"""Control of a vehicle: take-off and its cancellation, setpoints, guidance, and the watchdog."""

@@ -52,7 +52,7 @@ class Departure:
         self._top = math.inf
         """Height of the latest take-off, metres up in the autopilot's frame."""
         self._climb: Climb | None = None
-        self._withdrawal: TakeoffCancellation | None = None
+        self._cancellation: TakeoffCancellation | None = None
 
     @property
     def goal(self) -> float | None:
@@ -72,7 +72,7 @@ class Departure:
     @property
     def withdrawing(self) -> bool:
         """Whether one was withdrawn, and motors might still start or turn."""
-        return self._withdrawal is not None
+        return self._cancellation is not None
 
     def begin(self, orders: Sequence[PendingCommand], height: float, now: float) -> None:
         """Climb by `orders`.
@@ -114,7 +114,7 @@ class Departure:
         if not self._flies():
             # In the mode of a take-off, a late order to arm would make it fly.
             self._commander.give(self._hold, now=now)
-        self._withdrawal = TakeoffCancellation(
+        self._cancellation = TakeoffCancellation(
             self._commander, self._disarm, self._land, now, flies=self._flies()
         )
 
@@ -127,7 +127,7 @@ class Departure:
         """Stop all commands, as another pilot flies."""
         if self._climb is not None:
             self._climb.cancel()
-        self._climb = self._withdrawal = None
+        self._climb = self._cancellation = None
         self._commander.withdraw_steering()
 
     def observe(self, now: float, *, was_armed: bool) -> None:
@@ -146,10 +146,10 @@ class Departure:
             self.let_go()
             if not phase.armed:
                 phase.rest()
-        if self._withdrawal is not None:
-            self._withdrawal.observe(now, armed=phase.armed)
-            if self._withdrawal.over:
-                self._withdrawal = None
+        if self._cancellation is not None:
+            self._cancellation.observe(now, armed=phase.armed)
+            if self._cancellation.over:
+                self._cancellation = None
                 phase.rest()
 
     def update(self, now: float) -> None:

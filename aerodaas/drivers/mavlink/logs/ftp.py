@@ -343,7 +343,7 @@ class _Pieces:
         return self.at >= self.size
 
     def add(self, offset: int, content: bytes) -> bool:
-        """Take a piece; whether it has anything new."""
+        """Add a piece; returns whether it has anything new."""
         content = content[: max(0, self.size - offset)]
         known = len(self._ahead.get(offset, b""))
         ends = offset + len(content)

@@ -3,7 +3,7 @@
 A drone's actor that is killed, or whose host dies, can bring nobody home any more. What is left is
 the autopilot, which acts on our silence as its parameters say. They belong to the vehicle's owner:
 they are read and judged, and set only where the environment's settings ask for it; what was there
-before is kept in a journal before anything is changed, and put back when we let go of the vehicle
+before is kept in a backup before anything is changed, and put back when we let go of the vehicle
 on the ground, or the next time, if we were killed.
 """
 
@@ -65,22 +65,20 @@ class Fallback:
         settings: MavlinkSettings,
         *,
         name: str,
-        journal: ParameterBackup,
+        backup: ParameterBackup,
     ) -> None:
         """Of robot `name`; nothing is read or changed yet."""
         self._link = link
         self._autopilot = autopilot
         self._settings = settings
         self._name = name
-        self._journal = journal
+        self._backup = backup
         self.obstacles: tuple[str, ...] = ("its fallback was not looked at: it was flying already",)
         """Why it would not come home, one sentence each; empty if it would."""
 
     def under(self, settings: MavlinkSettings) -> Fallback:
         """The fallback of the same vehicle under other settings."""
-        return Fallback(
-            self._link, self._autopilot, settings, name=self._name, journal=self._journal
-        )
+        return Fallback(self._link, self._autopilot, settings, name=self._name, backup=self._backup)
 
     @property
     def objections(self) -> list[str]:
@@ -141,7 +139,7 @@ class Fallback:
 
         What somebody else has changed since is left alone.
         """
-        changes = self._journal.read()
+        changes = self._backup.read()
         if changes is None:
             return
         parameters = Parameters(self._link, self._autopilot)
@@ -150,7 +148,7 @@ class Fallback:
             if value is None:
                 raise VehicleError(
                     f"{self._name}: it does not tell {name}, which was {change.before:g} before we "
-                    f"set it: {self._journal.path} keeps what is to be put back"
+                    f"set it: {self._backup.path} keeps what is to be put back"
                 )
             if _same(value, change.set_to):
                 parameters.set(name, change.before)
@@ -162,10 +160,10 @@ class Fallback:
         if changes.mission is not None:
             upload(self._link, changes.mission)
             _log.warning("%s: the vehicle's own mission is on it again", self._name)
-        self._journal.clear()
+        self._backup.clear()
 
     def _remind(self) -> None:
-        changes = self._journal.read()
+        changes = self._backup.read()
         if changes is None or self._settings.fallback == "set":
             return
         said = ", ".join(f"{name} {one.before:g}" for name, one in changes.parameters.items())
@@ -191,18 +189,18 @@ class Fallback:
         return [one.text for one in judged if one.value is None]
 
     def _change(self, wanted: Sequence[FallbackParameter], plan: Sequence[MissionItem]) -> None:
-        """Set what does not fit; the journal is always ahead of the vehicle."""
+        """Set what does not fit; the backup is always ahead of the vehicle."""
         judged = self._judge(wanted)
         unknown = [one.text for one in judged if one.value is None]
         if unknown:
             raise VehicleError(f"{self._name}: {'; '.join(unknown)}")
-        changes = self._journal.read() or Changes()
+        changes = self._backup.read() or Changes()
         try:
             # The plan first: what flies it must not be switched on before it is there.
             if plan:
                 if changes.mission is None:
                     changes.mission = download(self._link)
-                    self._journal.write(changes)
+                    self._backup.write(changes)
                 upload_way_home(self._link, plan)
             parameters = Parameters(self._link, self._autopilot)
             for one in judged:
@@ -211,7 +209,7 @@ class Fallback:
                 ours = earlier is not None and _same(earlier.set_to, one.value)
                 before = earlier.before if earlier is not None and ours else one.value
                 changes.parameters[one.name] = ParameterChange(before, one.needed)
-                self._journal.write(changes)
+                self._backup.write(changes)
                 parameters.set(one.name, one.needed)
                 _log.warning(
                     "%s: %s is %g for this flight, instead of %g: %s",

@@ -223,7 +223,7 @@ class MavlinkMissionMode:
             self._fail(text)
 
     def on_message(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take one of `messages`.
+        """Process one of `messages`.
 
         Args:
             message: The message.

@@ -34,7 +34,7 @@ class Changes(BaseModel):
 
 
 class ParameterBackup:
-    """The journal of one vehicle, a file that only its owner can read."""
+    """Backup of one vehicle, a file that only its owner can read."""
 
     def __init__(self, vehicle: str) -> None:
         """Open nothing; `vehicle` names the vehicle and nothing else."""

@@ -188,7 +188,7 @@ class PayloadComponent:
             self._on_information(message, kind, now)
 
     def _on_information(self, message: Message, kind: str, now: float) -> None:
-        """Take in what was searched for."""
+        """Process information that was searched for."""
         if kind == "GIMBAL_MANAGER_INFORMATION":
             self.gimbal = self.gimbal or MavlinkGimbal(message, self.commander)
         elif kind == "CAMERA_INFORMATION":

@@ -86,7 +86,7 @@ class BootClock:
         return mavlink.MAVLink_timesync_message(0, self._pending)
 
     def on_timesync(self, message: Any) -> None:  # noqa: ANN401
-        """Take a TIMESYNC of the autopilot; its own requests are none of our answers."""
+        """Process a TIMESYNC of the autopilot; its own requests are none of our answers."""
         now = self._clock()
         if message.tc1 > 0 and (message.ts1 - self._system) % _SYSTEMS == 0:
             self._answered, self._unanswered_since = True, None
