@@ -25,7 +25,6 @@ __all__ = [
     "HeightReference",
     "NavigationItem",
     "NavigationType",
-    "Number",
     "SchedulingType",
     "TargetState",
     "VelocityCommand",
@@ -103,10 +102,9 @@ LEAST_TRIGGER = 0.1
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
 Number: TypeAlias = Annotated[float, StrictlyTyped(), Ge(-LARGEST), Le(LARGEST)]
-_Flag: TypeAlias = Annotated[bool, StrictlyTyped()]
-_Angle: TypeAlias = Annotated[Number, Ge(-_HALF_TURN), Le(_HALF_TURN)]
-_Trigger: TypeAlias = Annotated[Number, Ge(LEAST_TRIGGER)]
-_Percent: TypeAlias = Annotated[Number, Ge(0.0), Le(_WHOLE)]
+Flag: TypeAlias = Annotated[bool, StrictlyTyped()]
+Angle: TypeAlias = Annotated[Number, Ge(-_HALF_TURN), Le(_HALF_TURN)]
+Percent: TypeAlias = Annotated[Number, Ge(0.0), Le(_WHOLE)]
 
 
 def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
@@ -175,22 +173,22 @@ class Waypoint:
     """Seconds of mission time by which to arrive; None for no deadline."""
     above: HeightReference | str | None = None
     """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
-    gimbal_pitch: _Angle | None = None
+    gimbal_pitch: Angle | None = None
     """Radians to which the gimbal is turned on the way there, 0 at the horizon, negative
     downwards: -pi/2 looks straight down. None leaves it as it is, or level where `gimbal_yaw` is
     given."""
-    gimbal_yaw: _Angle | None = None
+    gimbal_yaw: Angle | None = None
     """Radians from the nose, counter-clockwise; None leaves it as it is, or ahead where
     `gimbal_pitch` is given."""
-    photo: _Flag = False
+    photo: Flag = False
     """Whether a picture is taken there, once the gimbal looks where it is to."""
     actuate: Annotated[dict[str, str] | tuple[tuple[str, str], ...], PairsAsObject()] = ()
     """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
     other, after the picture; kept as a tuple of pairs."""
-    trigger_distance: _Trigger | None = None
+    trigger_distance: Annotated[Number, Ge(LEAST_TRIGGER)] | None = None
     """Metres between pictures on the way there, along the straight line from where it begins; the
     drone does not stop for them. None takes none."""
-    trigger_interval: _Trigger | None = None
+    trigger_interval: Annotated[Number, Ge(LEAST_TRIGGER)] | None = None
     """Seconds between pictures on the way there and during the stay; the drone does not stop for
     them. None takes none."""
     look_at: tuple[Number, Number, Number] | None = None
@@ -198,12 +196,12 @@ class Waypoint:
     cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
     x, y and z are."""
 
-    zoom: _Percent | None = None
+    zoom: Percent | None = None
     """Percent of the camera's zoom, 0 (sees most) to 100, that is set on the way there; None leaves
     it as it is."""
-    focus: _Percent | None = None
+    focus: Percent | None = None
     """The same for the focus, 0 (near) to 100 (far)."""
-    video: _Flag | None = None
+    video: Flag | None = None
     """Whether the camera's recording on its own card is begun there (True) or ended (False), after
     the picture and before actuators move; None leaves it as it is. One that the mission has begun
     ends with it."""
