@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from aerodaas.protocol.schemas import Role
+from aerodaas.protocol.schemas import PictureForm, Role
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.http.gate import Admission, LimitsMiddleware
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
+from aerodaas.service.live.session import wanted_streams
 
 
 @dataclass
@@ -107,3 +108,12 @@ def test_what_exceeds_a_limit_is_refused(
         assert await asked(0) == 200
 
     asyncio.run(count())
+
+
+def test_a_live_view_has_as_many_streams_as_it_may() -> None:
+    """Those named first; pictures and their depth count alike."""
+    names = [f"drone/{number}" for number in range(20)]
+    asked = wanted_streams(",".join(names), PictureForm.JPEG, ",".join(names))
+    assert asked == [(name, PictureForm.JPEG) for name in names[:16]]
+    few = wanted_streams("drone/cam", PictureForm.JPEG, ",".join(names))
+    assert few[1:] == [(name, PictureForm.DEPTH) for name in names[:15]]
