@@ -278,18 +278,18 @@ class LeaseBook:
     """
 
     def __init__(
-        self, shelf: LeaseTable, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
+        self, table: LeaseTable, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
     ) -> None:
-        """Go on with the leases on `shelf`; call `tick` next, for some may be over.
+        """Go on with the leases of `table`; call `tick` next, for some may be over.
 
         Raises:
             StoreError: If the database does not answer.
         """
-        self._shelf = shelf
+        self._table = table
         self._new_id = new_id
         self._lock = threading.RLock()
-        self._live = {lease.id: lease for lease in shelf.live()}
-        self._number = shelf.highest_number()
+        self._live = {lease.id: lease for lease in table.live()}
+        self._number = table.highest_number()
         self._unsaved: dict[str, Lease] = {}
         self._changes: list[Lease] = []
 
@@ -504,7 +504,7 @@ class LeaseBook:
         live |= {lease.id: lease for lease in granted}
         rows = self._unsaved | {lease.id: live[lease.id] for lease in (*changed, *granted)}
         if rows:
-            self._shelf.put(*rows.values())
+            self._table.put(*rows.values())
         self._unsaved.clear()
         self._live = live
         self._changes += granted

@@ -131,7 +131,7 @@ class OnnxDetector(Analytics[Detections]):
         self._outputs = tuple(
             TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
         )
-        self._desk = _Buffers()
+        self._buffers = _Buffers()
         self.trial: Trial = try_out(model, self.decoder, self.style)
         """What the model gave for the trial pictures."""
 
@@ -214,16 +214,16 @@ class OnnxDetector(Analytics[Detections]):
 
         The returned array is overwritten by this thread's next call.
         """
-        desk = self._desk
+        buffers = self._buffers
         shape = (frames[0].height, frames[0].width)
-        if desk.letterbox is None or desk.letterbox.frame != shape:
-            desk.letterbox = Letterbox(shape, self.size, self.style, flexible=self._flexible)
-            desk.buffer = None
-        if desk.buffer is None or len(desk.buffer) != len(frames):
-            desk.buffer = desk.letterbox.buffer(len(frames), self._dtype)
-        for frame, slot in zip(frames, desk.buffer, strict=True):
-            desk.letterbox.write(frame.image, slot)
-        return desk.buffer
+        if buffers.letterbox is None or buffers.letterbox.frame != shape:
+            buffers.letterbox = Letterbox(shape, self.size, self.style, flexible=self._flexible)
+            buffers.buffer = None
+        if buffers.buffer is None or len(buffers.buffer) != len(frames):
+            buffers.buffer = buffers.letterbox.buffer(len(frames), self._dtype)
+        for frame, slot in zip(frames, buffers.buffer, strict=True):
+            buffers.letterbox.write(frame.image, slot)
+        return buffers.buffer
 
     def infer(self, pixels: NDArray[Any]) -> list[NDArray[Any]]:
         """Run the network.
@@ -251,7 +251,7 @@ class OnnxDetector(Analytics[Detections]):
         Raises:
             ModelError: If no frames were preprocessed.
         """
-        letterbox = self._desk.letterbox
+        letterbox = self._buffers.letterbox
         if letterbox is None:
             message = f"{self.path}: preprocess the frames first"
             raise ModelError(message)
