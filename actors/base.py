@@ -250,7 +250,7 @@ class NodeActor:
             streams=self.counts(),
             sent=self.sent(),
             vitals=read_vitals(),
-            alerts=tuple(self.alerts.newest),
+            alerts=self.alerts.newest,
             problems=tuple(self._problems),
             values=self._values(),
         )

@@ -38,8 +38,7 @@ from aerodaas.mission.planner import BackgroundPlanner, Planner
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.neighbours import Neighbour
-from aerodaas.runtime.node import NEVER, Outlet
-from aerodaas.runtime.reports import Latencies
+from aerodaas.runtime.node import NEVER, Latencies, Outlet
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import (
     photo_stream,
@@ -54,6 +53,8 @@ __all__ = ["MakePlanner", "RobotSpec", "VehicleController", "sensor_item"]
 
 _TURNS_FAILED = 20
 """Failed loop cycles in a row (one second) after which the loop gives up the vehicle."""
+_LATENCIES_KEPT = 20_000
+"""A quarter of an hour's at 20 Hz."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -114,7 +115,7 @@ class VehicleController:
         self._make_planner = make_planner
         self.spec = spec
         self.id = spec.robot.id
-        self.latencies = Latencies()
+        self.latencies = Latencies(_LATENCIES_KEPT)
         """Milliseconds from capture to the arrival of the resulting navigation."""
         self._session = session
         self._alerts_read = 0

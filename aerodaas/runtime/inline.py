@@ -68,7 +68,7 @@ class Part(Host):
             phase=self.phase,
             error=self.error,
             sent=sent_counts(self.alerts.outlet, self.nodes),
-            alerts=tuple(self.alerts.newest),
+            alerts=self.alerts.newest,
             values=merged_values(self.nodes),
         )
 

@@ -7,7 +7,7 @@ same nodes fly in one process on a simulated clock (`inline.py`) and in actors o
 
 from __future__ import annotations
 
-from collections import deque
+from array import array
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,11 +15,12 @@ from aerodaas.clock import Clock, host_time_ns
 from aerodaas.messages.envelope import Message, TraceSpan
 from aerodaas.messages.frames import Header
 
-__all__ = ["NEVER", "Host", "Node", "Outlet"]
+__all__ = ["LATENCIES_KEPT", "NEVER", "Host", "Latencies", "Node", "Outlet"]
 
 NEVER = 2**63 - 1
 """A mission time that is never reached."""
-_LATENCIES_KEPT = 256
+LATENCIES_KEPT = 256
+"""Newest latencies of a stream that reports tell the median and the tail of."""
 
 
 class Host:
@@ -68,6 +69,26 @@ class Host:
         raise NotImplementedError
 
 
+class Latencies:
+    """The newest latencies, appended by one thread and read by others."""
+
+    def __init__(self, kept: int) -> None:
+        """Keep at least the newest `kept` values, and at most twice as many."""
+        self._kept = kept
+        self._values = array("d")
+
+    def append(self, value: float) -> None:
+        """Append the newest value, milliseconds."""
+        self._values.append(value)
+        if len(self._values) > 2 * self._kept:
+            del self._values[: -self._kept]
+
+    def newest(self, count: int) -> tuple[float, ...]:
+        """The newest `count` values, newest last."""
+        # A slice is made in one piece; an iteration would fail if another value came meanwhile.
+        return tuple(self._values[-count:]) if count > 0 else ()
+
+
 class Outlet:
     """One stream of a node: numbers its messages and measures their latency."""
 
@@ -76,7 +97,7 @@ class Outlet:
         self.stream = stream
         self.sent = 0
         """Number of messages made so far."""
-        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        self.latencies = Latencies(LATENCIES_KEPT)
         """Milliseconds from capture to publishing, newest last."""
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import threading
-from array import array
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -19,16 +17,14 @@ from aerodaas.messages.mission import MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.messages.vitals import Vitals
-from aerodaas.runtime.node import Node, Outlet
+from aerodaas.runtime.node import LATENCIES_KEPT, Node, Outlet
 from aerodaas.runtime.stream_names import alert_stream
 
 __all__ = [
-    "LATENCIES_KEPT",
     "ActorReport",
     "AlertHandler",
     "AlertLog",
     "FlightState",
-    "Latencies",
     "Phase",
     "RobotReport",
     "SentCount",
@@ -37,8 +33,6 @@ __all__ = [
     "sent_counts",
 ]
 
-LATENCIES_KEPT = 20_000
-"""A quarter of an hour's at 20 Hz, or ten minutes' of a fast camera."""
 Phase = Literal["new", "ready", "running", "done", "failed"]
 
 
@@ -58,23 +52,6 @@ class RobotReport:
         """Values whose change the application is told at once, rather than at its next poll."""
         status = self.status
         return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
-
-
-class Latencies:
-    """The newest latencies, appended by one thread and read by others."""
-
-    def __init__(self) -> None:
-        self._values = array("d")
-
-    def append(self, value: float) -> None:
-        """Append the newest value; of the others, at least the newest `LATENCIES_KEPT` stay."""
-        self._values.append(value)
-        if len(self._values) > 2 * LATENCIES_KEPT:
-            del self._values[:-LATENCIES_KEPT]
-
-    def newest(self, count: int) -> tuple[float, ...]:
-        """The newest `count` values, newest last."""
-        return tuple(self._values[-count:]) if count > 0 else ()
 
 
 @dataclass(frozen=True)
@@ -135,7 +112,10 @@ def sent_counts(alerts: Outlet, nodes: Iterable[Node]) -> dict[str, SentCount]:
         nodes: Nodes of one report.
     """
     outlets = [alerts, *(outlet for node in nodes for outlet in tuple(node.outlets.values()))]
-    return {outlet.stream: SentCount.of(outlet.sent, tuple(outlet.latencies)) for outlet in outlets}
+    return {
+        outlet.stream: SentCount.of(outlet.sent, outlet.latencies.newest(LATENCIES_KEPT))
+        for outlet in outlets
+    }
 
 
 def merged_values(nodes: Iterable[Node]) -> dict[str, Any]:
@@ -188,7 +168,8 @@ class AlertLog:
     def __init__(self, name: str) -> None:
         """Start the alerts of the part `name`."""
         self.outlet = Outlet(alert_stream(name))
-        self.newest: deque[Alert] = deque(maxlen=_KEPT)
+        self.newest: tuple[Alert, ...] = ()
+        """The newest alerts, oldest first."""
         self._name = name
         self._lock = threading.Lock()
         self._raised: dict[tuple[str, str, str], int] = {}
@@ -216,7 +197,7 @@ class AlertLog:
                 self._raised.pop(next(iter(self._raised)))
             header = Header(self.outlet.sent, stamp, source)
             alert = Alert(header, kind, text, dict(values))
-            self.newest.append(alert)
+            self.newest = (*self.newest[1 - _KEPT :], alert)
             return self.outlet.measure(alert, header, host_time_ns())
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from aerodaas.runtime.node import Node
-from aerodaas.runtime.reports import LATENCIES_KEPT, Latencies, SentCount, merged_values
+import gc
+
+from aerodaas.messages.frames import Header
+from aerodaas.runtime.node import Latencies, Node, Outlet
+from aerodaas.runtime.reports import SentCount, merged_values, sent_counts
 
 
 def test_the_newest_latencies_are_given_in_their_order() -> None:
     """As many as asked for, or all there are."""
-    known = Latencies()
+    known = Latencies(kept=10)
     assert known.newest(3) == ()
     for value in (1.0, 2.0, 3.0):
         known.append(value)
@@ -19,13 +22,33 @@ def test_the_newest_latencies_are_given_in_their_order() -> None:
 
 def test_latencies_kept_do_not_grow_with_the_flight() -> None:
     """The newest are kept, however many there were."""
-    known = Latencies()
-    for value in range(5 * LATENCIES_KEPT):
+    known = Latencies(kept=100)
+    for value in range(500):
         known.append(float(value))
-    kept = known.newest(10 * LATENCIES_KEPT)
-    assert LATENCIES_KEPT <= len(kept) <= 2 * LATENCIES_KEPT
-    assert kept[-1] == 5 * LATENCIES_KEPT - 1
-    assert kept == tuple(float(value) for value in range(int(kept[0]), 5 * LATENCIES_KEPT))
+    kept = known.newest(1000)
+    assert 100 <= len(kept) <= 200
+    assert kept == tuple(float(value) for value in range(int(kept[0]), 500))
+
+
+def test_a_report_is_made_while_messages_are_sent() -> None:
+    """Messages that another thread sends meanwhile do not disturb it, whenever they come."""
+    outlet = Outlet("drone/alerts")
+
+    def send(*_: object) -> None:
+        """Send a message in the middle of whatever allocates memory."""
+        outlet.measure(None, Header(outlet.sent, 0, "drone"), 0)
+
+    send()
+    thresholds = gc.get_threshold()
+    gc.callbacks.append(send)
+    gc.set_threshold(1)
+    try:
+        counts = [sent_counts(outlet, [])["drone/alerts"].count for _ in range(50)]
+    finally:
+        gc.set_threshold(*thresholds)
+        gc.callbacks.remove(send)
+    assert counts == sorted(counts)
+    assert counts[-1] > counts[0]
 
 
 def test_figures_of_nodes_with_one_report_are_joined() -> None:
