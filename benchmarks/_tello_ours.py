@@ -8,7 +8,7 @@ import time
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello.camera import TelloCamera
+from aerodaas.extensions.tello.camera import TelloCamera
 from tools.tello_vehicle.stamp import read_age
 
 _WARM_UP = 2.0

@@ -22,8 +22,8 @@ from _ports import free_port
 from _report import Report
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello.vehicle import TelloVehicle
 from aerodaas.errors import AeroDaaSError
+from aerodaas.extensions.tello.vehicle import TelloVehicle
 
 UNITS = {"median": "ms", "p99": "ms", "largest": "ms", "cpu": "% of a core", "frames": "asked for"}
 _HERE = Path(__file__).resolve().parent

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from flying import Flyer
 
-from aerodaas.config.environment_choices import VEHICLES, EnvironmentChoices
+from aerodaas.config.environment_choices import EnvironmentChoices, vehicle_kinds
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 
@@ -76,8 +76,8 @@ def test_our_code_flies(
 
 def test_the_environment_is_what_init_writes_for_each_vehicle() -> None:
     """Sensors, drone and edge have the names that the blocks use."""
-    for vehicle in VEHICLES:
-        cameras = None if vehicle in {"simulated", "tello"} else ["rtsp://127.0.0.1/a"]
+    for vehicle, kind in vehicle_kinds().items():
+        cameras = None if kind.camera is not None else ["rtsp://127.0.0.1/a"]
         document = EnvironmentChoices(vehicle, cameras=cameras).document("s", Path())
         (robot,) = document["robots"]
         assert {one["id"] for one in robot["sensors"]} == {"camera", "odometry", "battery"}

@@ -9,189 +9,195 @@ import typer
 
 from aerodaas.cli.deferred import DeferredCommand
 from aerodaas.cli.options import ExampleGroup
+from aerodaas.config.extensions import Command, extensions
 from aerodaas.environment.signals import heed_interrupts
 
-__all__ = ["COMMANDS", "app", "main", "run_typer"]
+__all__ = ["app", "commands", "main", "run_typer"]
 
 _PROVIDER = "At a provider"
 
-COMMANDS = (
-    DeferredCommand(
+_CORE = (
+    Command(
         "init",
         "aerodaas.cli.init:init",
         "Write an environment file, and beside it the schema by which editors explain it.",
     ),
-    DeferredCommand(
+    Command(
         "new",
         "aerodaas.cli.shipped:new",
         "Begin an application: a folder with its file, an environment, a test, a README.",
     ),
-    DeferredCommand(
+    Command(
         "examples",
         "aerodaas.cli.shipped:examples",
         "Copy the applications that ship, with their environments, to read and to change.",
     ),
-    DeferredCommand("run", "aerodaas.cli.run:run", "Fly an application.", words=True),
-    DeferredCommand(
+    Command("run", "aerodaas.cli.run:run", "Fly an application.", words=True),
+    Command(
         "compile",
         "aerodaas.cli.document:compile_document",
         "Write an application as a mission document: data, which others fly without running code.",
         words=True,
     ),
-    DeferredCommand(
+    Command(
         "graph",
         "aerodaas.cli.document:graph",
         "Draw an application's graph as a Mermaid flowchart; nothing flies.",
         words=True,
     ),
-    DeferredCommand(
+    Command(
         "check",
         "aerodaas.cli.check:check",
         "Try everything that a flight needs, without flying.",
         words=True,
     ),
-    DeferredCommand(
+    Command(
         "preflight",
         "aerodaas.cli.preflight:preflight",
         "Print a robot's health before take-off as one list; nothing moves, and nothing is set "
         "there.",
     ),
-    DeferredCommand(
+    Command(
         "logs",
         "aerodaas.cli.logs:logs",
         "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
     ),
-    DeferredCommand(
+    Command(
         "schema", "aerodaas.cli.document:schema", "Print the JSON schema of environment files."
     ),
-    DeferredCommand("doctor", "aerodaas.cli.doctor:doctor", "Say what this machine can do."),
-    DeferredCommand(
+    Command("doctor", "aerodaas.cli.doctor:doctor", "Say what this machine can do."),
+    Command(
         "serve",
         "aerodaas.cli.serve:serve",
         "Offer a fleet of drones: users' applications fly on it by URL.",
     ),
-    DeferredCommand(
+    Command(
         "view",
         "aerodaas.cli.report:view",
         "Play a recording in a browser: map, video, state and charts, by one timeline.",
     ),
-    DeferredCommand(
+    Command(
         "report",
         "aerodaas.cli.report:report",
         "Write a recording's report: one HTML page, its plots as PNG, and the figures as JSON.",
     ),
-    DeferredCommand(
+    Command(
         "attach",
         "aerodaas.cli.report:attach",
         "Attach an autopilot's own log to the recording of its flight, its clock laid over.",
     ),
-    DeferredCommand(
+    Command(
         "compare",
         "aerodaas.cli.report:compare",
         "Set two recordings side by side in one HTML page.",
     ),
-    DeferredCommand(
+    Command(
         "export",
         "aerodaas.cli.export:export",
         "Write parts of a recording as CSV, Parquet, MP4, GPX, KML, COCO, LeRobot or a ROS 2 bag.",
     ),
-    DeferredCommand(
+    Command(
         "import",
         "aerodaas.cli.import_bag:import_bag",
         "Write topics of a ROS 2 bag as a recording, to replay, view and report on.",
     ),
-    DeferredCommand(
+    Command(
         "replay",
         "aerodaas.cli.replay:replay",
         "Feed a recording's sensors through an application, and say how its decisions differ.",
         words=True,
     ),
-    DeferredCommand(
+    Command(
         "login",
         "aerodaas.cli.provider:login",
         "Store the token of your account at a provider, for you alone (mode 0600).",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "fleet",
         "aerodaas.cli.provider:fleet",
         "Show a provider's drones: free or leased, their charge, where they are, and their health.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "missions",
         "aerodaas.cli.provider:missions",
         "List the missions that you may see, newest first.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "watch",
         "aerodaas.cli.provider:watch",
         "Watch a mission until it is over; Ctrl-C leaves it as it is.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "cancel",
         "aerodaas.cli.provider:cancel",
         "Cancel a mission; drones in flight come home and land.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "grant",
         "aerodaas.cli.provider:grant",
         "Share the cameras of your mission in flight with another tenant's applications.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "fetch",
         "aerodaas.cli.provider:fetch",
         "Fetch the recording of a mission that is over.",
         panel=_PROVIDER,
     ),
-    DeferredCommand(
+    Command(
         "submit",
         "aerodaas.cli.provider:submit",
         "Fly an application on a provider's drones, unchanged but for the address.",
         panel=_PROVIDER,
         words=True,
     ),
-    DeferredCommand("remote", "aerodaas.cli.remote:app", "Take part in a mission that is flying."),
-    DeferredCommand(
+    Command("remote", "aerodaas.cli.remote:app", "Take part in a mission that is flying."),
+    Command(
         "lab",
         "aerodaas.cli.lab:app",
         "Compare analytics schedulers in simulation: thousands of drone-minutes in seconds.",
     ),
-    DeferredCommand(
+    Command(
         "models",
         "aerodaas.cli.models:app",
         "Detectors and pose models: fetch by name, try, and measure.",
     ),
-    DeferredCommand(
+    Command(
         "plan",
         "aerodaas.cli.plan:app",
         "Read and write the plans of QGroundControl and Mission Planner.",
     ),
-    DeferredCommand(
+    Command(
         "sim",
         "aerodaas.cli.sim:app",
         "Start PX4 or ArduCopter in simulation, which has to be installed already.",
     ),
-    DeferredCommand("cluster", "aerodaas.cli.cluster:app", "Edge and cloud as one cluster."),
-    DeferredCommand(
+    Command("cluster", "aerodaas.cli.cluster:app", "Edge and cloud as one cluster."),
+    Command(
         "lease",
         "aerodaas.cli.lease:app",
         "Lease a provider's drones: while a lease lasts, its tenant alone flies them.",
         panel=_PROVIDER,
     ),
 )
-"""Every command, in the order in which `--help` lists them."""
+"""The core's commands, in the order in which `--help` lists them."""
+
+
+def commands() -> tuple[Command, ...]:
+    """Every command: the core's, then those of extensions."""
+    return (*_CORE, *(one for extension in extensions().values() for one in extension.commands))
 
 
 class _Commands(ExampleGroup):
-    """The group of `COMMANDS`."""
+    """The group of all commands."""
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - Typer's
-        settings["commands"] = {command.name: command for command in COMMANDS}
+        settings["commands"] = {command.name: DeferredCommand(command) for command in commands()}
         super().__init__(**settings)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from importlib import import_module
 from typing import Any
 
 import typer
@@ -11,6 +10,7 @@ import typer.main
 from typer.core import TyperCommand, TyperGroup
 
 from aerodaas.cli.options import ExampleGroup
+from aerodaas.config.extensions import Command, imported
 
 __all__ = ["DeferredCommand"]
 
@@ -20,27 +20,16 @@ class DeferredCommand(TyperCommand):
 
     name: str
 
-    def __init__(
-        self, name: str, place: str, summary: str, *, panel: str | None = None, words: bool = False
-    ) -> None:
-        """Name the command.
-
-        Args:
-            name: The word by which it is called.
-            place: `module:attribute` of its function, or of a Typer application of several.
-            summary: The first sentence of its help.
-            panel: Title above it in the list; None for the list's own.
-            words: Whether words after `--` are an application's own; a misspelt option is none.
-        """
-        super().__init__(name, help=summary, rich_help_panel=panel)
-        self._place = place
-        self._settings = {"allow_extra_args": True} if words else {}
+    def __init__(self, command: Command) -> None:
+        """List `command`; its module is imported when it is called."""
+        super().__init__(command.name, help=command.summary, rich_help_panel=command.panel)
+        self._place = command.place
+        self._settings = {"allow_extra_args": True} if command.words else {}
 
     @cached_property
     def loaded(self) -> TyperCommand | TyperGroup:
         """The command itself, with its whole help and its parameters."""
-        module, _, attribute = self._place.partition(":")
-        found = getattr(import_module(module), attribute)
+        found = imported(self._place)
         holder = typer.Typer(cls=ExampleGroup, rich_markup_mode="markdown")
         if isinstance(found, typer.Typer):
             holder.add_typer(found, name=self.name)

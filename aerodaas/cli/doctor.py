@@ -21,6 +21,7 @@ from rich.table import Table
 from rich.text import Text
 
 from aerodaas.actors import priority
+from aerodaas.config.extensions import extensions
 from aerodaas.errors import AeroDaaSError
 from aerodaas.findings import Finding
 
@@ -47,8 +48,6 @@ _SHARED_MEMORY_NEEDED = 256
 _PORTS = {
     14540: "PX4 offboard",
     14550: "ground station, ArduPilot",
-    8890: "Tello state",
-    11111: "Tello video",
 }
 
 
@@ -181,7 +180,8 @@ def _renderer() -> Iterator[Finding]:
 
 
 def _ports() -> Iterator[Finding]:
-    for port, use in _PORTS.items():
+    added = {port: use for one in extensions().values() for port, use in one.ports.items()}
+    for port, use in {**_PORTS, **added}.items():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
                 probe.bind(("127.0.0.1", port))

@@ -7,19 +7,22 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from aerodaas.config.environment_choices import (
+    EnvironmentChoices,
+    camera_words,
+    default_address,
+    vehicle_kinds,
+)
+from aerodaas.config.extensions import VehicleDiscovery, imported
 from aerodaas.errors import ConfigError
-
-if TYPE_CHECKING:
-    from aerodaas.config.environment_choices import EnvironmentChoices
 
 __all__ = ["init"]
 
 _SCHEMA = "environment.schema.json"
-_TELLO = "tello"
 _NUMBERS = re.compile(r"\[\n\s*(-?[\d.]+(?:,\n\s*-?[\d.]+)*)\n\s*\]")
 """A list of numbers over several lines, as no string of JSON holds a line's end."""
 
@@ -28,13 +31,13 @@ def init(
     *,
     vehicle: Annotated[
         str | None,
-        typer.Option("--vehicle", "-v", help="`simulated`, `px4`, `ardupilot` or `tello`."),
+        typer.Option("--vehicle", "-v", help=f"`{'`, `'.join(vehicle_kinds())}`."),
     ] = None,
     url: Annotated[
         str | None,
         typer.Option(
             help="Where it is: a MAVLink URL such as `udpin:127.0.0.1:14540` or "
-            "`serial:/dev/ttyACM0:57600`, or a Tello's address."
+            "`serial:/dev/ttyACM0:57600`, or a network address."
         ),
     ] = None,
     camera: Annotated[
@@ -43,23 +46,24 @@ def init(
             "--camera",
             "-c",
             help="A device (`/dev/video0`), a URL (`rtsp://…`), a file or a folder of pictures, "
-            "or `simulated`, `tello`, `none`; may be given several times. Default: the one that "
-            "the vehicle brings along.",
+            "or the vehicle's own by its name, or `none`; may be given several times. Default: the "
+            "one that the vehicle brings along.",
         ),
     ] = None,
     discover: Annotated[
         bool,
         typer.Option(
             "--discover",
-            help="Listen for MAVLink and for a Tello, and look for video devices. Nothing is sent "
-            "off this machine.",
+            help="Listen for vehicles and look for video devices; nothing is sent off this "
+            "machine.",
         ),
     ] = False,
-    ask_tello: Annotated[
+    ask: Annotated[
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="With --discover, also send `command` to this address, as to 192.168.10.1.",
+            help="With --discover, also ask this address whether a vehicle is there, such as a "
+            "Tello at 192.168.10.1. Nothing moves.",
         ),
     ] = None,
     address: Annotated[
@@ -84,20 +88,23 @@ def init(
         aerodaas init --vehicle px4 --camera rtsp://127.0.0.1:8554/front
         aerodaas init --discover
     """
-    from aerodaas.config.environment_choices import EnvironmentChoices  # noqa: PLC0415 - slow to load
-
     _require_free(output, force=force)
-    if not discover and ask_tello is not None:
-        raise ConfigError("--ask-tello goes with --discover")
+    if not discover and ask is not None:
+        raise ConfigError("--ask goes with --discover")
     if discover:
-        beginning = _discovered(vehicle, url, camera, ask_tello, seconds)
+        beginning = _discovered(vehicle, url, camera, ask, seconds)
     elif vehicle is None:
         if url is not None or camera:
-            raise ConfigError("say whose it is, too: --vehicle simulated, px4, ardupilot or tello")
+            raise ConfigError(f"name the vehicle, too: {_choices()}")
         beginning = _asked()
     else:
         beginning = EnvironmentChoices(vehicle, url, cameras=camera)
     _write(beginning, _compute(address), output, force=force)
+
+
+def _choices() -> str:
+    """The option that names a vehicle, with what it may be."""
+    return f"--vehicle {' | '.join(vehicle_kinds())}"
 
 
 def _require_free(output: Path, *, force: bool) -> None:
@@ -108,17 +115,12 @@ def _require_free(output: Path, *, force: bool) -> None:
 
 def _asked() -> EnvironmentChoices:
     from aerodaas.cameras.devices import video_devices  # noqa: PLC0415 - only where it is asked
-    from aerodaas.config.environment_choices import (  # noqa: PLC0415 - slow to load
-        VEHICLES,
-        EnvironmentChoices,
-        camera_words,
-        default_address,
-    )
 
+    kinds = tuple(vehicle_kinds())
     try:
-        vehicle = typer.prompt(f"Which vehicle: {', '.join(VEHICLES)}?", VEHICLES[0])
-        while vehicle not in VEHICLES:
-            vehicle = typer.prompt("One of these", VEHICLES[0])
+        vehicle = typer.prompt(f"Which vehicle: {', '.join(kinds)}?", kinds[0])
+        while vehicle not in kinds:
+            vehicle = typer.prompt("One of these", kinds[0])
         address = default_address(vehicle)
         if address is not None:
             address = typer.prompt("Where is it?", address)
@@ -130,7 +132,7 @@ def _asked() -> EnvironmentChoices:
         cameras = [word.strip() for word in typer.prompt(text, usual).split(",")]
     except typer.Abort:
         raise ConfigError(
-            "nobody answers: say --vehicle simulated, px4, ardupilot or tello, or --discover"
+            f"there is no terminal to ask: give {_choices()}, or --discover"
         ) from None
     return EnvironmentChoices(vehicle, address, cameras=cameras)
 
@@ -139,36 +141,34 @@ def _discovered(
     vehicle: str | None,
     url: str | None,
     cameras: list[str] | None,
-    ask_tello: str | None,
+    asked: str | None,
     seconds: float,
 ) -> EnvironmentChoices:
     """Choices by options first, then by discovery, which is printed."""
     from aerodaas.cameras.devices import video_devices  # noqa: PLC0415 - only where it is asked
-    from aerodaas.config.environment_choices import EnvironmentChoices, camera_words  # noqa: PLC0415 - slow to load
     from aerodaas.drivers.mavlink.discovery import hear_vehicles  # noqa: PLC0415 - slow to load
-    from aerodaas.drivers.tello.discovery import find_tello  # noqa: PLC0415 - slow to load
 
     typer.echo(f"listening for {seconds:g} s")
-    with ThreadPoolExecutor(1) as thread:
-        tello_found = thread.submit(find_tello, seconds, ask_tello)
+    searched = [kind for kind in vehicle_kinds().values() if kind.find]
+    with ThreadPoolExecutor(max(1, len(searched))) as threads:
+        searches = [threads.submit(imported(kind.find), seconds, asked) for kind in searched]
         heard = hear_vehicles(seconds)
-        tello = tello_found.result()
+        discoveries: list[VehicleDiscovery] = [search.result() for search in searches]
     devices, notes = video_devices()
     found = [EnvironmentChoices(one.family, one.url, one.system) for one in heard.vehicles]
     told = [one.text for one in heard.vehicles]
-    if tello.address is not None:
-        found.append(EnvironmentChoices(_TELLO, tello.address))
-        told.append(f"tello at {tello.address}")
+    for kind, discovery in zip(searched, discoveries, strict=True):
+        if discovery.address is not None:
+            found.append(EnvironmentChoices(kind.name, discovery.address))
+            told.append(f"{kind.name} at {discovery.address}")
+    hints = [note for discovery in discoveries for note in discovery.notes]
     for line in [*told, *(f"camera {one.path}: {one.name}" for one in devices)]:
         typer.echo(f"  found: {line}")
-    for line in (*heard.notes, *tello.notes, *notes):
+    for line in (*heard.notes, *hints, *notes):
         typer.echo(f"  {line}")
     fitting = [one for one in found if vehicle in {None, one.vehicle}]
     if vehicle is None and not fitting:
-        raise ConfigError(
-            "no vehicle was found: switch it on and try again, or say --vehicle simulated, px4, "
-            "ardupilot or tello"
-        )
+        raise ConfigError(f"no vehicle was found: switch it on and try again, or give {_choices()}")
     chosen = fitting[0] if fitting else EnvironmentChoices(vehicle or "")
     if len(fitting) > 1:
         typer.echo("  written is the first; another one by --vehicle and --url")

@@ -8,37 +8,47 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from aerodaas.config.extensions import VehicleKind, extensions
 from aerodaas.errors import ConfigError, UnknownIdError
 
-__all__ = ["VEHICLES", "EnvironmentChoices", "camera_words", "default_address"]
+__all__ = ["EnvironmentChoices", "camera_words", "default_address", "vehicle_kinds"]
 
-VEHICLES = ("simulated", "px4", "ardupilot", "tello")
-
-_ADDRESSES = {
-    "px4": "udpin:127.0.0.1:14540",
-    "ardupilot": "udpin:127.0.0.1:14550",
-    "tello": "192.168.10.1",
+_AUTOPILOT: dict[str, Any] = {
+    "driver": "mavlink",
+    "limits": {"takeoff_height": 3.0, "cruise_speed": 2.0},
+    "fence": (20, 10),
+    "address_setting": "url",
 }
-_DRIVERS = {"px4": "mavlink", "ardupilot": "mavlink"}
-_LIMITS: dict[str, dict[str, Any]] = {
-    "simulated": {"cruise_speed": 2.0},
-    "px4": {"takeoff_height": 3.0, "cruise_speed": 2.0},
-    "ardupilot": {"takeoff_height": 3.0, "cruise_speed": 2.0},
-    "tello": {"takeoff_height": 1.2, "cruise_speed": 0.4, "max_speed": 1.0},
-}
-_FENCES = {"simulated": (20, 10), "px4": (20, 10), "ardupilot": (20, 10), "tello": (5, 3)}
-"""Metres from the take-off to each side, and up: room for a first flight, to be widened."""
+_CORE = (
+    VehicleKind(
+        "simulated",
+        driver="simulated",
+        limits={"cruise_speed": 2.0},
+        fence=(20, 10),
+        camera={"width": 640, "height": 360, "pitch": 30},
+    ),
+    VehicleKind("px4", address="udpin:127.0.0.1:14540", **_AUTOPILOT),
+    VehicleKind("ardupilot", address="udpin:127.0.0.1:14550", **_AUTOPILOT),
+)
 _NONE = "none"
 
 
+def vehicle_kinds() -> dict[str, VehicleKind]:
+    """Kinds of vehicles that an environment file can begin with, by name."""
+    added = (kind for extension in extensions().values() for kind in extension.vehicles)
+    return {kind.name: kind for kind in (*_CORE, *added)}
+
+
 def default_address(vehicle: str) -> str | None:
-    """Where a vehicle is by default; None for a simulated one."""
-    return _ADDRESSES.get(vehicle)
+    """Where a vehicle is by default; None for one without an address or of an unknown kind."""
+    kind = vehicle_kinds().get(vehicle)
+    return kind.address if kind else None
 
 
 def camera_words(vehicle: str) -> tuple[str, ...]:
     """The cameras that such a vehicle brings along."""
-    return (vehicle,) if vehicle in {"simulated", "tello"} else ()
+    kind = vehicle_kinds().get(vehicle)
+    return (vehicle,) if kind and kind.camera is not None else ()
 
 
 @dataclass(frozen=True)
@@ -46,14 +56,14 @@ class EnvironmentChoices:
     """Choices from which an environment file is written."""
 
     vehicle: str
-    """One of `VEHICLES`."""
+    """Name of one of the `vehicle_kinds()`."""
     address: str | None = None
-    """MAVLink URL, or a Tello's address; None: the vehicle's default."""
+    """MAVLink URL, or network address; None: the vehicle's default."""
     system: int | None = None
     """MAVLink system id, where several are heard."""
     cameras: Sequence[str] | None = None
-    """`simulated`, `tello`, a device, a URL, a file or a folder; `none` is none. None: those that
-    the vehicle brings along."""
+    """The vehicle's own by its name, a device, a URL, a file or a folder; `none` is none. None:
+    those that the vehicle brings along."""
     compute: Sequence[dict[str, str]] = field(default=({"id": "edge", "kind": "edge"},))
 
     def document(self, schema: str, folder: Path) -> dict[str, Any]:
@@ -67,9 +77,11 @@ class EnvironmentChoices:
             UnknownIdError: For an unknown vehicle.
             ConfigError: For an address or a camera that it cannot have.
         """
-        if self.vehicle not in VEHICLES:
-            raise UnknownIdError("vehicle", self.vehicle, list(VEHICLES))
-        side, ceiling = _FENCES[self.vehicle]
+        kinds = vehicle_kinds()
+        if self.vehicle not in kinds:
+            raise UnknownIdError("vehicle", self.vehicle, list(kinds))
+        kind = kinds[self.vehicle]
+        side, ceiling = kind.fence
         fence = {
             "polygon": [[-side, -side], [side, -side], [side, side], [-side, side]],
             "floor": 0.3,
@@ -82,9 +94,9 @@ class EnvironmentChoices:
         ]
         robot = {
             "id": "drone",
-            "driver": _DRIVERS.get(self.vehicle, self.vehicle),
-            "settings": self._settings(),
-            "limits": {**_LIMITS[self.vehicle], "geofence": fence},
+            "driver": kind.driver,
+            "settings": self._settings(kind),
+            "limits": {**kind.limits, "geofence": fence},
             "sensors": sensors,
         }
         if not robot["settings"]:
@@ -99,16 +111,15 @@ class EnvironmentChoices:
             **({"simulation": world} if self.vehicle == "simulated" else {}),
         }
 
-    def _settings(self) -> dict[str, Any]:
-        address = self.address or default_address(self.vehicle)
-        if self.vehicle == "simulated":
+    def _settings(self, kind: VehicleKind) -> dict[str, Any]:
+        if not kind.address_setting:
             if self.address is not None:
-                raise ConfigError("a simulated drone has no address: name a vehicle that has one")
+                raise ConfigError(
+                    f"a {kind.name} drone has no address: name a vehicle that has one"
+                )
             return {}
-        if self.vehicle == "tello":
-            return {"address": address}
         system = {} if self.system is None else {"system": self.system}
-        return {"url": address, **system}
+        return {kind.address_setting: self.address or kind.address, **system}
 
     def _cameras(self, folder: Path) -> list[dict[str, Any]]:
         words = camera_words(self.vehicle) if self.cameras is None else self.cameras
@@ -123,14 +134,14 @@ class EnvironmentChoices:
 
     def _camera(self, name: str, word: str, folder: Path) -> dict[str, Any]:
         sensor: dict[str, Any] = {"id": name, "type": "camera", "rate": 10}
-        if word in {"simulated", "tello"}:
+        own = vehicle_kinds().get(word)
+        if own is not None and own.camera is not None:
             if word != self.vehicle:
                 raise ConfigError(
                     f"a camera of the kind {word!r} is a {word} drone's own, not a "
                     f"{self.vehicle} one's: give a device, a URL, a file or a folder"
                 )
-            settings = {"width": 640, "height": 360, "pitch": 30} if word == "simulated" else {}
-            return {**sensor, **({"settings": settings} if settings else {})}
+            return {**sensor, **({"settings": dict(own.camera)} if own.camera else {})}
         is_device = word.startswith("/dev/") or "://" in word
         if not is_device and not Path(word).exists():
             raise ConfigError(

@@ -1,7 +1,8 @@
 """Plug-ins: found by registered name, by entry point, or by `module:Class`.
 
-A package adds its own by an entry point in the group `aerodaas.<kind>`, such as
-`aerodaas.cameras`; an application may name any importable class as `module:Class`.
+An extension adds the plug-ins that its `Extension` lists. A package adds its own by an entry point
+in the group `aerodaas.<kind>`, such as `aerodaas.cameras`; an application may name any importable
+class as `module:Class`.
 """
 
 from __future__ import annotations
@@ -12,14 +13,14 @@ from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel
 
+from aerodaas.config.extensions import PluginKind, extensions
 from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
 __all__ = [
-    "PluginKind",
     "is_built_in",
     "load_plugin",
     "main_name",
@@ -28,21 +29,15 @@ __all__ = [
     "settings_model",
 ]
 
-PluginKind = Literal[
-    "drivers", "cameras", "analytics", "trajectory_schedulers", "analytics_schedulers"
-]
-
-_BUILT_IN: dict[PluginKind, dict[str, str]] = {
+_CORE: dict[PluginKind, dict[str, str]] = {
     "drivers": {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
-        "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
         "mavlink": "aerodaas.drivers.mavlink.vehicle:MavlinkVehicle",
         "ros2": "aerodaas.drivers.ros2.vehicle:Ros2Vehicle",
         "replayed": "aerodaas.recording.replay.vehicle:ReplayedVehicle",
     },
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
-        "tello": "aerodaas.drivers.tello.camera:TelloCamera",
         "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
@@ -107,7 +102,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
 def plugin_names(kind: PluginKind) -> list[str]:
     """Names that `load_plugin` resolves, sorted."""
     found = {point.name for point in entry_points(group=f"aerodaas.{kind}")}
-    return sorted(found | set(_BUILT_IN[kind]))
+    return sorted(found | set(_CORE[kind]) | set(_of_extensions(kind)))
 
 
 def require_plugin(kind: PluginKind, name: str) -> None:
@@ -130,7 +125,8 @@ def is_built_in(kind: PluginKind, name: str) -> bool:
         kind: Kind of plug-in.
         name: Its name.
     """
-    return name in _BUILT_IN[kind]
+    own = _of_extensions(kind).get(name, "")
+    return name in _CORE[kind] or own.startswith("aerodaas.extensions.")
 
 
 def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class of the caller's kind
@@ -184,9 +180,19 @@ def _imported(name: str) -> ModuleType:
     return importlib.import_module(name)
 
 
+def _of_extensions(kind: PluginKind) -> dict[str, str]:
+    """`module:attribute` of the plug-ins of one kind that extensions add, by name."""
+    return {
+        name: place
+        for extension in extensions().values()
+        for name, place in extension.plugins.get(kind, {}).items()
+    }
+
+
 def _target(kind: PluginKind, name: str) -> str:
-    if name in _BUILT_IN[kind]:
-        return _BUILT_IN[kind][name]
+    known = _CORE[kind].get(name) or _of_extensions(kind).get(name)
+    if known is not None:
+        return known
     for point in entry_points(group=f"aerodaas.{kind}"):
         if point.name == name:
             return point.value

@@ -11,7 +11,8 @@ from rich.markdown import Markdown
 from typer.core import TyperCommand, TyperGroup
 from typer.testing import CliRunner
 
-from aerodaas.cli.app import COMMANDS, app
+from aerodaas.cli.app import app
+from aerodaas.cli.app import commands as all_commands
 from aerodaas.cli.deferred import DeferredCommand
 
 
@@ -43,7 +44,7 @@ def test_each_example_has_its_line(name: str) -> None:
         assert example.strip() in shown
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+@pytest.mark.parametrize("command", all_commands(), ids=lambda command: command.name)
 def test_the_list_tells_the_first_sentence_of_each_help(command: DeferredCommand) -> None:
     """The list of all commands, which loads none of them, says the same as the command itself."""
     first, _, _ = (command.loaded.help or "").partition("\n\n")

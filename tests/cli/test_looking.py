@@ -17,9 +17,8 @@ from aerodaas.drivers.loading import load_vehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 from aerodaas.messages.health import MeasuredVehicle
-from aerodaas.messages.vehicle import Vehicle, VehicleMode
+from aerodaas.messages.vehicle import Vehicle
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
-from tools.tello_vehicle import EmulatedTello
 
 pytestmark = pytest.mark.wall_clock
 
@@ -47,9 +46,9 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def file_of(settings: dict[str, Any], driver: str = "mavlink") -> EnvironmentConfig:
+def file_of(settings: dict[str, Any]) -> EnvironmentConfig:
     """Write an environment file with one drone here."""
-    content = {"robots": [{"id": "drone", "driver": driver, "settings": settings}]}
+    content = {"robots": [{"id": "drone", "driver": "mavlink", "settings": settings}]}
     Path("environment.json").write_text(json.dumps(content))
     return EnvironmentConfig.model_validate(content)
 
@@ -126,29 +125,6 @@ def test_what_a_flight_would_meet_is_judged(fallback: str, *, objects: bool) -> 
         finally:
             vehicle.close()
         assert not autopilot.armed
-
-
-def test_a_tello_that_somebody_flies_is_left_in_the_air() -> None:
-    """It is landed by no connection that was only looking, and obeys none."""
-    with EmulatedTello() as tello:
-        settings = {"address": LOOPBACK, "command_port": tello.port, "state_port": free_port()}
-        config = file_of(settings, "tello")
-        pilot = load_vehicle(config.robots[0], config)
-        pilot.connect()
-        pilot.take_off(1.0)
-        until(lambda: pilot.read().mode is VehicleMode.HOLDING)
-        looking = {**settings, "state_port": free_port()}
-        vehicle = observer(file_of(looking, "tello"))
-        vehicle.connect()
-        until(lambda: vehicle.read().armed)
-        with pytest.raises(VehicleError, match="only looked at"):
-            vehicle.hold()
-        with pytest.raises(VehicleError, match="only looked at"):
-            vehicle.land()
-        vehicle.close()
-        assert "land" not in {text for _, text in tello.heard}
-        pilot.close()
-        assert "land" in {text for _, text in tello.heard}
 
 
 def until(condition: Any) -> None:  # noqa: ANN401 - a function without arguments

@@ -50,7 +50,7 @@ FLEET = {
         },
         {
             "id": "tello",
-            "driver": "tello",
+            "driver": "mavlink",
             "settings": {"host": f"{PRIVATE}.local"},
             "sensors": [
                 {"id": "phone", "type": "gps", "settings": {"path": f"/home/{PRIVATE}/log.gpx"}}

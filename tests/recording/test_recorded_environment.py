@@ -23,7 +23,6 @@ from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.tello.settings import TelloSettings
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.recorded_environment import allowed_content, left_out
@@ -195,7 +194,7 @@ def test_a_field_that_nobody_has_heard_of_is_left_out(content: dict[str, Any]) -
 
 
 @pytest.mark.parametrize(
-    "model", [MavlinkSettings, TelloSettings, load_plugin("drivers", "simulated").settings_model]
+    "model", [MavlinkSettings, load_plugin("drivers", "simulated").settings_model]
 )
 def test_of_a_drivers_settings_only_its_speeds_are_read(model: Any) -> None:  # noqa: ANN401
     """No address, no key, no file; and no text in the place of a speed."""
@@ -324,7 +323,7 @@ def test_the_local_file_gives_what_is_missing(flown: Path, tmp_path: Path) -> No
     """Its driver, its packages, its scheduler; but the recording's start and limits."""
     content = with_robot(driver="mine:Drone") | {"schedulers": {"analytics": "mine:Plan"}}
     local = {
-        "robots": [{"id": "tello", "driver": "tello", "start": [9, 9, 0]}, {"id": "other"}],
+        "robots": [{"id": "tello", "driver": "mavlink", "start": [9, 9, 0]}, {"id": "other"}],
         "runtime_env": {"one": {"packages": ["numpy==1.26"]}},
         "schedulers": {"analytics": "dems"},
     }
@@ -333,7 +332,7 @@ def test_the_local_file_gives_what_is_missing(flown: Path, tmp_path: Path) -> No
     config = replay_environment(foreign(flown, tmp_path, content), given)
     (robot,) = config.robots
     assert list(robot.start) == [1, 2, 0]
-    assert robot.settings["driver"] == "tello"
+    assert robot.settings["driver"] == "mavlink"
     assert config.runtime_env["one"].packages == ["numpy==1.26"]
     assert config.schedulers.analytics == "dems"
     assert left_out(content) == ["robots.tello.driver", "schedulers.analytics"]

@@ -109,10 +109,6 @@ def test_a_misspelt_setting_is_refused_with_the_right_one(
             r"known: .*nearest_neighbor",
         ),
         (
-            {"robots": [{"id": "d", "driver": "tello", "settings": {"adress": "1.2.3.4"}}]},
-            r"did you mean address\?",
-        ),
-        (
             {"robots": [{"id": "d", "driver": "mavlink", "settings": {"ulr": "udpin:0:1"}}]},
             r"did you mean url\?",
         ),
@@ -240,13 +236,6 @@ def test_what_a_camera_plays_must_be_there(folder: Flyer, driver: str) -> None:
     env = opened(folder, content(robot(sensors=[camera])))
     with pytest.raises(ConfigError, match=r"there is no .*pictres; did you mean pictures\?"):
         launched(folder, env)
-
-
-def test_a_camera_of_another_driver_is_refused(folder: Flyer) -> None:
-    """What a constructor of ours refuses is refused before Ray, too."""
-    camera = {"id": "cam1", "driver": "tello"}
-    with pytest.raises(ConfigError, match="tello"):
-        launched(folder, opened(folder, content(robot(sensors=[camera]))))
 
 
 class Modelled(BaseModel):

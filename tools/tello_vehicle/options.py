@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.drivers.tello.settings import tello_camera_settings
+from aerodaas.extensions.tello.settings import tello_camera_settings
 from aerodaas.testing.channel import Impairment
 
 __all__ = ["TelloOptions", "VideoOptions"]

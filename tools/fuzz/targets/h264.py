@@ -12,7 +12,7 @@ import numpy as np
 from av import logging as av_logging
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.drivers.tello.camera import TelloCamera
+from aerodaas.extensions.tello.camera import TelloCamera
 from tools.fuzz.flight import require
 from tools.tello_vehicle.video import packets
 

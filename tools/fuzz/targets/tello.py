@@ -13,10 +13,10 @@ import numpy as np
 from typing_extensions import Self
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello import handshake, link, vehicle
-from aerodaas.drivers.tello.link import TelloLink
-from aerodaas.drivers.tello.vehicle import TelloVehicle
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.tello import handshake, link, vehicle
+from aerodaas.extensions.tello.link import TelloLink
+from aerodaas.extensions.tello.vehicle import TelloVehicle
 from tools.fuzz.flight import (
     LIMITS,
     START,

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from aerodaas.drivers.tello.commands import BodyMotion
-from aerodaas.drivers.tello.reckoning import DeadReckoning
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello.commands import BodyMotion
+from aerodaas.extensions.tello.reckoning import DeadReckoning
+from aerodaas.extensions.tello.state import TelloState
 
 STILL = BodyMotion(np.zeros(3))
 

@@ -13,8 +13,9 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite, slowed
-from aerodaas.drivers.tello.battery import BatteryGauge
-from aerodaas.drivers.tello.commands import (
+from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.extensions.tello.battery import BatteryGauge
+from aerodaas.extensions.tello.commands import (
     ENTER,
     LAND,
     STILL,
@@ -23,13 +24,12 @@ from aerodaas.drivers.tello.commands import (
     Command,
     StickScale,
 )
-from aerodaas.drivers.tello.handshake import explain_no_states, greet, meaning
-from aerodaas.drivers.tello.link import TelloLink
-from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
-from aerodaas.drivers.tello.reckoning import DeadReckoning
-from aerodaas.drivers.tello.settings import TelloSettings, tello_settings, video_port
-from aerodaas.drivers.tello.state import TelloState
-from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.extensions.tello.handshake import explain_no_states, greet, meaning
+from aerodaas.extensions.tello.link import TelloLink
+from aerodaas.extensions.tello.phase import LIFTED, FlightPhase
+from aerodaas.extensions.tello.reckoning import DeadReckoning
+from aerodaas.extensions.tello.settings import TelloSettings, tello_settings, video_port
+from aerodaas.extensions.tello.state import TelloState
 from aerodaas.geometry.braking import limit_length, velocity_towards
 from aerodaas.geometry.frames import Vector, enu_to_body, wrap_angle
 from aerodaas.messages.health import HealthReadings

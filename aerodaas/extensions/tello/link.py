@@ -14,12 +14,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from aerodaas.drivers.pin import Pin
-from aerodaas.drivers.tello.commands import STILL, Command, Sticks
-from aerodaas.drivers.tello.dead_man import DeadMan
-from aerodaas.drivers.tello.settings import TelloSettings
-from aerodaas.drivers.tello.sockets import bound_socket, datagrams
-from aerodaas.drivers.tello.state import TelloState, parse_state
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.tello.commands import STILL, Command, Sticks
+from aerodaas.extensions.tello.dead_man import DeadMan
+from aerodaas.extensions.tello.settings import TelloSettings
+from aerodaas.extensions.tello.sockets import bound_socket, datagrams
+from aerodaas.extensions.tello.state import TelloState, parse_state
 
 __all__ = ["LinkCounts", "TelloLink"]
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.drivers.tello.commands import BodyMotion, Sticks, StickScale
-from aerodaas.drivers.tello.reckoning import DeadReckoning
-from aerodaas.drivers.tello.state import parse_state
+from aerodaas.extensions.tello.commands import BodyMotion, Sticks, StickScale
+from aerodaas.extensions.tello.reckoning import DeadReckoning
+from aerodaas.extensions.tello.state import parse_state
 from aerodaas.geometry.frames import wrap_angle
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.options import TelloOptions

@@ -7,17 +7,17 @@ import ipaddress
 import socket
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import psutil
 
-from aerodaas.drivers.tello.commands import ENTER, Command
-from aerodaas.drivers.tello.settings import STATE_PORT, TelloSettings
-from aerodaas.drivers.tello.sockets import bound_socket, datagrams
-from aerodaas.drivers.tello.state import parse_state
+from aerodaas.config.extensions import VehicleDiscovery
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.tello.commands import ENTER, Command
+from aerodaas.extensions.tello.settings import STATE_PORT, TelloSettings
+from aerodaas.extensions.tello.sockets import bound_socket, datagrams
+from aerodaas.extensions.tello.state import parse_state
 
-__all__ = ["TelloDiscovery", "find_tello"]
+__all__ = ["find_tello"]
 
 _NETWORK = ipaddress.ip_network("192.168.10.0/24")
 """The network that a Tello makes as an access point."""
@@ -25,18 +25,9 @@ _COMMAND_PORT: int = TelloSettings.model_fields["command_port"].default
 _TICK = 0.05
 
 
-@dataclass(frozen=True)
-class TelloDiscovery:
-    """The Tello found, if any."""
-
-    address: str | None = None
-    notes: tuple[str, ...] = ()
-    """What speaks for one that was not found, and what was in the way."""
-
-
 def find_tello(
     seconds: float, asked: str | None = None, *, port: int = _COMMAND_PORT
-) -> TelloDiscovery:
+) -> VehicleDiscovery:
     """Look for a Tello.
 
     A Tello says nothing until it is asked once; from then on it sends its state to whoever asked.
@@ -67,16 +58,16 @@ def find_tello(
                     sockets["reply"].sendto(ENTER.text.encode("ascii"), (asked, port))
             found = next(_answers(sockets, asked), None)
             if found is not None:
-                return TelloDiscovery(found, tuple(notes))
+                return VehicleDiscovery(found, tuple(notes))
             time.sleep(_TICK)
     if asked is not None:
         notes.append(f"no Tello answers at {asked}")
     elif _in_its_network(_own_addresses()):
         notes.append(
             f"this host is in {_NETWORK}, as in a Tello's Wi-Fi; "
-            "`--ask-tello 192.168.10.1` asks whether it is one"
+            "`--ask 192.168.10.1` asks whether it is one"
         )
-    return TelloDiscovery(None, tuple(notes))
+    return VehicleDiscovery(None, tuple(notes))
 
 
 def _answers(sockets: dict[str, socket.socket], asked: str | None) -> Iterator[str]:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from aerodaas.drivers.tello.battery import BatteryGauge
-from aerodaas.drivers.tello.commands import (
+from aerodaas.extensions.tello.battery import BatteryGauge
+from aerodaas.extensions.tello.commands import (
     ENTER,
     LAND,
     STILL,
@@ -20,7 +20,7 @@ from aerodaas.drivers.tello.commands import (
     StickScale,
     ports,
 )
-from aerodaas.drivers.tello.state import parse_state
+from aerodaas.extensions.tello.state import parse_state
 
 SCALE = StickScale(speed=2.0, climb=0.5, turn=1.25)
 FIELDS = {

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from aerodaas.drivers.tello import dead_man
-from aerodaas.drivers.tello.dead_man import DeadMan
+from aerodaas.extensions.tello import dead_man
+from aerodaas.extensions.tello.dead_man import DeadMan
 
 PEER = ("192.168.10.1", 8889)
 SILENCE = None

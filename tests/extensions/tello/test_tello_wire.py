@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from typing_extensions import Self
 
-from aerodaas.drivers.tello import link as module
-from aerodaas.drivers.tello.commands import LAND, STILL, TAKE_OFF, VERSION, Command, Sticks
-from aerodaas.drivers.tello.link import TelloLink
-from aerodaas.drivers.tello.settings import TelloSettings
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello import link as module
+from aerodaas.extensions.tello.commands import LAND, STILL, TAKE_OFF, VERSION, Command, Sticks
+from aerodaas.extensions.tello.link import TelloLink
+from aerodaas.extensions.tello.settings import TelloSettings
+from aerodaas.extensions.tello.state import TelloState
 
 TELLO = ("192.168.10.1", 8889)
 STATE = b"pitch:0;roll:0;yaw:0;vgx:0;vgy:0;vgz:0;templ:60;temph:63;tof:10;h:0;bat:%d;baro:1;time:0;"

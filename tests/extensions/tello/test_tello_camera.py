@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.h264 import FrameAssembler, FrameDecoder
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
-from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.tello.camera import TelloCamera
 from tools.tello_vehicle.video import packets
 
 pytestmark = pytest.mark.wall_clock

@@ -12,8 +12,9 @@ from tello_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
 
 from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello.vehicle import TelloVehicle
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.extensions.tello.vehicle import TelloVehicle
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.vehicle import (
     ClockedVehicle,
@@ -378,3 +379,25 @@ def test_settings_are_checked_by_name(settings: dict[str, object], complaint: st
     robot = RobotConfig(id="t", driver="tello", settings=settings)
     with pytest.raises(ConfigError, match=f"robot t: settings: {complaint}"):
         TelloVehicle(robot, EnvironmentConfig(robots=[robot]))
+
+
+def test_a_tello_that_somebody_flies_is_left_in_the_air() -> None:
+    """No connection that only looks lands it or commands it."""
+    with EmulatedTello() as tello:
+        robot = robot_of(tello.port)
+        config = EnvironmentConfig(robots=[robot])
+        pilot = load_vehicle(robot, config)
+        pilot.connect()
+        pilot.take_off(1.0)
+        wait_for(lambda: pilot.read().mode is VehicleMode.HOLDING)
+        vehicle = load_vehicle(robot_of(tello.port), config, observing=True)
+        vehicle.connect()
+        wait_for(lambda: vehicle.read().armed)
+        with pytest.raises(VehicleError, match="only looked at"):
+            vehicle.hold()
+        with pytest.raises(VehicleError, match="only looked at"):
+            vehicle.land()
+        vehicle.close()
+        assert "land" not in {text for _, text in tello.heard}
+        pilot.close()
+        assert "land" in {text for _, text in tello.heard}

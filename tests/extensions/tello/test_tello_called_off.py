@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from tello_flights import flight
 
-from aerodaas.drivers.tello.phase import FlightPhase
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello.phase import FlightPhase
+from aerodaas.extensions.tello.state import TelloState
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 from tools.tello_vehicle import Impairment, TelloOptions
 

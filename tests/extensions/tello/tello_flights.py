@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello.camera import TelloCamera
-from aerodaas.drivers.tello.vehicle import TelloVehicle
+from aerodaas.extensions.tello.camera import TelloCamera
+from aerodaas.extensions.tello.vehicle import TelloVehicle
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from tools.tello_vehicle import EmulatedTello, TelloOptions
 

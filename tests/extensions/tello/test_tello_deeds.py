@@ -12,12 +12,12 @@ import pytest
 
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.tello import vehicle as module
-from aerodaas.drivers.tello.commands import STILL, Command, Sticks
-from aerodaas.drivers.tello.link import LinkCounts
-from aerodaas.drivers.tello.state import TelloState
-from aerodaas.drivers.tello.vehicle import TelloVehicle
 from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.extensions.tello import vehicle as module
+from aerodaas.extensions.tello.commands import STILL, Command, Sticks
+from aerodaas.extensions.tello.link import LinkCounts
+from aerodaas.extensions.tello.state import TelloState
+from aerodaas.extensions.tello.vehicle import TelloVehicle
 from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode, VelocitySetpoint
 
 STANDING = TelloState(0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 0.0, 0.1, 100.0, 80, 0.0, 50.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import queue
 import time
 
-from aerodaas.drivers.tello.commands import ENTER, STREAM_ON, VERSION, Command, ports
-from aerodaas.drivers.tello.link import TelloLink
-from aerodaas.drivers.tello.settings import STATE_PORT, VIDEO_PORT, TelloSettings
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.tello.commands import ENTER, STREAM_ON, VERSION, Command, ports
+from aerodaas.extensions.tello.link import TelloLink
+from aerodaas.extensions.tello.settings import STATE_PORT, VIDEO_PORT, TelloSettings
 
 __all__ = ["explain_no_states", "greet", "meaning"]
 

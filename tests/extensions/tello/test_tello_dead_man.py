@@ -13,13 +13,13 @@ from collections.abc import Iterator
 import pytest
 from tello_flights import LOOPBACK
 
-from aerodaas.drivers.tello.dead_man import DeadMan
+from aerodaas.extensions.tello.dead_man import DeadMan
 
 pytestmark = pytest.mark.wall_clock
 
 _FLYING = """
 import socket, sys, time
-from aerodaas.drivers.tello.dead_man import DeadMan
+from aerodaas.extensions.tello.dead_man import DeadMan
 link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 link.bind(("127.0.0.1", 0))
 guard = DeadMan(link, ("127.0.0.1", int(sys.argv[1])))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello.phase import LIFTED, FlightPhase
+from aerodaas.extensions.tello.state import TelloState
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 
 

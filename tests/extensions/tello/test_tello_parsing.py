@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.drivers.tello.battery import BatteryGauge
-from aerodaas.drivers.tello.commands import (
+from aerodaas.extensions.tello.battery import BatteryGauge
+from aerodaas.extensions.tello.commands import (
     ENTER,
     LAND,
     STREAM_ON,
@@ -18,7 +18,7 @@ from aerodaas.drivers.tello.commands import (
     Command,
     ports,
 )
-from aerodaas.drivers.tello.state import parse_state
+from aerodaas.extensions.tello.state import parse_state
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.options import TelloOptions
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello.state import TelloState
 from aerodaas.messages.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["LIFTED", "FlightPhase"]

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from aerodaas.drivers.tello.commands import BodyMotion
-from aerodaas.drivers.tello.state import TelloState
+from aerodaas.extensions.tello.commands import BodyMotion
+from aerodaas.extensions.tello.state import TelloState
 from aerodaas.geometry.frames import Vector, body_to_enu, wrap_angle
 from aerodaas.messages.odometry import Odometry
 

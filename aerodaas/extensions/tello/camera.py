@@ -17,13 +17,13 @@ from aerodaas.cameras.settings import camera_model
 from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.drivers.pin import Pin
-from aerodaas.drivers.tello.settings import (
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.tello.settings import (
     TelloCameraSettings,
     tello_camera_settings,
     tello_settings,
 )
-from aerodaas.drivers.tello.sockets import bound_socket, datagrams
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.tello.sockets import bound_socket, datagrams
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 

@@ -1,0 +1,162 @@
+"""Extensions: features that the core flies without, each in a folder or a package of its own.
+
+The project's own are the folders of `aerodaas/extensions/`. A package adds others by an entry
+point in the group `aerodaas.extensions`, whose value names its `Extension`. The core imports no
+extension: it asks `extensions()` what there is, and imports what an extension names when needed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import pkgutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any, Literal
+
+from aerodaas.errors import ConfigError
+
+__all__ = [
+    "Command",
+    "Extension",
+    "PluginKind",
+    "VehicleDiscovery",
+    "VehicleKind",
+    "extensions",
+    "imported",
+]
+
+_PACKAGE = "aerodaas.extensions"
+_log = logging.getLogger(__name__)
+
+PluginKind = Literal[
+    "drivers", "cameras", "analytics", "trajectory_schedulers", "analytics_schedulers"
+]
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command of the command line."""
+
+    name: str
+    """The word by which it is called."""
+    place: str
+    """`module:attribute` of its function, or of a Typer application of several commands."""
+    summary: str
+    """The first sentence of its help."""
+    panel: str | None = None
+    """Title above it in the list of commands; None for the list's own."""
+    words: bool = False
+    """Whether words after `--` are an application's own."""
+
+
+@dataclass(frozen=True)
+class VehicleDiscovery:
+    """Result of a search for a vehicle of one kind."""
+
+    address: str | None = None
+    """Where a vehicle is; None if none was found."""
+    notes: tuple[str, ...] = ()
+    """Signs of a vehicle that was not found, and what hindered the search."""
+
+
+@dataclass(frozen=True)
+class VehicleKind:
+    """A kind of vehicle for which `aerodaas init` writes an environment file."""
+
+    name: str
+    driver: str
+    limits: Mapping[str, Any]
+    """Limits of a first flight, as an environment file has them."""
+    fence: tuple[float, float]
+    """Geofence of a first flight: metres from the take-off to each side, and up."""
+    address: str | None = None
+    """Where the vehicle is by default; None if it has no address."""
+    address_setting: str = ""
+    """The driver's setting for the address."""
+    camera: Mapping[str, Any] | None = None
+    """Settings of the camera that the vehicle brings along; None if it brings none."""
+    find: str = ""
+    """`module:function` that searches for such a vehicle: it gets how many seconds to listen and
+    an address to ask or None, and returns a `VehicleDiscovery`. Empty if nothing searches."""
+
+
+@dataclass(frozen=True)
+class Extension:
+    """All that one extension adds to the core.
+
+    Its module is imported by every command, so it imports nothing slow: code is named as
+    `module:attribute`.
+    """
+
+    name: str
+    """The folder's or the entry point's name."""
+    summary: str
+    """One sentence for a list of extensions."""
+    plugins: Mapping[PluginKind, Mapping[str, str]] = field(default_factory=dict)
+    """`module:attribute` of each plug-in by its registered name."""
+    commands: tuple[Command, ...] = ()
+    vehicles: tuple[VehicleKind, ...] = ()
+    ports: Mapping[int, str] = field(default_factory=dict)
+    """UDP ports that `aerodaas doctor` tries, and what listens there."""
+
+
+@cache
+def extensions() -> Mapping[str, Extension]:
+    """Every extension by its name: the project's own first, each group in order of the alphabet.
+
+    An installed package's extension that cannot be imported is left out with a warning, so that
+    everything else still works.
+
+    Raises:
+        ConfigError: If two extensions have one name, or add one plug-in.
+    """
+    found: dict[str, Extension] = {}
+    owner: dict[tuple[str, str], str] = {}
+    for name, extension in (*_own(), *_installed()):
+        if name in found:
+            raise ConfigError(f"two extensions are called {name!r}: uninstall one of them")
+        found[name] = extension
+        for kind, plugins in extension.plugins.items():
+            for plugin in plugins:
+                other = owner.setdefault((kind, plugin), name)
+                if other != name:
+                    raise ConfigError(
+                        f"the extensions {other!r} and {name!r} both add {plugin!r} to {kind}: "
+                        "uninstall one of them"
+                    )
+    return found
+
+
+def imported(place: str) -> Any:  # noqa: ANN401 - whatever is named
+    """Import what an extension names.
+
+    Args:
+        place: `module:attribute`.
+    """
+    module, _, attribute = place.partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def _own() -> Iterator[tuple[str, Extension]]:
+    try:
+        package = importlib.import_module(_PACKAGE)
+    except ModuleNotFoundError:
+        return
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda module: module.name):
+        yield module.name, imported(f"{_PACKAGE}.{module.name}.extension:EXTENSION")
+
+
+def _installed() -> Iterator[tuple[str, Extension]]:
+    for point in sorted(entry_points(group=_PACKAGE), key=lambda point: point.name):
+        try:
+            extension = point.load()
+        except Exception as error:  # noqa: BLE001 - a stranger's module may raise anything
+            _log.warning("the extension %r cannot be imported: %s", point.name, error)
+            continue
+        if not isinstance(extension, Extension):
+            _log.warning("the extension %r is no Extension: %s", point.name, point.value)
+            continue
+        yield point.name, extension

@@ -1,0 +1,170 @@
+"""Extensions: found in their folders and in packages; the core works without any of them."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.plugins import load_plugin, plugin_names
+from aerodaas.errors import ConfigError, UnknownIdError
+
+_ROOT = Path(__file__).resolve().parents[2]
+_FOLDERS = sorted(
+    path.parent.name for path in (_ROOT / "aerodaas/extensions").glob("*/extension.py")
+)
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of installed packages, each of whose extensions is found."""
+    monkeypatch.syspath_prepend(tmp_path)
+    extensions.cache_clear()
+    yield tmp_path
+    extensions.cache_clear()
+
+
+def _install(site: Path, package: str, name: str, source: str) -> None:
+    """Install a package of one module with one extension."""
+    (site / f"{package}.py").write_text(source)
+    info = site / f"{package}-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(f"[aerodaas.extensions]\n{name} = {package}:EXTENSION\n")
+    importlib.invalidate_caches()
+
+
+def test_every_folder_is_an_extension_of_its_name() -> None:
+    """With a sentence on what it is; whatever it names can be imported."""
+    found = extensions()
+    assert set(_FOLDERS) <= set(found)
+    for name in _FOLDERS:
+        extension = found[name]
+        assert extension.name == name
+        assert extension.summary.endswith(".")
+        places = [place for plugins in extension.plugins.values() for place in plugins.values()]
+        places += [command.place for command in extension.commands]
+        places += [kind.find for kind in extension.vehicles if kind.find]
+        for place in places:
+            assert imported(place) is not None
+
+
+def test_a_packages_extension_adds_its_plug_ins(site: Path) -> None:
+    """By its entry point alone."""
+    source = (
+        "from aerodaas.config.extensions import Extension\n"
+        "from aerodaas.drivers.simulated import SimulatedVehicle\n"
+        "class Glider(SimulatedVehicle): pass\n"
+        "EXTENSION = Extension('gliders', 'Gliders.', {'drivers': {'glider': 'gliding:Glider'}})\n"
+    )
+    _install(site, "gliding", "gliders", source)
+    assert extensions()["gliders"].summary == "Gliders."
+    assert "glider" in plugin_names("drivers")
+    assert load_plugin("drivers", "glider").__name__ == "Glider"
+
+
+@pytest.mark.parametrize("source", ["import nothing_of_this_name\n", "EXTENSION = 3\n"])
+def test_a_package_that_is_broken_is_left_out_with_a_warning(
+    site: Path, caplog: pytest.LogCaptureFixture, source: str
+) -> None:
+    """Everything else still works."""
+    _install(site, "broken_one", "broken", source)
+    assert "broken" not in extensions()
+    assert "'broken'" in caplog.text
+    assert load_plugin("drivers", "simulated") is not None
+    with pytest.raises(UnknownIdError):
+        load_plugin("drivers", "broken")
+
+
+def test_two_extensions_that_add_one_plug_in_are_refused(site: Path) -> None:
+    """Both are named, with the remedy."""
+    source = (
+        "from aerodaas.config.extensions import Extension\n"
+        "EXTENSION = Extension('NAME', 'Some.', {'drivers': {'glider': 'gliding:Glider'}})\n"
+    )
+    _install(site, "first_one", "first", source)
+    _install(site, "second_one", "second", source)
+    with pytest.raises(ConfigError, match=r"'first' and 'second' both add 'glider'.*uninstall"):
+        extensions()
+
+
+def test_no_test_of_the_core_imports_an_extension() -> None:
+    """Their tests lie in `tests/extensions`, so that the others run without them."""
+    found = []
+    for path in (_ROOT / "tests").rglob("*.py"):
+        if path.is_relative_to(_ROOT / "tests/extensions"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            found += [str(path) for name in names if name.startswith("aerodaas.extensions.")]
+    assert found == []
+
+
+FLIGHT = """
+from aerodaas import *
+
+env = Environment("environment.json")
+drone = env.get_robot_by_id("drone")
+drone.navigate(AeroListData([Waypoint("a", 2, 0, 2), Waypoint("b", 0, 2, 2)]))
+drone.start_mission()
+"""
+
+
+def _without(tmp_path: Path, left_out: list[str]) -> dict[str, str]:
+    """A copy of the package without some extensions; the variables that have it imported."""
+    copy = tmp_path / "copy"
+    shutil.copytree(
+        _ROOT / "aerodaas", copy / "aerodaas", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    for name in left_out:
+        shutil.rmtree(copy / "aerodaas/extensions" / name)
+    return {**os.environ, "PYTHONPATH": str(copy)}
+
+
+def _core_works(tmp_path: Path, left_out: list[str]) -> None:
+    """Every module of the core is imported, its commands are listed, and a drone flies."""
+    variables = _without(tmp_path, left_out)
+
+    def run(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, *words],
+            cwd=tmp_path,
+            env=variables,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=240,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    names = run("-c", "from aerodaas.config.extensions import extensions; print(*extensions())")
+    assert not set(left_out) & set(names.split())
+    assert "run" in run("-m", "aerodaas", "--help")
+    run("-m", "aerodaas", "init", "--vehicle", "simulated")
+    (tmp_path / "app.py").write_text(FLIGHT)
+    words = ("--speed", "max", "--no-view", "--record", str(tmp_path / "flights"))
+    run("-m", "aerodaas", "run", "app.py", *words)
+    (summary,) = (tmp_path / "flights").rglob("summary.txt")
+    assert "2 of 2 waypoints" in summary.read_text()
+
+
+def test_the_core_flies_without_any_extension(tmp_path: Path) -> None:
+    """With all their folders deleted."""
+    _core_works(tmp_path, _FOLDERS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", _FOLDERS)
+def test_the_core_flies_without(tmp_path: Path, name: str) -> None:
+    """With one extension's folder deleted."""
+    _core_works(tmp_path, [name])
