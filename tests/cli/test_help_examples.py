@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from aerodaas.cli.app import app
 from aerodaas.cli.app import commands as all_commands
 from aerodaas.cli.deferred import DeferredCommand
+from aerodaas.config.extensions import Command
 
 
 def commands(group: TyperGroup, name: str) -> Iterator[tuple[str, TyperCommand | TyperGroup]]:
@@ -45,10 +46,10 @@ def test_each_example_has_its_line(name: str) -> None:
 
 
 @pytest.mark.parametrize("command", all_commands(), ids=lambda command: command.name)
-def test_the_list_tells_the_first_sentence_of_each_help(command: DeferredCommand) -> None:
+def test_the_list_tells_the_first_sentence_of_each_help(command: Command) -> None:
     """The list of all commands, which loads none of them, says the same as the command itself."""
-    first, _, _ = (command.loaded.help or "").partition("\n\n")
-    assert command.help == first.replace("\n", " ").partition(" ```text")[0]
+    first, _, _ = (DeferredCommand(command).loaded.help or "").partition("\n\n")
+    assert command.summary == first.replace("\n", " ").partition(" ```text")[0]
 
 
 def test_there_are_examples() -> None:
