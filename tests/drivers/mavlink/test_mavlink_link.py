@@ -180,6 +180,15 @@ def test_who_waits_for_an_answer_gets_it(world: World) -> None:
     assert both.empty()
 
 
+def test_a_listener_gets_messages_that_the_driver_does_not_process(world: World) -> None:
+    """A service that nobody else needs is one of its own."""
+    entry = mavlink.MAVLink_log_entry_message(1, 1, 1, 0, 90)
+    with world.link.listen("LOG_ENTRY") as entries:
+        world.says(entry)
+        world.link.step(100.0)
+        assert entries.get_nowait().size == 90
+
+
 def test_what_a_wire_brings_in_pieces_is_put_together(world: World) -> None:
     """On one without addresses; a datagram's beginning is no other one's."""
     packet = world.says(LOOK, peer=None)

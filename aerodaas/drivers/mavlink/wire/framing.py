@@ -6,7 +6,7 @@ Python costs more than a driver may take, so packets are cut out by their header
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 
 __all__ = ["Framer", "senders", "signed"]
 
@@ -43,14 +43,14 @@ def senders(content: bytes) -> set[tuple[int, int]] | None:
 class Framer:
     """Extractor of packets from bytes.
 
-    `decode` turns a packet whose message id is among `wanted` into a message, or returns None if
-    it is none after all, in which case the search goes on behind its first byte. Packets of
-    systems that are `foreign` are of no interest.
+    `decode` turns a packet whose message id is among `wanted`, which may grow, into a message, or
+    returns None if it is none after all, in which case the search goes on behind its first byte.
+    Packets of systems that are `foreign` are of no interest.
     """
 
     def __init__(
         self,
-        wanted: frozenset[int],
+        wanted: Container[int],
         decode: Callable[[bytearray], object],
         foreign: Callable[[int], bool] = lambda _: False,
     ) -> None:

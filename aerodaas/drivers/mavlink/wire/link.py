@@ -57,8 +57,6 @@ _WANTED = frozenset(
         mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
         *(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, mavlink.MAVLINK_MSG_ID_VIBRATION),
         *(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED),
-        *(mavlink.MAVLINK_MSG_ID_LOG_ENTRY, mavlink.MAVLINK_MSG_ID_LOG_DATA),
-        mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL,
         *(mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION, mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED),
         *(mavlink.MAVLINK_MSG_ID_CAMERA_FEEDBACK, mavlink.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION),
         *(
@@ -73,6 +71,10 @@ _WANTED = frozenset(
         EventMessage.id,
     }
 )
+"""Messages that the driver processes; those of a listener come on top."""
+_MESSAGE_IDS = {message.msgname: number for number, message in mavlink.mavlink_map.items()} | {
+    EventMessage.msgname: EventMessage.id
+}
 
 _ABOARD = {
     "ADSB_VEHICLE": frozenset({mavlink.MAV_COMP_ID_ADSB}),
@@ -138,6 +140,7 @@ class MavlinkLink:
         self._stands = stands
         self.pins = SenderPins(lambda: self.key is not None or stands())
         self._refused_at = -math.inf
+        self._wanted = set(_WANTED)
         self._framers: dict[Peer, Framer] = {}
         self._lock = threading.Lock()
         self._listeners: list[tuple[frozenset[str], queue.SimpleQueue[Message]]] = []
@@ -243,7 +246,8 @@ class MavlinkLink:
 
     @contextmanager
     def listen(self, *names: str) -> Iterator[queue.SimpleQueue[Message]]:
-        """Context manager: queue of the vehicle's messages of these names."""
+        """Context manager: queue of the vehicle's messages of these names, such as `LOG_ENTRY`."""
+        self._wanted.update(_MESSAGE_IDS[name] for name in names)
         entry: tuple[frozenset[str], queue.SimpleQueue[Message]] = (
             frozenset(names),
             queue.SimpleQueue(),
@@ -326,7 +330,7 @@ class MavlinkLink:
             if len(self._framers) >= _FRAMERS:
                 known = {self.pins.pin.address}
                 self._framers = {one: f for one, f in self._framers.items() if one in known}
-            self._framers[peer] = Framer(_WANTED, self._decode, self._is_foreign)
+            self._framers[peer] = Framer(self._wanted, self._decode, self._is_foreign)
         return self._framers[peer]
 
     def _decode(self, frame: bytearray) -> Message | None:
