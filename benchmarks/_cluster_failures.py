@@ -55,7 +55,7 @@ def measure_recoveries(cluster: EdgeCloud, folder: Path, plain: Shape) -> list[R
         run = env.launch()
         time.sleep(3 * _SETTLE)
         for what, fail, mend in _failures(cluster, run, plain):
-            moments.append((what, run.poll().robots["drone0"].status.stamp / 1e9))
+            moments.append((what, run.poll().robots["drone0"].mission.stamp / 1e9))
             fail()
             time.sleep(_LOOK)
             mend()

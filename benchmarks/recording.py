@@ -112,7 +112,7 @@ def _replay(recording: Path, seconds: float) -> float:
     folder = recording.parent.parent / "replay"
     run, flown = _fly(folder, None, _application(seconds), replay=recording)
     assert run.state is not None  # noqa: S101 - it has flown
-    stamps = [robot.status.stamp for robot in run.state.robots.values()]
+    stamps = [robot.mission.stamp for robot in run.state.robots.values()]
     return max(stamps) / 1e9 / flown
 
 

@@ -148,11 +148,11 @@ class DroneFlight:
 
     def status(self, robot: str = "drone") -> MissionStatus:
         """Status of a robot's mission."""
-        return self._node_of(robot).reports()[robot].status
+        return self._node_of(robot).reports()[robot].mission
 
     def position(self, robot: str = "drone") -> Any:  # noqa: ANN401
         """Where a robot is, local ENU."""
-        state = self._node_of(robot).reports()[robot].state
+        state = self._node_of(robot).reports()[robot].vehicle
         assert state is not None
         return state.odometry.position
 

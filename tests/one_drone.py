@@ -33,4 +33,4 @@ def long(env: Environment) -> None:
 
 def state_of(env: Environment) -> MissionState:
     """The mission's state."""
-    return env.launch().poll().robots["drone"].status.state
+    return env.launch().poll().robots["drone"].mission.state

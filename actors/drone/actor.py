@@ -21,11 +21,11 @@ from aerodaas.actors.run.losses import ALONE
 from aerodaas.config.file_lock import actor_lock, exclusive
 from aerodaas.errors import MissionError
 from aerodaas.messages.envelope import Message
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.drone import DroneNode, failure_of
 from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
-from aerodaas.runtime.reports import RobotReport
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
@@ -61,7 +61,7 @@ class DroneActor(NodeActor):
         self._robots = tuple(spec.robot.id for spec in robots)
         make = partial(planner_for, session)
         self._node = DroneNode(session, name, robots, make, neighbours=neighbours)
-        self._reports: dict[str, RobotReport] = {}
+        self._reports: dict[str, RobotStatus] = {}
         """Newest report of each robot: replaced by the loop, never mutated."""
         self._locks = ExitStack()
         self._changes = ChangeSignal()
@@ -118,7 +118,7 @@ class DroneActor(NodeActor):
                 lambda: self._node.command(robot, command, self.clock.now()), ANSWER_TIMEOUT
             )
         except LoopOverError as over:
-            state = self._reports[robot].status.state.value
+            state = self._reports[robot].mission.state.value
             return Answer(accepted=False, text=f"{over}: {state}")
 
     def grow(self, robots: tuple[RobotSpec, ...], timeout: float) -> ActorInfo:
@@ -155,7 +155,7 @@ class DroneActor(NodeActor):
         runner.subscriber.add(self._node.reads)
         runner.subscriber.subscribe_added()
 
-    def robots(self, newest: int = 200) -> dict[str, RobotReport]:
+    def robots(self, newest: int = 200) -> dict[str, RobotStatus]:
         """Report of each robot's last loop cycle, with the `newest` latencies.
 
         The call is also the heartbeat of the application's process.

@@ -43,6 +43,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.config.options import LiveViews
 from aerodaas.errors import AeroDaaSError, MissionError, SilentError
 from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
@@ -51,7 +52,7 @@ from aerodaas.runtime.growth import Growth, growth
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.plan import ActorPlan, CameraSpec, DispatchPlan, FlightPlan
-from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
+from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.runtime.stream_names import done_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
@@ -132,7 +133,7 @@ class Flight:
         self._recordings: list[Path] = [] if self.recording is None else [self.recording]
         self._changing = False
         """Whether a change keeps actors from answering."""
-        self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
+        self._answers: dict[str, tuple[float, dict[str, RobotStatus]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
         self._changes: dict[str, int] = {}
@@ -187,7 +188,7 @@ class Flight:
             self._gather_reports()
             self._record_vitals()
         self._call_reaper("heard")
-        robots: dict[str, RobotReport] = {}
+        robots: dict[str, RobotStatus] = {}
         for name in set(self._drones.values()):
             robots.update(self._robots_of(name, newest))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
@@ -236,12 +237,12 @@ class Flight:
                 self._changes[name] = awaited.result()
                 self._next_reports = 0.0
 
-    def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
+    def _robots_of(self, name: str, newest: int) -> dict[str, RobotStatus]:
         """Reports of a drone's actor; the last ones while it is too busy to answer."""
         member, before = self._members[name], self._answers.get(name)
         asked = member.handle.robots.remote(newest)
         try:
-            robots: dict[str, RobotReport] = (
+            robots: dict[str, RobotStatus] = (
                 ask(asked) if before is None else ask(asked, _LOOK_TIMEOUT)
             )
         except DeadError:
@@ -676,7 +677,7 @@ class Flight:
             text: One sentence for the operator.
         """
         stamps = [
-            report.status.stamp
+            report.mission.stamp
             for _, reports in tuple(self._answers.values())
             for report in reports.values()
         ]

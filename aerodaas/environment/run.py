@@ -562,7 +562,7 @@ class Run:
             self._view.print_alerts(self.state)
         for hook in self.on_end:
             hook()
-        stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
+        stamps = [robot.mission.stamp for robot in self.state.robots.values()] if self.state else []
         show_speed(
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
@@ -588,14 +588,14 @@ class Run:
         ]
         robots = self.state.robots if self.state else {}
         problems += [
-            f"{name}: mission aborted: {robot.status.reason}"
+            f"{name}: mission aborted: {robot.mission.reason}"
             for name, robot in robots.items()
-            if robot.status.state is MissionState.ABORTED
+            if robot.mission.state is MissionState.ABORTED
         ]
         unfinished = [
-            f"{name}: the mission was not completed: {robot.status.unfinished}"
+            f"{name}: the mission was not completed: {robot.mission.unfinished}"
             for name, robot in robots.items()
-            if robot.status.state is MissionState.LANDED and robot.status.unfinished
+            if robot.mission.state is MissionState.LANDED and robot.mission.unfinished
         ]
         if problems or unfinished:
             error = MissionError if problems else IncompleteError

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from aerodaas.messages.frames import Header
+from aerodaas.messages.health import HealthReport
 from aerodaas.messages.json_types import Int64, Real
-from aerodaas.messages.records import fast_pickle
-from aerodaas.messages.vehicle import Setpoint
+from aerodaas.messages.records import UNSENT, fast_pickle
+from aerodaas.messages.vehicle import Setpoint, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Decision",
     "MissionState",
     "MissionStatus",
+    "RobotStatus",
     "SetpointRecord",
 ]
 
@@ -114,6 +116,32 @@ class MissionStatus:
         """Share of the known waypoints that have been visited, 0 to 1."""
         visited, known = self.waypoint_counts
         return visited / known if known else 0.0
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class RobotStatus:
+    """Status of one robot at one time: of its mission and of its vehicle."""
+
+    mission: MissionStatus
+    vehicle: VehicleState | None = None
+    """None before the vehicle's first state."""
+    health: HealthReport | None = field(default=None, metadata=UNSENT)
+    """The list before take-off as it was gone through last."""
+    latencies: tuple[float, ...] = field(default=(), metadata=UNSENT)
+    """Milliseconds from capture to command, newest last."""
+
+    @property
+    def notable(self) -> tuple[object, ...]:
+        """Values whose change the application is told at once, rather than at its next poll."""
+        one = self.mission
+        return one.state, one.reason, len(one.visited), len(one.given_up), one.faults
+
+    @property
+    def public(self) -> RobotStatus:
+        """The status without the simulator's truth and the driver's further figures."""
+        vehicle = self.vehicle
+        return self if vehicle is None else replace(self, vehicle=vehicle.public)
 
 
 @fast_pickle

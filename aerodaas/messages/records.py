@@ -11,15 +11,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 __all__ = [
-    "SECRET",
+    "UNSENT",
     "fast_pickle",
-    "secrets_of",
     "shared_pickle",
+    "unsent_fields",
     "valued",
 ]
 
 C = TypeVar("C", bound=type[Any])
-SECRET: Mapping[str, bool] = {"secret": True}
+UNSENT: Mapping[str, bool] = {"exclude": True}
 """Metadata of a dataclass' field that is recorded nowhere, and never sent to others."""
 _PLAIN = frozenset({bool, float, int, str})
 """What most fields are; all else is asked what it is, which takes several times as long."""
@@ -39,10 +39,10 @@ _JSON = {
 
 
 @lru_cache(maxsize=1024)
-def secrets_of(cls: type) -> frozenset[str]:
-    """Names of a class' fields that are `SECRET`; none of what is no dataclass."""
+def unsent_fields(cls: type) -> frozenset[str]:
+    """Names of a class' fields that are `UNSENT`; none of what is no dataclass."""
     fields = dataclasses.fields(cls) if dataclasses.is_dataclass(cls) else ()
-    return frozenset(one.name for one in fields if one.metadata.get("secret"))
+    return frozenset(one.name for one in fields if one.metadata.get("exclude"))
 
 
 def valued(cls: C) -> C:

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, from_json, to_json
 
 from aerodaas.errors import AeroDaaSError
-from aerodaas.messages.records import secrets_of
+from aerodaas.messages.records import unsent_fields
 
 __all__ = [
     "MessageError",
@@ -46,7 +46,7 @@ def _number(value: object) -> Any:  # noqa: ANN401 - one of Python's numbers
 
 
 def json_of(message: object) -> Any:  # noqa: ANN401 - JSON
-    """The JSON value of a message, without its secret fields.
+    """The JSON value of a message, without its unsent fields.
 
     Args:
         message: An instance of a dataclass of `aerodaas.messages`.
@@ -61,9 +61,9 @@ def json_of(message: object) -> Any:  # noqa: ANN401 - JSON
 
 
 def json_schema_of(kind: type) -> dict[str, Any]:
-    """The JSON schema of a message's class, without its secret fields."""
+    """The JSON schema of a message's class, without its unsent fields."""
     schema = _adapter(kind).json_schema()
-    for name in secrets_of(kind):
+    for name in unsent_fields(kind):
         del schema["properties"][name]
     return schema
 
@@ -75,7 +75,7 @@ def json_text(
     without: Mapping[str, Any] = {},
     **more: str | float | None,
 ) -> bytes:
-    """The JSON text of a message, without its secret fields.
+    """The JSON text of a message, without its unsent fields.
 
     Args:
         message: An instance of a dataclass of `aerodaas.messages`.
@@ -93,7 +93,7 @@ def json_text(
         # Fields are not checked here: whoever reads the message checks them.
         text = _adapter(type(message)).dump_json(
             message,
-            exclude={**dict.fromkeys(secrets_of(type(message)), True), **without},
+            exclude=dict(without),
             exclude_none=without_none,
             warnings="none",
             fallback=_number,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.clock import Clock
@@ -16,7 +16,7 @@ from aerodaas.geometry.frames import Vector
 from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import Gimbal, GimbalAttitude, PhotoCamera
-from aerodaas.messages.records import SECRET, fast_pickle
+from aerodaas.messages.records import UNSENT, fast_pickle
 
 __all__ = [
     "Capabilities",
@@ -170,9 +170,14 @@ class VehicleState:
     limits need one; None without a fresh reading in its range."""
     actuators: dict[str, str] = field(default_factory=dict)
     """Positions last taken by actuator, as far as the vehicle has acknowledged them."""
-    video: str = field(default="", repr=False, metadata=SECRET)
+    video: str = field(default="", repr=False, metadata=UNSENT)
     """Address of its camera's video, as it says; it may hold a password, so it is recorded nowhere
     and sent to nobody else. Empty where it tells none that may be read."""
+
+    @property
+    def public(self) -> VehicleState:
+        """The state without the simulator's truth, the driver's further figures and addresses."""
+        return replace(self, truth=None, extra={}, video="")
 
 
 @runtime_checkable

@@ -18,7 +18,7 @@ import numpy as np
 from foxglove import Schema
 
 from aerodaas.identifiers import INTERNAL, is_internal
-from aerodaas.messages.records import secrets_of
+from aerodaas.messages.records import unsent_fields
 
 __all__ = ["Entry", "plain", "stream_of", "topic"]
 
@@ -128,13 +128,13 @@ def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
 @lru_cache(maxsize=1024)
 def _declared(kind: type) -> tuple[tuple[str, ...], bool]:
     """Fields and slots of a class, and whether its objects' further attributes are data, too."""
-    secret = secrets_of(kind)
+    unsent = unsent_fields(kind)
     names = [field.name for field in dataclasses.fields(kind)] if is_dataclass(kind) else []
     own = kind.__module__.partition(".")[0] not in sys.stdlib_module_names
     if own:
         slots = (getattr(one, "__slots__", ()) for one in kind.__mro__)
         names += [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
-    return tuple(name for name in dict.fromkeys(names) if name not in secret), own
+    return tuple(name for name in dict.fromkeys(names) if name not in unsent), own
 
 
 def _words(value: object) -> str:

@@ -11,12 +11,12 @@ from aerodaas.drivers.loading import link_of
 from aerodaas.errors import MissionError, failure_line
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.runtime.controller import MakePlanner, RobotSpec, VehicleController
 from aerodaas.runtime.node import NEVER, Host, Node
-from aerodaas.runtime.reports import RobotReport
 from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, Session, next_due
 from aerodaas.runtime.stream_names import whereabouts_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
@@ -275,10 +275,10 @@ class DroneNode(Node):
         """Ids of the robots."""
         return tuple(self._controllers)
 
-    def reports(self) -> dict[str, RobotReport]:
+    def reports(self) -> dict[str, RobotStatus]:
         """Status and state of each robot, without latencies."""
         return {
-            name: RobotReport(controller.status, controller.state, (), controller.loop.health)
+            name: RobotStatus(controller.status, controller.state, controller.loop.health)
             for name, controller in self._controllers.items()
         }
 

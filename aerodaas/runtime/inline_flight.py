@@ -17,6 +17,7 @@ from typing_extensions import Self
 from aerodaas.config.options import LiveViews
 from aerodaas.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.messages.frames import Header
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import read_vitals
 from aerodaas.mission.commands import Answer, Command
@@ -34,7 +35,7 @@ from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.node import NEVER, Node
 from aerodaas.runtime.plan import ActorPlan, CameraSpec, FlightPlan
 from aerodaas.runtime.recorder import RecorderNode
-from aerodaas.runtime.reports import ActorReport, FlightState, RobotReport
+from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
@@ -132,7 +133,7 @@ class InlineFlight:
         self._sensed = False
         self._over = False
         self._stopped = False
-        self._robots: dict[str, RobotReport] = {}
+        self._robots: dict[str, RobotStatus] = {}
         self._look: object = None
         """What of the robots the application is told at once."""
         self._notes: list[Alert] = []
@@ -303,7 +304,7 @@ class InlineFlight:
                 lambda: drone.command(robot, command, self._executor.clock.now()), _ANSWER_TIMEOUT
             )
         except LoopOverError as over:
-            return Answer(accepted=False, text=f"{over}: {self._robots[robot].status.state.value}")
+            return Answer(accepted=False, text=f"{over}: {self._robots[robot].mission.state.value}")
 
     def publish_alert(self, kind: str, text: str) -> None:
         """Publish an alert of the application; in any thread.

@@ -12,10 +12,8 @@ from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.health import HealthReport
-from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
-from aerodaas.messages.vehicle import VehicleState
 from aerodaas.messages.vitals import Vitals
 from aerodaas.runtime.node import LATENCIES_KEPT, Node, Outlet
 from aerodaas.runtime.stream_names import alert_stream
@@ -26,7 +24,6 @@ __all__ = [
     "AlertLog",
     "FlightState",
     "Phase",
-    "RobotReport",
     "SentCount",
     "StreamCount",
     "merged_values",
@@ -34,24 +31,6 @@ __all__ = [
 ]
 
 Phase = Literal["new", "ready", "running", "done", "failed"]
-
-
-@dataclass(frozen=True)
-class RobotReport:
-    """Status and state of one robot at one time; made by the setpoint loop, immutable."""
-
-    status: MissionStatus
-    state: VehicleState | None
-    latencies: tuple[float, ...]
-    """Milliseconds from capture to command, newest last."""
-    health: HealthReport | None = None
-    """The list before take-off as it was gone through last."""
-
-    @property
-    def notable(self) -> tuple[object, ...]:
-        """Values whose change the application is told at once, rather than at its next poll."""
-        status = self.status
-        return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
 
 
 @dataclass(frozen=True)
@@ -136,7 +115,7 @@ def merged_values(nodes: Iterable[Node]) -> dict[str, Any]:
 class FlightState:
     """State of a run at one time."""
 
-    robots: dict[str, RobotReport]
+    robots: dict[str, RobotStatus]
     reports: dict[str, ActorReport]
     over: bool
     """True after every mission has ended."""

@@ -21,7 +21,7 @@ from aerodaas.config.options import RunOptions
 from aerodaas.errors import RecordingError
 from aerodaas.identifiers import is_internal
 from aerodaas.terminal.live import MissionView
-from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import FlightState
@@ -124,7 +124,7 @@ class FlightView:
         """Show the flight's present state, but for its alerts in a pipe."""
         if self._view is None:
             return
-        stamps = [robot.status.stamp for robot in state.robots.values()]
+        stamps = [robot.mission.stamp for robot in state.robots.values()]
         now = seconds(max(stamps, default=0))
         self._measure_rates(state, now)
         self._view.update(
@@ -132,10 +132,7 @@ class FlightView:
                 title=self._title,
                 mission_time=now,
                 wall_time=time.monotonic() - self._began,
-                robots=tuple(
-                    RobotSnapshot(name, robot.status, robot.state)
-                    for name, robot in state.robots.items()
-                ),
+                robots=state.robots,
                 streams=(*self._streams(state), *_commands(state)),
                 alerts=tuple(alert.text for alert in state.alerts[-_ALERTS_SHOWN:]),
                 scheduler=_scheduler_text(state),

@@ -12,10 +12,10 @@ from rich.rule import Rule
 from rich.text import Text
 from typing_extensions import Self
 
-from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.terminal.lines import robot_line
 from aerodaas.terminal.panels import alerts_panel, clock_text, robot_panel, streams_panel
-from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
+from aerodaas.terminal.snapshot import Snapshot
 
 __all__ = ["MissionView"]
 
@@ -75,15 +75,15 @@ class MissionView:
     def update(self, snapshot: Snapshot) -> None:
         """Show `snapshot`."""
         self._last = snapshot
-        for robot in snapshot.robots:
-            self._remember(robot)
+        for name, robot in snapshot.robots.items():
+            self._remember(name, robot)
         now = time.monotonic()
         if self._live is not None:
             if now - self._drawn >= _REDRAW:
                 self._drawn = now
                 self._live.update(self.render(snapshot), refresh=True)
         else:
-            states = {robot.name: robot.mission.state for robot in snapshot.robots if robot.mission}
+            states = {name: robot.mission.state for name, robot in snapshot.robots.items()}
             if states != self._states or now - self._drawn >= _LINE_EVERY:
                 self._drawn = now
                 self._states = states
@@ -93,8 +93,8 @@ class MissionView:
         """The view of a snapshot, at least 72 columns wide."""
         ascii_only = not self._console.encoding.lower().startswith("utf")
         parts = [
-            robot_panel(robot, self._paths.get(robot.name, ()), ascii_only=ascii_only)
-            for robot in snapshot.robots
+            robot_panel(name, robot, self._paths.get(name, ()), ascii_only=ascii_only)
+            for name, robot in snapshot.robots.items()
         ]
         # rich draws a rule without a title in Unicode even where the terminal cannot.
         rule = Rule(style="dim", characters="-" if ascii_only else "─")
@@ -113,11 +113,11 @@ class MissionView:
             width=min(self._console.width, _WIDEST),
         )
 
-    def _remember(self, robot: RobotSnapshot) -> None:
+    def _remember(self, name: str, robot: RobotStatus) -> None:
         if robot.vehicle is None:
             return
         east, north, _ = (float(axis) for axis in robot.vehicle.odometry.position)
-        path = self._paths.setdefault(robot.name, [])
+        path = self._paths.setdefault(name, [])
         if path and abs(path[-1][0] - east) + abs(path[-1][1] - north) < _STEP:
             return
         path.append((east, north))
@@ -125,7 +125,7 @@ class MissionView:
             del path[1::2]
 
     def _print(self, snapshot: Snapshot) -> None:
-        lines = [robot_line(snapshot, robot) for robot in snapshot.robots]
+        lines = [robot_line(snapshot, *one) for one in snapshot.robots.items()]
         lines += [snapshot.scheduler] if snapshot.scheduler else []
         if lines != self._lines:
             self._lines = lines

@@ -11,10 +11,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.terminal.plan import braille_plan
-from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
 
 __all__ = [
     "alerts_panel",
@@ -60,26 +60,33 @@ def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
 
 
 def robot_panel(
-    robot: RobotSnapshot, path: Sequence[tuple[float, float]], *, ascii_only: bool
+    name: str, robot: RobotStatus, path: Sequence[tuple[float, float]], *, ascii_only: bool
 ) -> RenderableType:
-    """Mission, position and battery of a robot, beside a plan of its flight."""
+    """Mission, position and battery of a robot, beside a plan of its flight.
+
+    Args:
+        name: Id of the robot.
+        robot: Its status.
+        path: Where it has flown, metres east and north.
+        ascii_only: Whether the terminal shows nothing but ASCII, and so no plan.
+    """
     facts = Table.grid(padding=(0, 1), expand=True)
     facts.add_column(style="dim", width=9, no_wrap=True)
     facts.add_column(ratio=1, overflow="fold")
     mission, vehicle = robot.mission, robot.vehicle
-    facts.add_row(Text(robot.name, "bold not dim"), _state(mission))
-    facts.add_row("", Text(mission.reason if mission else "", "italic"))
+    facts.add_row(Text(name, "bold not dim"), _state(mission))
+    facts.add_row("", Text(mission.reason, "italic"))
     facts.add_row("waypoint", _waypoint(mission, vehicle))
     facts.add_row("position", _position(vehicle))
     facts.add_row("battery", _battery(vehicle))
-    if mission is not None and mission.outlook is not None:
+    if mission.outlook is not None:
         facts.add_row("", _outlook(mission.outlook))
     facts.add_row("progress", _progress(mission))
-    facts.add_row("flown", f"{mission.distance:.1f} m" if mission else "")
+    facts.add_row("flown", f"{mission.distance:.1f} m")
     facts.add_row("faults", _faults(mission, vehicle))
     if ascii_only:
         return facts
-    ahead = () if mission is None else (*mission.pending, mission.target)
+    ahead = (*mission.pending, mission.target)
     places = [(at.x, at.y) for at in ahead if at is not None]
     beside = Table.grid(padding=(0, 1), expand=True)
     beside.add_column(ratio=1)
@@ -111,15 +118,13 @@ def alerts_panel(alerts: Sequence[str]) -> RenderableType:
     return Group(*(Text(f"! {alert}", "yellow") for alert in alerts[-_ALERTS:]))
 
 
-def _state(mission: MissionStatus | None) -> Text:
-    if mission is None:
-        return Text("waiting for the first word", "dim")
+def _state(mission: MissionStatus) -> Text:
     style = _STYLES.get(mission.state, "bold black on bright_blue")
     return Text.assemble((f" {mission.state.value.replace('_', ' ').upper()} ", style))
 
 
-def _waypoint(mission: MissionStatus | None, vehicle: VehicleState | None) -> Text:
-    if mission is None or mission.target is None:
+def _waypoint(mission: MissionStatus, vehicle: VehicleState | None) -> Text:
+    if mission.target is None:
         return Text("-")
     target = mission.target
     text = f"{target.id} ({target.x:.1f}, {target.y:.1f}, {target.z:.1f})"
@@ -152,15 +157,13 @@ def _outlook(outlook: BatteryOutlook) -> str:
     return f"returns at {outlook.returns_at:.0%}, in {minutes}:{seconds:02}; plan needs {plan}"
 
 
-def _progress(mission: MissionStatus | None) -> RenderableType:
-    if mission is None:
-        return "-"
+def _progress(mission: MissionStatus) -> RenderableType:
     share, text = waypoints_text(mission)
     return _bar(share, text, "bright_blue")
 
 
-def _faults(mission: MissionStatus | None, vehicle: VehicleState | None) -> Text:
-    faults = (*(mission.faults if mission else ()), *(vehicle.faults if vehicle else ()))
+def _faults(mission: MissionStatus, vehicle: VehicleState | None) -> Text:
+    faults = (*mission.faults, *(vehicle.faults if vehicle else ()))
     return Text("; ".join(faults), "red") if faults else Text("none", "dim")
 
 

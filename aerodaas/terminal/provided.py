@@ -13,14 +13,14 @@ from rich.console import Console
 from typing_extensions import Self
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus
+from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import MissionOut, MissionPhase, StatusOut
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.progress import download_view
-from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
+from aerodaas.terminal.snapshot import Snapshot
 
 __all__ = ["ProvidedView", "download_view", "phase_text"]
 
@@ -95,13 +95,13 @@ class ProvidedView:
                 title=f"{mission.name} ({mission.id})",
                 mission_time=max(times, default=0.0),
                 wall_time=time.monotonic() - self._began,
-                robots=tuple(self._robot(*one) for one in mission.status.items()),
+                robots={name: self._robot(name, one) for name, one in mission.status.items()},
                 alerts=alerts,
             )
         )
 
-    def _robot(self, name: str, status: StatusOut) -> RobotSnapshot:
-        return RobotSnapshot(name, self._mission(name, status), _vehicle(status))
+    def _robot(self, name: str, status: StatusOut) -> RobotStatus:
+        return RobotStatus(self._mission(name, status), _vehicle(status))
 
     def _reason(self, name: str, status: StatusOut, state: MissionState) -> str:
         """Why it is in its state; or since when nothing is known of it.

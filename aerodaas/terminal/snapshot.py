@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from aerodaas.messages.mission import MissionStatus
-from aerodaas.messages.vehicle import VehicleState
+from aerodaas.messages.mission import RobotStatus
 
-__all__ = ["RobotSnapshot", "Snapshot", "StreamSnapshot"]
-
-
-@dataclass(frozen=True, slots=True)
-class RobotSnapshot:
-    """One robot; None before its first report."""
-
-    name: str
-    mission: MissionStatus | None = None
-    vehicle: VehicleState | None = None
+__all__ = ["Snapshot", "StreamSnapshot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +33,8 @@ class Snapshot:
     """Mission seconds."""
     wall_time: float
     """Seconds on the host since the mission clock started."""
-    robots: tuple[RobotSnapshot, ...] = ()
+    robots: Mapping[str, RobotStatus] = field(default_factory=dict)
+    """By id."""
     streams: tuple[StreamSnapshot, ...] = ()
     alerts: tuple[str, ...] = ()
     """One line each, newest last; the view shows the last few."""

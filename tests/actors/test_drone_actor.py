@@ -53,7 +53,7 @@ def test_reading_never_meets_a_mission_that_changes() -> None:
         stamps = []
         for _ in range(_READS // 4):
             report = actor.robots()["drone"]
-            status = report.status
+            status = report.mission
             assert status.target not in status.pending
             assert len(set(status.visited)) == len(status.visited)
             stamps.append(status.stamp)
@@ -91,7 +91,7 @@ def test_commands_after_the_end_are_refused_at_once() -> None:
     actor.start(host_time_ns())
     _until_over(actor)
     before = actor.robots()["drone"]
-    assert before.status.state is MissionState.LANDED
+    assert before.mission.state is MissionState.LANDED
     began = time.monotonic()
     answer = actor.command("drone", End())
     assert time.monotonic() - began < 1.0
@@ -106,7 +106,7 @@ def test_a_change_is_told_to_a_call_that_waits() -> None:
     actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0, mission=_HOLD)
     actor.start(host_time_ns())
     known = 0
-    while actor.robots()["drone"].status.state is not MissionState.TAKING_OFF:
+    while actor.robots()["drone"].mission.state is not MissionState.TAKING_OFF:
         known = actor.await_change(known, 60.0)
     with ThreadPoolExecutor(1) as pool:
         known = actor.await_change(-1, 60.0)
@@ -117,7 +117,7 @@ def test_a_change_is_told_to_a_call_that_waits() -> None:
             known = actor.await_change(known, 60.0)
     # Aborted if it was asked to land before it had taken off.
     ended = {MissionState.LANDED, MissionState.ABORTED}
-    assert actor.robots()["drone"].status.state in ended
+    assert actor.robots()["drone"].mission.state in ended
     assert actor.await_change(known, 60.0) >= known
     actor.stop()
 
@@ -174,11 +174,11 @@ def test_a_drone_whose_application_is_silent_comes_home() -> None:
         assert time.monotonic() < end
         time.sleep(0.1)
     time.sleep(0.2)
-    status = actor.robots()["drone"].status
+    status = actor.robots()["drone"].mission
     assert status.state in {MissionState.RETURNING, MissionState.LANDING}
     assert [one.text for one in lost] == [status.reason]
     _until_over(actor)
-    assert actor.robots()["drone"].status.state is MissionState.LANDED
+    assert actor.robots()["drone"].mission.state is MissionState.LANDED
     actor.stop()
 
 
@@ -187,10 +187,10 @@ def _until_over(actor: DroneByHand) -> None:
 
 
 def _land(actor: DroneByHand) -> None:
-    _until(lambda: actor.robots()["drone"].status.state not in _ON_GROUND)
+    _until(lambda: actor.robots()["drone"].mission.state not in _ON_GROUND)
     assert actor.command("drone", End()).accepted
     _until_over(actor)
-    assert actor.robots()["drone"].status.state is MissionState.LANDED
+    assert actor.robots()["drone"].mission.state is MissionState.LANDED
     actor.stop()
 
 
@@ -210,7 +210,7 @@ def test_an_actor_whose_loop_fails_leaves_its_vehicle_to_itself(
         AddNavigation(hop((2, 0), hover=900)), speed=20.0, driver="drone_nodes:UnreadableVehicle"
     )
     actor.start(host_time_ns())
-    _until(lambda: actor.robots()["drone"].status.state is MissionState.LOITERING)
+    _until(lambda: actor.robots()["drone"].mission.state is MissionState.LOITERING)
     vehicle.unreadable.add("drone")
     _until(lambda: actor.report().phase == "failed")
     assert "TypeError" in str(actor.report().error)
@@ -233,13 +233,13 @@ def test_an_actor_flies_on_when_one_of_its_drones_fails(vehicle: type[Unreadable
     actor = DroneByHand(Session(environment, 20.0), "drone/west+north", specs)
     actor.open_here()
     actor.start(host_time_ns())
-    _until(lambda: all(one.status.state not in _ON_GROUND for one in actor.robots().values()))
+    _until(lambda: all(one.mission.state not in _ON_GROUND for one in actor.robots().values()))
     vehicle.unreadable.add("west")
     _until(lambda: any(one.kind == "drone_failed" for one in actor.report().alerts))
     assert actor.report().phase == "running"
     assert actor.command("north", End()).accepted
     _until(lambda: actor.report().phase == "failed")
-    assert actor.robots()["north"].status.state is MissionState.LANDED
+    assert actor.robots()["north"].mission.state is MissionState.LANDED
     assert str(actor.report().error).startswith("west: TypeError")
     actor.stop()
 

@@ -44,7 +44,7 @@ def test_a_graph_grows_in_flight(flyer: Flyer) -> None:
                 time.sleep(0.02)
 
         def is_in(state: MissionState) -> bool:
-            return env.launch().poll().robots["drone"].status.state is state
+            return env.launch().poll().robots["drone"].mission.state is state
 
         until(lambda: is_in(MissionState.LOITERING))
         assert Jitter().analyse(odometry).get_data(timeout=10.0) > 1.0

@@ -43,7 +43,7 @@ def test_an_idle_application_looks_once_a_second_and_leaves_no_records(
 
     with flyer.flying(_hover, speed=5.0) as env:
         run = env.launch()
-        while run.poll().robots["drone"].status.state is not MissionState.LOITERING:
+        while run.poll().robots["drone"].mission.state is not MissionState.LOITERING:
             time.sleep(0.1)
         count("poll")
         began = time.monotonic()

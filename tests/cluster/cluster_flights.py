@@ -87,11 +87,11 @@ class Watched:
 
     def now(self) -> float:
         """Mission seconds."""
-        return self.run.poll().robots["drone"].status.stamp / 1e9
+        return self.run.poll().robots["drone"].mission.stamp / 1e9
 
     def height(self) -> float:
         """Metres up."""
-        state = self.run.poll().robots["drone"].state
+        state = self.run.poll().robots["drone"].vehicle
         return float(state.odometry.position[2]) if state is not None else 0.0
 
     def outcomes(self) -> dict[str, int]:

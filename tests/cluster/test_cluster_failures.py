@@ -274,7 +274,7 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
         with pytest.raises(MissionError, match="No space left"):
             _fly_until_full(watched)
         assert watched.run.state is not None
-        assert watched.run.state.robots["drone"].status.state is MissionState.LANDED
+        assert watched.run.state.robots["drone"].mission.state is MissionState.LANDED
         assert "No space left" in watched.run.reports()["edge"].values["failure"]
     finally:
         subprocess.run(["umount", str(disk)], check=True)  # noqa: S607

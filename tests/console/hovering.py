@@ -13,7 +13,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.graph import Graph
 from aerodaas.errors import MissionError
 from aerodaas.messages.health import HealthReport
-from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Traffic, VehicleMode, VehicleState
@@ -68,7 +68,7 @@ class Run:
         status = MissionStatus(
             round(self.time * 10**9), self.mission_state, "flying to wp1", target, outlook=outlook
         )
-        robots = {"drone": SimpleNamespace(status=status, state=vehicle, health=self.health)}
+        robots = {"drone": RobotStatus(status, vehicle, self.health)}
         return SimpleNamespace(robots=robots, alerts=list(self.alerts), reports={})
 
     def command(self, robot: str, command: Command) -> Answer:

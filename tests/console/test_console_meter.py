@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from aerodaas.messages.mission import MissionState, MissionStatus
+from aerodaas.messages.mission import MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.service.own.flight import FlightMeter
@@ -20,7 +20,7 @@ def flying_to(target: int, *pending: int, stamp: int = 10**9) -> FlightState:
     """A state of one drone on its way to the waypoint `target`, as numbers name them."""
     ahead = [Waypoint(f"wp{one}", one, 2, 3, waypoint_type="local") for one in (target, *pending)]
     status = MissionStatus(stamp, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
-    robots = {"drone": SimpleNamespace(status=status, state=None, health=None)}
+    robots = {"drone": RobotStatus(status)}
     return cast("FlightState", SimpleNamespace(robots=robots, alerts=[], reports={}))
 
 

@@ -53,7 +53,7 @@ def test_the_environment_starts_and_ends_all_missions(flyer: Flyer) -> None:
             drone.on_end(partial(called.append, f"{name} ends"))
         env.start_mission(lambda: called.append("all start"), wait=False)
         run, end = env.launch(), time.monotonic() + 60
-        while {one.status.state for one in run.poll().robots.values()} != {MissionState.LOITERING}:
+        while {one.mission.state for one in run.poll().robots.values()} != {MissionState.LOITERING}:
             assert time.monotonic() < end
         env.end_mission()
         env.wait()

@@ -16,7 +16,13 @@ from hypothesis import strategies as st
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Header
-from aerodaas.messages.mission import BatteryOutlook, Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.mission import (
+    BatteryOutlook,
+    Decision,
+    MissionStatus,
+    RobotStatus,
+    SetpointRecord,
+)
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoFailure
 from aerodaas.messages.readings import Alert, Readings
@@ -57,6 +63,7 @@ def test_a_secret_field_is_not_written() -> None:
     """The address of a vehicle's video may hold a password."""
     state = filled(VehicleState, video="rtsp://me:word@camera")
     assert "video" not in json_of(state)
+    assert "video" not in json_of(filled(RobotStatus, vehicle=state))["vehicle"]
 
 
 @pytest.mark.parametrize("kind", MESSAGES, ids=lambda kind: kind.__name__)

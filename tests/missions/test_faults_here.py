@@ -75,7 +75,7 @@ def holders(folder: Path) -> set[int]:
 
 def state_of(run: Run) -> MissionState:
     """The mission's state."""
-    return run.poll().robots["drone"].status.state
+    return run.poll().robots["drone"].mission.state
 
 
 def alerts(flight: RecordedFlight) -> dict[str, list[str]]:

@@ -19,7 +19,7 @@ from aerodaas.config.model import EnvironmentConfig, LimitsConfig, RemoteConfig
 from aerodaas.dataflow.graph import Graph
 from aerodaas.environment.remote_client import RemoteClient
 from aerodaas.errors import MissionError
-from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.service.own import flight as own_flight
@@ -56,7 +56,7 @@ class DirectRun:
         """The mission's word."""
         del newest
         vehicle = self.flown.vehicle.read()
-        drone = SimpleNamespace(status=self.flown.status, state=vehicle, health=None)
+        drone = RobotStatus(self.flown.status, vehicle)
         self.state = SimpleNamespace(robots={"drone": drone}, alerts=[], reports={})
         return self.state
 

@@ -63,7 +63,7 @@ def until(env: Environment, condition: Callable[[], bool], seconds: float = 30.0
 
 def pending(env: Environment) -> list[str]:
     """What is still to be visited after the present waypoint, in planned order."""
-    status = env.launch().poll().robots["drone"].status
+    status = env.launch().poll().robots["drone"].mission
     return [waypoint.id for waypoint in status.pending]
 
 
@@ -112,7 +112,7 @@ def test_navigation_joins_a_flight(flyer: Flyer) -> None:
     with flyer.flying(stay) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         drone_of(env).navigate(places(Waypoint("urgent", 2.0, 2.0, 2.0, priority=0)))
-        until(env, lambda: "urgent" in env.launch().poll().robots["drone"].status.visited)
+        until(env, lambda: "urgent" in env.launch().poll().robots["drone"].mission.visited)
         drone_of(env).navigate(Weave().analyse(odometry_of(env)))
         env.trajectory_scheduler().clear_navigation()
         until(env, lambda: state_of(env) is MissionState.FOLLOWING)

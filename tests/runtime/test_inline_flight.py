@@ -91,7 +91,7 @@ def test_waypoints_added_in_flight_are_flown(flyer: Flyer) -> None:
         scheduler.clearNavigation()
         until(lambda: state_of(env) is MissionState.HOLDING)
         scheduler.addNavigation(AeroListData([Waypoint("extra", 2, 2, 2)]))
-        until(lambda: "extra" in env.launch().poll().robots["drone"].status.visited)
+        until(lambda: "extra" in env.launch().poll().robots["drone"].mission.visited)
         drone_of(env).end_mission()
     assert recorded(env.launch()).robots["drone"].outcome.startswith("landed: ")
 

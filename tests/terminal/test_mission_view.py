@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.plan import braille_plan
-from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
 
 PLACES = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
 
@@ -46,7 +46,7 @@ def snapshot(
         "Farm [Survey]",
         time,
         time / 10,
-        (RobotSnapshot("tello", mission, vehicle),),
+        {"tello": RobotStatus(mission, vehicle)},
         streams,
         alerts,
     )
@@ -100,11 +100,12 @@ def test_a_narrow_panel_cuts_no_name(width: int) -> None:
     long = "drone/a_stream_with_a_name_that_tells_all_that_it_is_made_from"
     alert = "link_lost: " + " ".join(f"word{number}" for number in range(30))
     told = snapshot(3.0, alerts=(alert,))
-    (robot,) = told.robots
-    assert robot.mission is not None
+    robot = told.robots["tello"]
     reason = " ".join(f"reason{number}" for number in range(20))
     mission = replace(robot.mission, reason=reason, faults=(alert,))
-    told = replace(told, robots=(replace(robot, mission=mission),), streams=(StreamSnapshot(long),))
+    told = replace(
+        told, robots={"tello": replace(robot, mission=mission)}, streams=(StreamSnapshot(long),)
+    )
     console = Console(file=io.StringIO(), width=width, force_terminal=True, color_system=None)
     console.print(MissionView(console).render(told))
     assert isinstance(console.file, io.StringIO)
@@ -167,12 +168,12 @@ def test_pipe_gets_a_line_at_each_change_of_state() -> None:
 
 
 def test_nothing_known_yet() -> None:
-    """Before the first word of a robot there is a picture already."""
+    """Before the first status of a robot there is a picture already."""
     console = Console(file=io.StringIO(), width=80, force_terminal=True)
     with MissionView(console) as view:
-        view.update(Snapshot("Farm", 0.0, 0.0, (RobotSnapshot("tello"),)))
+        view.update(Snapshot("Farm", 0.0, 0.0))
     assert isinstance(console.file, io.StringIO)
-    assert "waiting for the first word" in console.file.getvalue()
+    assert "Farm" in console.file.getvalue()
 
 
 @given(st.lists(PLACES, max_size=20), st.lists(PLACES, max_size=5))

@@ -83,19 +83,19 @@ class FlightMeter:
         """Record a state of the run."""
         told = {}
         for name, report in state.robots.items():
-            now, before = seconds(report.status.stamp), self.status.get(name)
+            now, before = seconds(report.mission.stamp), self.status.get(name)
             # The same status again is no news: who told it may hang.
             same = before is not None and before.time == now
             told[name] = self.told[name] if same else seconds(host_time_ns())
-            if before is not None and report.status.state not in GROUNDED:
+            if before is not None and report.mission.state not in GROUNDED:
                 self._flown[name] += max(0.0, now - before.time)
         self.told = told
         self.status = {
-            name: self._remembering(name, StatusOut.of(report.status, report.state))
+            name: self._remembering(name, StatusOut.of(report.mission, report.vehicle))
             for name, report in state.robots.items()
         }
         self.preflight = {
-            name: PreflightOut.of_flight(name, report.health, report.status.stamp)
+            name: PreflightOut.of_flight(name, report.health, report.mission.stamp)
             for name, report in state.robots.items()
         }
         for name, status in self.status.items():

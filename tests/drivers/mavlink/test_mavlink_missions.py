@@ -34,7 +34,7 @@ def test_a_waypoint_mission(flyer: Flyer) -> None:
         home = vehicle.truth.position
         motions = vehicle.firmware.motions
     assert run.state is not None
-    status = run.state.robots["drone"].status
+    status = run.state.robots["drone"].mission
     assert status.state is MissionState.LANDED
     assert status.visited == ("wp0", "wp1")
     assert motions[:3] == ["arm", "take off", "follow"]

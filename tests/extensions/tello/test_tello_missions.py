@@ -81,7 +81,7 @@ def test_a_waypoint_mission(environment: Environment, tello: EmulatedTello) -> N
     drone.start_mission()
     assert environment.run is not None
     assert environment.run.state is not None
-    status = environment.run.state.robots["drone"].status
+    status = environment.run.state.robots["drone"].mission
     assert status.state is MissionState.LANDED
     assert status.visited == ("a", "b")
     assert tello.mode is VehicleMode.GROUNDED

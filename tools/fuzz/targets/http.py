@@ -17,7 +17,7 @@ from typing import Any
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.graph import Graph
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.schemas import Role
@@ -116,7 +116,7 @@ class _Link:
     def poll(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         del newest
         status, vehicle = self.flight.mission.status, self.drone.read()
-        drone = SimpleNamespace(status=status, state=vehicle, health=None)
+        drone = RobotStatus(status, vehicle)
         return SimpleNamespace(robots={"drone": drone}, alerts=[], reports={})
 
     def command(self, robot: str, command: Command) -> Answer:
