@@ -14,7 +14,6 @@ import databases
 import hypothesis
 import pytest
 import required
-import ros_domain
 from flying import Flyer
 
 from aerodaas.config.options import RunOptions, current_options
@@ -34,10 +33,9 @@ _CI = bool(os.environ.get("CI"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """What is missing fails in continuous integration; databases and ROS domains are fixtures."""
+    """What is missing fails in continuous integration; databases are fixtures."""
     config.pluginmanager.register(required)
     config.pluginmanager.register(databases)
-    config.pluginmanager.register(ros_domain)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 import typer
 
-from aerodaas.cli.deferred import DeferredCommand
-from aerodaas.cli.options import ExampleGroup
+from aerodaas.cli.deferred import deferred_group
 from aerodaas.config.extensions import Command, extensions
 from aerodaas.environment.signals import heed_interrupts
 
@@ -91,16 +89,7 @@ _CORE = (
         "aerodaas.cli.report:compare",
         "Set two recordings side by side in one HTML page.",
     ),
-    Command(
-        "export",
-        "aerodaas.cli.export:export",
-        "Write parts of a recording as CSV, Parquet, MP4, GPX, KML, COCO, LeRobot or a ROS 2 bag.",
-    ),
-    Command(
-        "import",
-        "aerodaas.cli.import_bag:import_bag",
-        "Write topics of a ROS 2 bag as a recording, to replay, view and report on.",
-    ),
+    Command("export", "aerodaas.cli.export:app", "Write parts of a recording for other programs."),
     Command(
         "replay",
         "aerodaas.cli.replay:replay",
@@ -193,16 +182,8 @@ def commands() -> tuple[Command, ...]:
     return (*_CORE, *(one for extension in extensions().values() for one in extension.commands))
 
 
-class _Commands(ExampleGroup):
-    """The group of all commands."""
-
-    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - Typer's
-        settings["commands"] = {command.name: DeferredCommand(command) for command in commands()}
-        super().__init__(**settings)
-
-
 app = typer.Typer(
-    cls=_Commands,
+    cls=deferred_group(commands),
     # Typer takes an application without a command for a mistake.
     callback=lambda: None,
     no_args_is_help=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 from aerodaas.cli.options import ExampleGroup
 from aerodaas.config.extensions import Command, imported
 
-__all__ = ["DeferredCommand"]
+__all__ = ["DeferredCommand", "deferred_group"]
 
 
 class DeferredCommand(TyperCommand):
@@ -48,3 +49,20 @@ class DeferredCommand(TyperCommand):
     ) -> Any:  # noqa: ANN401 - as above
         """Begin a call of the command itself."""
         return self.loaded.make_context(info_name, args, parent, **extra)
+
+
+def deferred_group(commands: Callable[[], tuple[Command, ...]]) -> type[ExampleGroup]:
+    """Class of a group of commands whose modules are imported when they are called.
+
+    Args:
+        commands: Gives the commands in the order in which help lists them.
+    """
+
+    class Group(ExampleGroup):
+        """A group of deferred commands."""
+
+        def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - Typer's
+            settings["commands"] = {one.name: DeferredCommand(one) for one in commands()}
+            super().__init__(**settings)
+
+    return Group

@@ -2,87 +2,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated
 
 import typer
 
+from aerodaas.cli.deferred import deferred_group
 from aerodaas.cli.report import Recorded
+from aerodaas.config.extensions import Command, extensions
 from aerodaas.config.printable import printable
+from aerodaas.recording.reader import Recording
 
-if TYPE_CHECKING:
-    from aerodaas.recording.reader import Recording
+__all__ = ["Folder", "app", "csv", "export", "formats", "parquet", "topics"]
 
-__all__ = ["export"]
+Folder = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the files. Default: the recording's own.")
+]
+_Topics = Annotated[
+    list[str], typer.Argument(metavar="TOPIC…", help="Channels, as `topics` lists them.")
+]
+_CORE = (
+    Command("topics", "aerodaas.cli.export:topics", "List the channels of a recording."),
+    Command("csv", "aerodaas.cli.export:csv", "Write channels as CSV."),
+    Command("parquet", "aerodaas.cli.export:parquet", "Write channels as Parquet."),
+)
+
+
+def formats() -> tuple[Command, ...]:
+    """Every format: the core's, then those of extensions."""
+    return (*_CORE, *(one for extension in extensions().values() for one in extension.exports))
+
+
+app = typer.Typer(
+    cls=deferred_group(formats),
+    # Typer takes an application without a command for a mistake.
+    callback=lambda: None,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="""Write parts of a recording for other programs.
+
+    aerodaas export topics flight.mcap
+    aerodaas export csv flight.mcap /tello/state /decisions/decision
+    aerodaas export mp4 flight.mcap
+""",
+)
 
 
 def export(
-    recording: Recorded,
-    csv: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Channel to write as CSV.")
-    ] = None,
-    parquet: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Channel to write as Parquet.")
-    ] = None,
-    mp4: Annotated[bool, typer.Option("--mp4", help="A video of each camera.")] = False,  # noqa: FBT002
-    overlays: Annotated[bool, typer.Option(help="Draw detections into the videos.")] = True,  # noqa: FBT002
-    gpx: Annotated[bool, typer.Option("--gpx", help="The track as GPX.")] = False,  # noqa: FBT002
-    kml: Annotated[bool, typer.Option("--kml", help="The track as KML.")] = False,  # noqa: FBT002
-    coco: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SECONDS",
-            min=0,
-            help="Pictures, at least so far apart, and what was detected, as a COCO dataset.",
-        ),
-    ] = None,
-    lerobot: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TASK",
-            help="Pictures, states and commands as a LeRobot dataset; the task in words.",
-        ),
-    ] = None,
-    ros2: Annotated[
-        Literal["mcap", "sqlite3"] | None,
-        typer.Option(help="States, pictures and detections as a ROS 2 bag in this storage."),
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the files. Default: the recording's own.")
-    ] = None,
+    recording: Path, out: Path | None, write: Callable[[Recording, Path], Sequence[Path | str]]
 ) -> None:
-    """Write parts of a recording as CSV, Parquet, MP4, GPX, KML, COCO, LeRobot or a ROS 2 bag.
+    """Write files from a recording, and print what was written.
 
-    Without any of these, list the recording's channels.
+    Args:
+        recording: The recording's file.
+        out: Folder for the files; None for the recording's own.
+        write: Writes the files of the recording into the folder; returns their paths, or lines to
+            print.
 
-        aerodaas export flight.mcap --csv /tello/state --csv /decisions/decision
-        aerodaas export flight.mcap --mp4 --kml --out for_the_web
-        aerodaas export flight.mcap --coco 0.5
-        aerodaas export flight.mcap --lerobot "survey the field"
-        aerodaas export flight.mcap --ros2 mcap
+    Raises:
+        RecordingError: If the recording cannot be read, or a file cannot be written.
     """
-    from aerodaas.recording.export import tabular, track, video  # noqa: PLC0415 - slow to load
-    from aerodaas.recording.export.coco import write_coco  # noqa: PLC0415
-    from aerodaas.recording.export.lerobot import write_lerobot  # noqa: PLC0415
-    from aerodaas.recording.reader import Recording  # noqa: PLC0415
-    from aerodaas.recording.ros import bag_writer  # noqa: PLC0415
-
-    folder = out or recording.parent
     with Recording.open(recording) as opened:
-        files = [tabular.write_csv(opened, topic, folder) for topic in csv or ()]
-        files += [tabular.write_parquet(opened, topic, folder) for topic in parquet or ()]
-        files += video.write_videos(opened, folder, overlays=overlays) if mp4 else []
-        files += [track.write_gpx(opened, folder)] if gpx else []
-        files += [track.write_kml(opened, folder)] if kml else []
-        files += [] if coco is None else [write_coco(opened, folder, interval=coco)]
-        files += [] if lerobot is None else write_lerobot(opened, folder, task=lerobot)
-        files += [bag_writer.write_bag(opened, folder, ros2)] if ros2 else []
-        lines = [str(path) for path in files] or _channels(opened)
+        lines = [str(line) for line in write(opened, out or recording.parent)]
         if opened.damaged:
             lines.append(f"skipped {opened.damaged} broken messages or chunks")
     typer.echo("\n".join(lines))
 
 
+def topics(recording: Recorded) -> None:
+    """List the channels of a recording.
+
+    aerodaas export topics flight.mcap
+    """
+    export(recording, None, lambda opened, _: _channels(opened))
+
+
+def csv(recording: Recorded, topic: _Topics, out: Folder = None) -> None:
+    """Write channels as CSV.
+
+    aerodaas export csv flight.mcap /tello/state /decisions/decision
+    """
+    from aerodaas.recording.tables import write_csv  # noqa: PLC0415 - slow to load
+
+    export(recording, out, lambda opened, to: [write_csv(opened, one, to) for one in topic])
+
+
+def parquet(recording: Recorded, topic: _Topics, out: Folder = None) -> None:
+    """Write channels as Parquet.
+
+    aerodaas export parquet flight.mcap /tello/state
+    """
+    from aerodaas.recording.tables import write_parquet  # noqa: PLC0415 - slow to load
+
+    export(recording, out, lambda opened, to: [write_parquet(opened, one, to) for one in topic])
+
+
 def _channels(recording: Recording) -> list[str]:
-    topics = sorted(recording.topics.values(), key=lambda topic: topic.name)
-    return [printable(f"{topic.count:>9}  {topic.name}  {topic.schema}") for topic in topics]
+    found = sorted(recording.topics.values(), key=lambda topic: topic.name)
+    return [printable(f"{topic.count:>9}  {topic.name}  {topic.schema}") for topic in found]

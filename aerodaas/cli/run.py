@@ -10,6 +10,7 @@ import typer
 from aerodaas.cli.application import run_application, runtime_option, speed_option
 from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.shipped import find_application
+from aerodaas.config.extensions import live_views
 from aerodaas.config.options import RunOptions
 from aerodaas.errors import ConfigError
 
@@ -91,12 +92,13 @@ def run(
     live_address: Annotated[
         str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
     ] = "127.0.0.1:8765",
-    ros2: Annotated[  # noqa: FBT002
-        bool,
+    show: Annotated[
+        list[str] | None,
         typer.Option(
-            "--ros2", help="Publish the flight on ROS 2 topics of the domain ROS_DOMAIN_ID, or 0."
+            metavar="VIEW",
+            help=f"Show the flight elsewhere, too: {', '.join(live_views())}. May be repeated.",
         ),
-    ] = False,
+    ] = None,
 ) -> None:
     """Fly an application.
 
@@ -111,7 +113,6 @@ def run(
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
     """
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - slow to load
-    from aerodaas.ros.link import domain_of  # noqa: PLC0415 - as above
 
     application = find_application(application)
     # Who looks on and commands has the clock's time, unless another speed is asked for.
@@ -128,7 +129,7 @@ def run(
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=view,
         live=live_address if live else None,
-        ros2=domain_of(None) if ros2 else None,
+        show=tuple(show or ()),
         console=console_address if console else None,
         application=application.resolve(),
     )

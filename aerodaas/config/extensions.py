@@ -21,11 +21,13 @@ from aerodaas.errors import ConfigError
 __all__ = [
     "Command",
     "Extension",
+    "LiveView",
     "PluginKind",
     "VehicleDiscovery",
     "VehicleKind",
     "extensions",
     "imported",
+    "live_views",
 ]
 
 _PACKAGE = "aerodaas.extensions"
@@ -50,6 +52,23 @@ class Command:
     """Title above it in the list of commands; None for the list's own."""
     words: bool = False
     """Whether words after `--` are an application's own."""
+
+
+@dataclass(frozen=True)
+class LiveView:
+    """A way to show a flight's recorded messages in another program while it flies."""
+
+    name: str
+    """The word after `aerodaas run --show`."""
+    summary: str
+    """What it shows, and where."""
+    prepare: str
+    """`module:function` without arguments, called by the application before the flight. It returns
+    the place that `open` gets, and raises a ConfigError with the remedy if nothing can be shown."""
+    open: str
+    """`module:callable` that opens the view beside the recorder. It gets the place, the start of
+    the mission clock (Unix, nanoseconds) and the quality of JPEG pictures (1 to 100). What it
+    returns has `put(message)`, called with each recorded message, and `close()`."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +117,12 @@ class Extension:
     plugins: Mapping[PluginKind, Mapping[str, str]] = field(default_factory=dict)
     """`module:attribute` of each plug-in by its registered name."""
     commands: tuple[Command, ...] = ()
+    exports: tuple[Command, ...] = ()
+    """Formats of `aerodaas export`."""
+    views: tuple[LiveView, ...] = ()
+    decoders: Mapping[str, str] = field(default_factory=dict)
+    """By an encoding of recorded messages: `module:function` that gets the name of a schema and
+    returns the function that decodes its messages, or None for a schema that it does not know."""
     vehicles: tuple[VehicleKind, ...] = ()
     ports: Mapping[int, str] = field(default_factory=dict)
     """UDP ports that `aerodaas doctor` tries, and what listens there."""
@@ -128,6 +153,11 @@ def extensions() -> Mapping[str, Extension]:
                         "uninstall one of them"
                     )
     return found
+
+
+def live_views() -> dict[str, LiveView]:
+    """Live views that extensions add, by name."""
+    return {view.name: view for extension in extensions().values() for view in extension.views}
 
 
 def imported(place: str) -> Any:  # noqa: ANN401 - whatever is named

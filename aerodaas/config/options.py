@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -49,8 +49,8 @@ class LiveViews:
 
     foxglove: str | None = None
     """Address (`host:port`) of Foxglove's WebSocket; None for none."""
-    ros2: int | None = None
-    """DDS domain of the ROS 2 topics; None for none."""
+    others: Mapping[str, Any] = field(default_factory=dict)
+    """Place of each view that an extension shows, by the view's name."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class RunOptions:
     summary as JSON."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
-    ros2: int | None = None
-    """Publish the flight on ROS 2 topics of this DDS domain."""
+    show: tuple[str, ...] = ()
+    """Live views of extensions, by name."""
     console: str | None = None
     """Serve the console to browsers at this `host:port` while flying."""
     remote: bool = True

@@ -33,7 +33,6 @@ _CORE: dict[PluginKind, dict[str, str]] = {
     "drivers": {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
         "mavlink": "aerodaas.drivers.mavlink.vehicle:MavlinkVehicle",
-        "ros2": "aerodaas.drivers.ros2.vehicle:Ros2Vehicle",
         "replayed": "aerodaas.recording.replay.vehicle:ReplayedVehicle",
     },
     "cameras": {
@@ -42,7 +41,6 @@ _CORE: dict[PluginKind, dict[str, str]] = {
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
         "mavlink": "aerodaas.cameras.video:VideoCamera",
-        "ros2": "aerodaas.drivers.ros2.camera:Ros2Camera",
         "mcap": "aerodaas.recording.replay.mcap_camera:McapCamera",
         "replayed": "aerodaas.recording.replay.mcap_camera:ReplayedCamera",
     },

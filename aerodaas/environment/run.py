@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.clock import seconds
+from aerodaas.config.extensions import imported, live_views
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import LiveViews, Speed, current_options
@@ -31,11 +32,11 @@ from aerodaas.errors import (
     IncompleteError,
     MissionError,
     RecordingError,
+    UnknownIdError,
 )
 from aerodaas.identifiers import told
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.commands import Answer, Command, End
-from aerodaas.ros.link import require_dds
 from aerodaas.runtime.checks import check_served
 
 if TYPE_CHECKING:
@@ -75,6 +76,8 @@ class Run:
     ) -> None:
         """The flight `number` of this environment, counted from 1, at the application's `speed`."""
         self.options = current_options.get().at_speed(speed)
+        self._shown: dict[str, Any] = {}
+        """Place of each live view of an extension, by the view's name."""
         self.config = environment.config
         self.graph = environment.graph
         self.on_end: list[Callable[[], None]] = []
@@ -144,7 +147,7 @@ class Run:
                 document=document,
             )
             options = self.options
-            views = LiveViews(options.live, options.ros2)
+            views = LiveViews(options.live, self._shown)
             flight = make_flight(plan, self.recording, provenance, views)
             starting.begin("opening vehicles, cameras and models")
             try:
@@ -216,10 +219,13 @@ class Run:
             require_extra("remote", "--console")
         if self.options.live and self.recording is None:
             raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
-        if self.options.ros2 is not None:
-            require_dds("--ros2")
-            if self.recording is None:
-                raise ConfigError('--ros2 shows what is recorded; set "recording.enabled" to true')
+        if self.options.show and self.recording is None:
+            raise ConfigError('--show shows what is recorded; set "recording.enabled" to true')
+        known = live_views()
+        for name in self.options.show:
+            if name not in known:
+                raise UnknownIdError("live view", name, sorted(known))
+            self._shown[name] = imported(known[name].prepare)()
 
     def _listen(self) -> None:
         """Listen for those who are to be served while flying."""

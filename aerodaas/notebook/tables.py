@@ -17,9 +17,9 @@ from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.errors import MissionError
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, detections
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.tables import table_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -84,7 +84,7 @@ def recorded_table(recording: str | Path, what: str | AeroStreamData[Any]) -> Da
     Args:
         recording: The MCAP file, such as `env.run.recording`.
         what: A stream of the application that flew, its name such as `drone/odometry`, or a
-            channel such as `/drone/state/odometry`; `aerodaas export FILE` lists them.
+            channel such as `/drone/state/odometry`; `aerodaas export topics FILE` lists them.
 
     Returns:
         A row for each message, by mission seconds of capture.

@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+from aerodaas.config.extensions import imported, live_views
 from aerodaas.config.options import LiveViews
 from aerodaas.errors import RecordingError, failure_line
 from aerodaas.geometry.frames import GeodeticOrigin
@@ -23,9 +24,18 @@ if TYPE_CHECKING:
     from aerodaas.recording.live import LiveServer
     from aerodaas.recording.photo_album import PhotoAlbum
     from aerodaas.recording.recorder import FlightRecorder
-    from aerodaas.recording.ros.live import RosGraph
 
 __all__ = ["RecorderNode"]
+
+
+class LiveMessages(Protocol):
+    """Live view of the recorded messages in another program."""
+
+    def put(self, message: Message[Any]) -> None:
+        """Show a message."""
+
+    def close(self) -> None:
+        """End the view."""
 
 
 class RecorderNode(Node):
@@ -60,7 +70,7 @@ class RecorderNode(Node):
         self._recorder: FlightRecorder | None = None
         self._album: PhotoAlbum | None = None
         self._live: LiveServer | None = None
-        self._ros: RosGraph | None = None
+        self._shown: dict[str, LiveMessages] = {}
 
     def open(self, host: Host) -> None:
         """Create the file; raises RecordingError if it cannot be written."""
@@ -72,13 +82,13 @@ class RecorderNode(Node):
 
         environment = self._session.environment
         home = environment.home
-        address, domain = self._views.foxglove, self._views.ros2
+        address = self._views.foxglove
         self._live = LiveServer(address, self._provenance.name) if address else None
-        if domain is not None:
-            from aerodaas.recording.ros.live import RosGraph  # noqa: PLC0415 - an extra
-
-            quality = environment.recording.jpeg_quality
-            self._ros = RosGraph(domain, self._provenance.started_ns, quality)
+        known = live_views()
+        quality = environment.recording.jpeg_quality
+        for name, place in self._views.others.items():
+            view = imported(known[name].open)
+            self._shown[name] = view(place, self._provenance.started_ns, quality)
         # A recorder that is set up again keeps its predecessor's file and writes a second part.
         self.path = _unwritten(self.path)
         self._album = PhotoAlbum(album_folder(self.path), environment)
@@ -145,16 +155,20 @@ class RecorderNode(Node):
             self._recorder.drops(stream, count)
 
     def _show(self, message: Message[Any]) -> None:
-        """Publish on ROS 2 topics; what fails there ends that, and no recording."""
-        graph = self._ros
-        if graph is None:
-            return
+        """Show a message in each live view; what fails there ends that view, and no recording."""
+        for name in tuple(self._shown):
+            self._show_in(name, message)
+
+    def _show_in(self, name: str, message: Message[Any]) -> None:
+        view = self._shown.get(name)
         try:
-            graph.put(message)
-        except Exception as error:  # noqa: BLE001 - a middleware's
-            self._ros = None
-            graph.close()
-            self.host.alert("ros2_stopped", failure_line(error))
+            if view is not None:
+                view.put(message)
+        except Exception as error:  # noqa: BLE001 - an extension's
+            # Another thread may have ended it by the same failure.
+            if (ended := self._shown.pop(name, None)) is not None:
+                ended.close()
+                self.host.alert(f"{name}_stopped", failure_line(error))
 
     def _keep(self, robot: str, photo: Photo) -> None:
         """Keep a picture beside the recording; one that cannot be kept does not end it."""
@@ -174,8 +188,9 @@ class RecorderNode(Node):
             self._album.close()
         if self._live is not None:
             self._live.close()
-        if self._ros is not None:
-            self._ros.close()
+        for view in self._shown.values():
+            view.close()
+        self._shown = {}
         self._recorder = None
         if summary.stopped:
             raise RecordingError(summary.stopped)

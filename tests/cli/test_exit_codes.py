@@ -43,7 +43,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ["report", "broken.mcap"],
         ["view", "none.mcap"],
         ["compare", "none.mcap", "broken.mcap"],
-        ["export", "none.mcap"],
+        ["export", "topics", "none.mcap"],
         ["attach", "none.mcap", "none.bin"],
         ["import", "none"],
         ["compile", "none.mcap"],

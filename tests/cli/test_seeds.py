@@ -125,7 +125,7 @@ def test_wrong_input_is_told_once(flyer: Flyer, capsys: pytest.CaptureFixture[st
     [
         (["--seeds", "2", "--speed", "1"], "leave --speed out"),
         (["--seeds", "2", "--live"], "leave it out"),
-        (["--seeds", "2", "--ros2"], "leave it out"),
+        (["--seeds", "2", "--show", "ros2"], "leave it out"),
         (["--seeds", "2", "--record", "flight.mcap"], "names a folder"),
         (["--jobs", "2"], "belongs to --seeds"),
     ],

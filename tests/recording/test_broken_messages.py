@@ -16,8 +16,6 @@ from aerodaas.cli.app import app
 from aerodaas.config.model import RecordingConfig
 from aerodaas.config.printable import printable
 from aerodaas.recording.decoding.messages import decode_json
-from aerodaas.recording.export.tabular import table_of
-from aerodaas.recording.export.track import write_gpx, write_kml
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording, vehicle_states
 from aerodaas.recording.replay.environment import read_timetables
@@ -25,6 +23,7 @@ from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
+from aerodaas.recording.tables import table_of
 
 BROKEN: dict[str, bytes] = {
     "no JSON": b"\xff\x00",
@@ -49,9 +48,8 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def read_all(path: Path, whole: Path, folder: Path) -> None:
+def read_all(path: Path, whole: Path) -> None:
     """Read a recording in every manner."""
-    folder.mkdir()
     read_report_without_plots(path)
     read_timetables(path)
     difference(path, whole)
@@ -62,8 +60,6 @@ def read_all(path: Path, whole: Path, folder: Path) -> None:
         detections_by_frame(recording)
         for topic in recording.topics:
             table_of(recording, topic)
-        write_gpx(recording, folder)
-        write_kml(recording, folder)
 
 
 def read_report_without_plots(path: Path) -> None:
@@ -90,7 +86,7 @@ def test_one_broken_message_of_each_channel(flown: Path, tmp_path: Path, kind: s
         ours = {name for name, it in recording.topics.items() if it.schema.startswith("aerodaas.")}
         repeated = {topic for topic, count in met.items() if count > 1}
         assert {topic for topic in ours & repeated if recording.skipped[topic] != 1} == set()
-    read_all(path, flown, tmp_path / "out")
+    read_all(path, flown)
 
 
 @pytest.mark.parametrize("odd", [..., *ODD], ids=repr)
@@ -110,7 +106,7 @@ def test_every_field_may_hold_anything(flown: Path, tmp_path: Path, odd: object)
         return json.dumps(with_field(value, places[turns[topic] % len(places)], odd)).encode()
 
     path = rewritten(flown, tmp_path / "odd.mcap", change=change)
-    read_all(path, flown, tmp_path / "out")
+    read_all(path, flown)
 
 
 def test_the_report_tells_what_was_skipped(flown: Path, tmp_path: Path) -> None:
@@ -127,7 +123,7 @@ def test_the_report_tells_what_was_skipped(flown: Path, tmp_path: Path) -> None:
     assert "skipped 2 messages or chunks that are broken" in str(report.summary)
     page = write_comparison(path, flown, tmp_path / "both.html").read_text()
     assert "broken and skipped" in page
-    words = ["export", str(path), "--csv", "/tello/state", "--out", str(tmp_path / "csv")]
+    words = ["export", "csv", str(path), "/tello/state", "--out", str(tmp_path / "csv")]
     assert "skipped 2 broken messages" in CliRunner().invoke(app, words).output
 
 

@@ -6,28 +6,18 @@ import csv
 import json
 import re
 from pathlib import Path
-from xml.etree import ElementTree as ET
 
-import av
-import cv2
-import numpy as np
 import pyarrow.parquet
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import Writer
-from synthetic_flight import HOME, PLAN, SyntheticFlight, record
+from synthetic_flight import HOME, SyntheticFlight, record
 
-from aerodaas.config.model import RecordingConfig
 from aerodaas.errors import RecordingError
-from aerodaas.recording.export.output import file_name, new_file
-from aerodaas.recording.export.tabular import table_of, write_csv, write_parquet
-from aerodaas.recording.export.track import write_gpx, write_kml
-from aerodaas.recording.export.video import write_videos
+from aerodaas.recording.new_file import file_name, new_file
 from aerodaas.recording.reader import Recording
-
-GPX = "{http://www.topografix.com/GPX/1/1}"
-KML = "{http://www.opengis.net/kml/2.2}"
+from aerodaas.recording.tables import table_of, write_csv, write_parquet
 
 
 @pytest.fixture(scope="module")
@@ -103,45 +93,6 @@ def test_unknown_channel_names_its_neighbours(recorded: Path, tmp_path: Path) ->
         write_csv(recording, "telo/state", tmp_path)
 
 
-def test_video_plays_at_the_pictures_times(recorded: Path, tmp_path: Path) -> None:
-    """Every frame is there, as H.264, as long as the flight, with the boxes drawn in."""
-    with Recording.open(recorded) as recording:
-        pictures = recording.topics["/tello/camera/image"].count
-        (path,) = write_videos(recording, tmp_path)
-        (plain,) = write_videos(recording, tmp_path / "plain", overlays=False)
-    assert path.name == "tello-camera.mp4"
-    drawn, bare = (cv2.VideoCapture(str(each)).read()[1] for each in (path, plain))
-    difference = np.abs(np.asarray(drawn, float) - np.asarray(bare, float)).mean(axis=2)
-    assert difference[45:135, 98:103].mean() > 10 * difference[20:40, 200:].mean()
-    with av.open(str(path)) as film:
-        stream = film.streams.video[0]
-        assert (stream.codec_context.name, stream.width, stream.height) == ("h264", 320, 180)
-        assert stream.frames == pictures
-        assert stream.duration is not None
-        assert stream.time_base is not None
-        assert float(stream.duration * stream.time_base) == pytest.approx(106.0, abs=2.5)
-        assert sum(1 for _ in film.decode(stream)) == pictures
-
-
-def test_tracks_lie_where_the_drone_flew(recorded: Path, tmp_path: Path) -> None:
-    """GPX and KML agree with home, waypoints and the height flown."""
-    with Recording.open(recorded) as recording:
-        gpx = ET.parse(write_gpx(recording, tmp_path)).getroot()  # noqa: S314
-        kml = ET.parse(write_kml(recording, tmp_path)).getroot()  # noqa: S314
-    points = gpx.findall(f"{GPX}trk/{GPX}trkseg/{GPX}trkpt")
-    assert len(points) == pytest.approx(212, abs=3)
-    places = [(at.get("lat"), at.get("lon"), at.findtext(f"{GPX}ele")) for at in points]
-    local = np.array([HOME.to_local(*(float(axis or "nan") for axis in at)) for at in places])
-    assert np.ptp(local[:, :2], axis=0) == pytest.approx([10, 10], abs=0.3)
-    assert local[:, 2].max() == pytest.approx(1.5, abs=0.2)
-    assert [at.findtext(f"{GPX}name") for at in gpx.findall(f"{GPX}wpt")] == [w.id for w in PLAN]
-    names = [mark.findtext(f"{KML}name") for mark in kml.iter(f"{KML}Placemark")]
-    assert names == ["tello", *(w.id for w in PLAN)]
-    line = kml.find(f".//{KML}LineString/{KML}coordinates")
-    assert line is not None
-    assert len((line.text or "").split()) == len(points)
-
-
 def test_nothing_is_overwritten(recorded: Path, tmp_path: Path) -> None:
     """A file in the way stays as it is."""
     (tmp_path / "tello-state.csv").write_text("mine")
@@ -151,15 +102,6 @@ def test_nothing_is_overwritten(recorded: Path, tmp_path: Path) -> None:
     ):
         write_csv(recording, "/tello/state", tmp_path)
     assert (tmp_path / "tello-state.csv").read_text() == "mine"
-
-
-def test_recording_without_pictures(tmp_path: Path) -> None:
-    """Asking for a video of nothing is answered, and leaves nothing behind."""
-    path = tmp_path / "flight.mcap"
-    record(path, SyntheticFlight(frames=1, rate=2), config=RecordingConfig(images="none"))
-    with Recording.open(path) as recording, pytest.raises(RecordingError, match="no pictures"):
-        write_videos(recording, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 @given(st.text(max_size=400), st.text(max_size=400))

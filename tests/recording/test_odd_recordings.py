@@ -13,7 +13,6 @@ from synthetic_flight import PROVENANCE, SyntheticFlight
 from aerodaas.config.model import RecordingConfig
 from aerodaas.errors import RecordingError
 from aerodaas.messages.envelope import Message
-from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
@@ -61,15 +60,13 @@ def test_missing_channels_cost_what_they_held(tmp_path: Path, missing: tuple[str
 
 
 def test_pictures_alone_are_no_flight(tmp_path: Path) -> None:
-    """They can be played; there is nothing to report, and no track to export."""
+    """They can be played; there is nothing to report."""
     path = written(
         tmp_path / "pictures.mcap",
         lambda messages: [m for m in messages if m.stream == "tello/camera"],
     )
     with Recording.open(path) as recording:
         assert len(list(frames(recording))) > 5
-        with pytest.raises(RecordingError, match="where on the globe"):
-            write_gpx(recording, tmp_path)
     with pytest.raises(RecordingError, match="holds no flight"):
         write_report(path, tmp_path / "report")
 

@@ -24,7 +24,6 @@ from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
-from aerodaas.recording.export.track import write_gpx
 from aerodaas.recording.recorded_environment import allowed_content, left_out
 from aerodaas.recording.replay.environment import replay_environment
 
@@ -358,12 +357,11 @@ def test_the_local_file_gives_what_is_missing(flown: Path, tmp_path: Path) -> No
 def test_an_environment_of_odd_shape_is_refused_in_words(
     flown: Path, tmp_path: Path, content: object
 ) -> None:
-    """Replay, export and lab raise the project's own errors, or do without."""
+    """Replay and lab raise the project's own errors, or do without."""
     path = foreign(flown, tmp_path, content)
     left_out(content)
     for use in (
         lambda: replay_environment(path),
-        lambda: write_gpx_of(path, tmp_path),
         lambda: RecordedWorkload.read(path),
     ):
         said = refusal_of(use)
@@ -377,14 +375,6 @@ def refusal_of(use: Callable[[], object]) -> str:
     except AeroDaaSError as error:
         return str(error)
     return ""
-
-
-def write_gpx_of(path: Path, folder: Path) -> None:
-    """Export the track of a recording."""
-    from aerodaas.recording.reader import Recording  # noqa: PLC0415
-
-    with Recording.open(path) as recording:
-        write_gpx(recording, folder)
 
 
 def test_deep_or_broken_json_is_refused(flown: Path, tmp_path: Path) -> None:

@@ -31,10 +31,10 @@ from aerodaas.recording.decoding.limits import (
     MAX_METADATA,
 )
 from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
-from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
+from aerodaas.recording.tables import table_of
 
 MAGIC = b"\x89MCAP0\r\n"
 COMPRESSED = "foxglove.CompressedImage"

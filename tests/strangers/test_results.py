@@ -228,7 +228,7 @@ def test_a_recording_of_unknown_classes_can_be_used(flown: Flown, tmp_path: Path
     assert b"cloudpickle" not in flown.recording.read_bytes()
     for words in (
         ["report", recording],
-        ["export", recording, "--csv", "/drone/plain/value", "--out", str(tmp_path)],
+        ["export", "csv", recording, "/drone/plain/value", "--out", str(tmp_path)],
         ["replay", recording, "--app", "kinds.py", "--out", str(tmp_path / "again")],
     ):
         done = run(folder, str(COMMAND), *words)

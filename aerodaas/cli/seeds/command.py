@@ -72,7 +72,7 @@ def _shared_options(run: ApplicationRun) -> RunOptions:
     options = run.options
     if options.simulated_time is False:
         raise ConfigError("--seeds flies as fast as the machine goes: leave --speed out")
-    shown = {"--live": options.live, "--console": options.console, "--ros2": options.ros2}
+    shown = {"--live": options.live, "--console": options.console, "--show": options.show or None}
     for name, given in shown.items():
         if given is not None:
             raise ConfigError(f"{name} shows one flight, and --seeds flies several: leave it out")

@@ -51,7 +51,7 @@ _ENDING_SECONDS = 60.0
 _OWN = (
     "address",
     "live",
-    "ros2",
+    "show",
     "console",
     "replay",
     "speed",

@@ -20,6 +20,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from pydantic_core import to_json
 
 from aerodaas.cameras.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.mission import Decision, MissionStatus
@@ -32,7 +33,6 @@ from aerodaas.recording.decoding.limits import (
 )
 from aerodaas.recording.decoding.old_shapes import conversions
 from aerodaas.recording.messages import CHANNELS, NO_LABELS, Labels, labels_and_message
-from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
 
 __all__ = ["BrokenMessageError", "MessageDecoder", "decode_json", "plain_fields"]
 
@@ -71,7 +71,7 @@ class MessageDecoder:
 
         Returns:
             Its labels, and a message of this project, a dictionary for other JSON, an object with
-            fields for protobuf and `ROS_TYPES`, else the bytes.
+            fields for protobuf and what an extension decodes, else the bytes.
 
         Raises:
             BrokenMessageError: If the message is broken; the others of its channel may be whole.
@@ -119,8 +119,10 @@ class MessageDecoder:
         found = self._protobuf.decoder_for(encoding, schema)
         if found is not None:
             return found
-        if encoding == "cdr" and schema is not None and schema.name in ROS_TYPES:
-            return ros_decoder(schema.name)
+        for extension in extensions().values() if schema is not None else ():
+            place = extension.decoders.get(encoding)
+            if place is not None and (found := imported(place)(schema.name)) is not None:
+                return found
         return decode_json if encoding == "json" else bytes
 
 

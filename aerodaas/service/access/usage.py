@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from datetime import datetime, timezone
 
 from aerodaas.protocol.schemas import UsageOut
-from aerodaas.recording.export.output import harmless
+from aerodaas.recording.new_file import harmless
 from aerodaas.service.store import Usage
 
 __all__ = ["usage_csv", "usage_out"]

@@ -344,7 +344,7 @@ OWN: dict[str, Callable[[], RunOptions]] = {
     "speed": lambda: RunOptions(view=False, speed=2.0),
     "address": lambda: RunOptions(view=False, address="auto"),
     "live": lambda: RunOptions(view=False, live="127.0.0.1:8765"),
-    "ros2": lambda: RunOptions(view=False, ros2=0),
+    "show": lambda: RunOptions(view=False, show=("ros2",)),
 }
 
 

@@ -26,6 +26,8 @@ from aerodaas.cli.recorded_workload import RecordedWorkload, flown_trace, flown_
 from aerodaas.config.model import RecordingConfig, SensorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import AeroDaaSError
+from aerodaas.extensions.exports.track import write_gpx, write_kml
+from aerodaas.extensions.exports.video import write_videos
 from aerodaas.geometry.frames import CameraModel, GeodeticOrigin
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message, TraceSpan
@@ -36,9 +38,6 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.messages.vitals import GpuLoad, Vitals
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
-from aerodaas.recording.export.tabular import write_csv
-from aerodaas.recording.export.track import write_gpx, write_kml
-from aerodaas.recording.export.video import write_videos
 from aerodaas.recording.pictures import picture_topics
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
@@ -55,6 +54,7 @@ from aerodaas.recording.report.page.figures import log_plots, plots_of
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
 from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.recording.tables import write_csv
 from aerodaas.recording.vehicle_log.attachment import attached_logs
 
 __all__ = ["mutate", "run", "seeds"]

@@ -1,0 +1,1 @@
+"""ROS 2: drones and cameras by topics, flights on topics, and bags."""

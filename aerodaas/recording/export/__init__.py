@@ -1,1 +1,0 @@
-"""Export of recordings to common file formats: tables, videos, GPS tracks."""

@@ -1,0 +1,216 @@
+"""ROS 2 bags of strangers: cut off, damaged, or made to harm. Each costs an error or a count."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import zstandard
+from ros_bags import EPOCH, SECOND, TYPES, Sent, odometry, write
+
+from aerodaas.errors import RecordingError
+from aerodaas.extensions.ros2.bags import bag as bag_reader
+from aerodaas.extensions.ros2.bags.bag import RosBag
+from aerodaas.extensions.ros2.bags.bag_preview import BagTopics
+from aerodaas.extensions.ros2.bags.importing import ImportedBag, import_bag
+from aerodaas.extensions.ros2.bags.outgoing import MessageBuilder
+from aerodaas.extensions.ros2.bags.typestore import DETECTIONS, ODOMETRY, ros_decoder
+from aerodaas.messages.detections import Detection, Detections
+from aerodaas.messages.frames import Header
+
+TOPICS = BagTopics(odometry={"odometry": "/odom"})
+
+
+def imported(bag: Path, folder: Path, topics: BagTopics = TOPICS) -> ImportedBag:
+    """Import a bag."""
+    with RosBag.open(bag) as opened:
+        return import_bag(opened, topics, folder / "flight.mcap")
+
+
+def cut_off(folder: Path, storage: str, share: float) -> Path:
+    """A bag of which only the first part is there, as after a crash."""
+    bag = write(folder / "bag", [odometry(index) for index in range(4000)], storage)
+    file = next(one for one in bag.iterdir() if one.suffix in {".mcap", ".db3"})
+    content = file.read_bytes()
+    file.write_bytes(content[: round(len(content) * share)])
+    return bag
+
+
+def test_what_is_whole_of_a_cut_off_bag_is_taken(tmp_path: Path) -> None:
+    """As of any MCAP file."""
+    done = imported(cut_off(tmp_path, "MCAP", 2 / 3), tmp_path)
+    assert not done.complete
+    assert 0 < done.summary.channels["/drone/state"] < 4000
+
+
+@pytest.mark.parametrize(
+    ("storage", "share", "words"),
+    [
+        ("SQLITE3", 2 / 3, r"cut off.*\.recover"),
+        ("SQLITE3", 1e-5, "neither MCAP nor SQLite|cut off"),
+        ("MCAP", 1e-4, "no whole message"),
+        ("MCAP", 1e-6, "neither MCAP nor SQLite"),
+    ],
+)
+def test_a_bag_that_holds_nothing_whole_is_told(
+    tmp_path: Path, storage: str, share: float, words: str
+) -> None:
+    """With the remedy, where there is one."""
+    with pytest.raises(RecordingError, match=words):
+        imported(cut_off(tmp_path, storage, share), tmp_path)
+
+
+def tampered(folder: Path, *statements: str) -> Path:
+    """A bag in SQLite, after some statements."""
+    bag = write(folder / "bag", [odometry(index) for index in range(3)], "SQLITE3")
+    with sqlite3.connect(bag / "bag.db3") as database:
+        for statement in statements:
+            database.execute(statement)
+    database.close()
+    return bag
+
+
+ENDLESS = (
+    "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+    "SELECT i AS id, 1 AS topic_id, i AS timestamp, zeroblob(100000000) AS data FROM n"
+)
+COMPUTED = (
+    "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+    "data BLOB AS (zeroblob(100000000)))"
+)
+
+
+@pytest.mark.parametrize("statement", [ENDLESS, COMPUTED])
+def test_a_table_that_is_none_is_refused(tmp_path: Path, statement: str) -> None:
+    """A view without an end, a column that is computed."""
+    bag = tampered(tmp_path, "DROP TABLE messages", statement)
+    with pytest.raises(RecordingError, match="no plain table 'messages'"):
+        RosBag.open(bag)
+
+
+def test_work_without_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a file makes SQLite do, it is in proportion to the file's size."""
+    monkeypatch.setattr(bag_reader, "_STEPS_A_BYTE", 0)
+    monkeypatch.setattr(bag_reader, "_STEPS_AT_LEAST", 50_000)
+    bag = write(tmp_path / "bag", [odometry(index) for index in range(5000)], "SQLITE3")
+    with pytest.raises(RecordingError, match="interrupted"):
+        RosBag.open(bag)
+
+
+def test_a_message_that_unpacks_to_much_is_stopped(tmp_path: Path) -> None:
+    """A few kilobytes that are 100 MB each, a hundred times."""
+    bomb = zstandard.compress(bytes(100 << 20))
+    sent = [Sent("/odom", EPOCH + index, bomb, ODOMETRY) for index in range(100)]
+    bag = write(tmp_path / "bag", sent, "SQLITE3")
+    began = time.process_time()
+    with pytest.raises(RecordingError, match="unpacks to more than"):
+        imported(bag, tmp_path)
+    assert time.process_time() - began < 20, "a tenth of what all of them take"
+
+
+def test_lengths_that_lie_cost_no_memory() -> None:
+    """A sequence of four billion detections in sixty bytes; a message larger than any."""
+    header = b"\x00\x01\x00\x00" + struct.pack("<iII", 1, 2, 1) + b"\x00\x00\x00\x00"
+    with pytest.raises(Exception, match=r".") as caught:
+        ros_decoder(DETECTIONS)(header + struct.pack("<I", 2**32 - 1) + bytes(40))
+    assert not isinstance(caught.value, MemoryError)
+    found = Detections(Header(0, 0, "cam"), (Detection((0, 0, 1, 1), "x", 0.5),) * 4000, 9, 9)
+    raw = bytes(
+        TYPES.serialize_cdr(MessageBuilder(TYPES.types, EPOCH).detections(found), DETECTIONS)
+    )
+    with pytest.raises(ValueError, match="exceeds"):
+        ros_decoder(DETECTIONS)(raw)
+
+
+def spoilt(change: Callable[[Sent], None]) -> list[Sent]:
+    """Ten odometries, the sixth of which is changed."""
+    sent = [odometry(index) for index in range(10)]
+    change(sent[5])
+    return sent
+
+
+def _not_finite(sent: Sent) -> None:
+    sent.value.pose.pose.position.x = float("nan")
+
+
+def _no_rotation(sent: Sent) -> None:
+    sent.value.pose.pose.orientation.w = 0.0
+    sent.value.pose.pose.orientation.z = 0.0
+
+
+def _far_future(sent: Sent) -> None:
+    sent.value.header.stamp.sec = 2**31 - 1
+
+
+def _repeated(sent: Sent) -> None:
+    sent.value.header.stamp.nanosec = 0
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (_not_finite, "vector"),
+        (_no_rotation, "quaternion"),
+        (_far_future, "too far"),
+        (_repeated, "not newer"),
+    ],
+)
+def test_a_message_that_is_nonsense_costs_itself(
+    tmp_path: Path, change: Callable[[Sent], None], reason: str
+) -> None:
+    """It is counted and told with its reason; the others are taken."""
+    done = imported(write(tmp_path / "bag", spoilt(change)), tmp_path)
+    count, told = done.skipped["/odom"]
+    assert (count, done.summary.channels["/drone/state"]) == (1, 9)
+    assert reason in told
+
+
+@pytest.mark.parametrize("frame", ["odom_ned", "map_ned", "NED"])
+def test_odometry_in_another_frame_is_refused(tmp_path: Path, frame: str) -> None:
+    """In NED every sign would be wrong; nothing is left of the attempt."""
+    bag = write(tmp_path / "bag", [odometry(index, frame=frame) for index in range(3)])
+    with pytest.raises(RecordingError, match="REP 103"):
+        imported(bag, tmp_path)
+    assert not (tmp_path / "flight.mcap").exists()
+
+
+def test_topics_that_do_not_fit_are_told_with_those_that_do(tmp_path: Path) -> None:
+    """Unknown, of another type, taken twice, too many, none."""
+    bag = write(tmp_path / "bag", [odometry(0)])
+    cases = [
+        (BagTopics(odometry={"o": "/nowhere"}), "/nowhere is not there.*the bag has: /odom"),
+        (BagTopics(camera={"c": "/odom"}), "is nav_msgs/msg/Odometry; camera takes"),
+        (BagTopics(odometry={"a": "/odom", "b": "/odom"}), "one topic for odometry, not 2"),
+        (BagTopics(), "at least a camera or odometry"),
+    ]
+    for topics, words in cases:
+        with pytest.raises(RecordingError, match=words):
+            imported(bag, tmp_path, topics)
+
+
+def test_what_is_no_bag_is_told(tmp_path: Path) -> None:
+    """With what to give instead."""
+    other = tmp_path / "flight.bag"
+    other.write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(RecordingError, match=r"neither MCAP nor SQLite.*rosbags-convert"):
+        RosBag.open(other)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(RecordingError, match=r"holds 0 .mcap and .db3 files"):
+        RosBag.open(tmp_path / "empty")
+    (tmp_path / "empty" / "a.db3.zstd").write_bytes(b"")
+    with pytest.raises(RecordingError, match="unzstd"):
+        RosBag.open(tmp_path / "empty")
+    with pytest.raises(RecordingError, match="No such file"):
+        RosBag.open(tmp_path / "nowhere")
+
+
+def test_the_start_is_that_of_the_first_message(tmp_path: Path) -> None:
+    """Capture times count from the earliest, whatever the bag's own clock was late by."""
+    sent = [odometry(index, late=SECOND // 50) for index in range(5)]
+    done = imported(write(tmp_path / "bag", sent), tmp_path)
+    assert done.complete
+    assert done.summary.duration == pytest.approx(0.4)

@@ -1,0 +1,93 @@
+"""Topics of a ROS 2 domain, on loopback."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import pytest
+from ros_domain import DOMAIN, wait_for
+
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.ros2.topics import messages as ros
+from aerodaas.extensions.ros2.topics.link import RosLink, domain_of, require_dds
+
+
+def test_messages_reach_subscribers(ros_link: RosLink, topics: str) -> None:
+    """Of another participant, the newest one at the latest; and both ends find each other."""
+    heard: list[ros.Bool] = []
+    other = RosLink(DOMAIN)
+    try:
+        other.subscribe(f"{topics}/enable", ros.Bool, heard.append)
+        publisher = ros_link.publisher(f"{topics}/enable", ros.Bool)
+        wait_for(lambda: publisher.listeners == 1)
+        publisher.publish(ros.Bool(data=True))
+        wait_for(lambda: heard)
+        assert heard[-1] == ros.Bool(data=True)
+        wait_for(lambda: other.published().get(f"{topics}/enable") == "std_msgs/msg/Bool")
+    finally:
+        other.close()
+    wait_for(lambda: publisher.listeners == 0)
+
+
+@pytest.mark.usefixtures("loopback_domain")
+def test_a_closed_link_is_silent(topics: str) -> None:
+    """Closing twice is no error; what it published by publishes nothing."""
+    made = RosLink(DOMAIN)
+    publisher = made.publisher(f"{topics}/enable", ros.Bool)
+    assert publisher.publish(ros.Bool(data=True))
+    made.close()
+    made.close()
+    assert not publisher.publish(ros.Bool(data=True))
+    assert publisher.listeners == 0
+
+
+def test_a_message_that_cannot_be_decoded_is_counted(
+    ros_link: RosLink, topics: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And the next one is heard."""
+    heard: list[ros.CompressedImage] = []
+    decode = ros.CompressedImage.deserialize
+
+    def spoiled(data: bytes, *words: object, **named: object) -> ros.CompressedImage:
+        if b"spoiled" in data:
+            raise UnicodeDecodeError("utf-8", data, 0, 1, "not the text that was promised")
+        assert not words
+        assert not named
+        return decode(data)
+
+    monkeypatch.setattr(ros.CompressedImage, "deserialize", spoiled)
+    ros_link.subscribe(f"{topics}/image", ros.CompressedImage, heard.append)
+    publisher = ros_link.publisher(f"{topics}/image", ros.CompressedImage)
+    wait_for(lambda: publisher.listeners == 1)
+    publisher.publish(ros.CompressedImage(data=b"spoiled"))
+    wait_for(lambda: ros_link.garbled == 1)
+    publisher.publish(ros.CompressedImage(data=b"whole"))
+    wait_for(lambda: heard)
+    assert [bytes(one.data) for one in heard] == [b"whole"]
+
+
+def test_the_domain_is_that_of_the_setting_or_of_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As for every other node of the machine."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "42")
+    assert domain_of(None) == 42
+    assert domain_of(7) == 7
+    monkeypatch.setenv("ROS_DOMAIN_ID", "")
+    assert domain_of(None) == 0
+    for wrong in ("233", "-1", "seven"):
+        monkeypatch.setenv("ROS_DOMAIN_ID", wrong)
+        with pytest.raises(ConfigError, match=rf"0 to 232, not '{wrong}'"):
+            domain_of(None)
+
+
+def test_without_cyclone_the_remedy_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An extra."""
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(ConfigError, match=r"robot x: the driver ros2 needs .*aerodaas\[ros\]"):
+        require_dds("robot x: the driver ros2")
+
+
+def test_a_network_that_cannot_be_joined_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the variable that may be to blame."""
+    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense>")
+    with pytest.raises(SourceError, match=r"cannot join the ROS 2 domain 9 .*CYCLONEDDS_URI"):
+        RosLink(9)
