@@ -119,9 +119,10 @@ class MessageDecoder:
         found = self._protobuf.decoder_for(encoding, schema)
         if found is not None:
             return found
-        for extension in extensions().values() if schema is not None else ():
+        name = schema.name if schema is not None else ""
+        for extension in extensions().values():
             place = extension.decoders.get(encoding)
-            if place is not None and (found := imported(place)(schema.name)) is not None:
+            if place is not None and (found := imported(place)(name)) is not None:
                 return found
         return decode_json if encoding == "json" else bytes
 
