@@ -65,11 +65,14 @@ def robot_at(
 ) -> RobotConfig:
     """The robot that flies what is found at `url`.
 
-    `settings` of its driver, its `own` ones and its `limits` go on top.
+    `settings` of its driver, its `own` ones and its `limits` go on top. Whether the sun is up where
+    the simulator stands depends on when a test runs, and is no finding of its.
     """
+    own = own or {}
     return RobotConfig.model_validate(
         {
-            **(own or {}),
+            **own,
+            "preflight": {"daylight": "ignore", **own.get("preflight", {})},
             "id": "drone",
             "driver": "mavlink",
             "settings": {"url": url, "ready_timeout": 120.0, **(settings or {})},

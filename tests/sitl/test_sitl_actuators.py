@@ -1,7 +1,8 @@
 """A gripper, a servo and a relay of a real autopilot in simulation, moved at waypoints.
 
-It needs one that has them: for ArduCopter the parameters of `actuators.parm`. Where the autopilot
-refuses the gripper on the ground, the test is skipped.
+It needs one that has them: for ArduCopter the parameters of `actuators.parm`. PX4 moves a gripper,
+and no servo or relay by a command. Where the autopilot refuses the gripper on the ground, the tests
+are skipped.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from required import needs_peer
 
 from aerodaas.config.actuators import ActuatorConfig, GripperConfig, RelayConfig, ServoConfig
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -43,24 +45,35 @@ def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
+def deliver(flight: SitlFlight) -> tuple[list[str], list[dict[str, str]]]:
+    """Fly to the mission's end; what people were told of the actuators, and how these moved."""
+    assert flight.tell(Actuate("hook", "grab")).accepted
+    flight.run(60.0, lambda: flight.mission.state is S.ENROUTE)
+    if flight.vehicle.read().actuators.get("hook") != "grab":
+        pytest.skip("this autopilot has no gripper")
+    moved: list[dict[str, str]] = []
+
+    def look() -> bool:
+        state = flight.vehicle.read().actuators
+        if not moved or moved[-1] != state:
+            moved.append(dict(state))
+        return False
+
+    flight.run(180.0, look)
+    assert flight.mission.state is S.LANDED, flight.story
+    flight.tell_outcome("a delivery")
+    return [one.text for one in flight.mission.alerts if one.kind == "actuator"], moved
+
+
+@pytest.mark.parametrize(
+    "autopilot",
+    [pytest.param("ardupilot", marks=needs_peer("AERODAAS_SITL_ARDUPILOT"))],
+    indirect=True,
+)
 def test_a_delivery(autopilot: Autopilot) -> None:
     """Each position is taken where it is to be; an output that turns a motor is refused."""
     with SitlFlight(autopilot.url, STOPS, actuators=CARRIED) as flight:
-        assert flight.tell(Actuate("hook", "grab")).accepted
-        flight.run(60.0, lambda: flight.mission.state is S.ENROUTE)
-        if flight.vehicle.read().actuators.get("hook") != "grab":
-            pytest.skip("this autopilot has no gripper")
-        moved: list[dict[str, str]] = []
-
-        def look() -> bool:
-            state = flight.vehicle.read().actuators
-            if not moved or moved[-1] != state:
-                moved.append(dict(state))
-            return False
-
-        flight.run(180.0, look)
-        assert flight.mission.state is S.LANDED, flight.story
-        alerts = [one.text for one in flight.mission.alerts if one.kind == "actuator"]
+        alerts, moved = deliver(flight)
         assert alerts == ["wrong: motor: full: not done: failed; nor hatch"]
         assert moved == [
             {"hook": "grab"},
@@ -70,4 +83,20 @@ def test_a_delivery(autopilot: Autopilot) -> None:
             {"hook": "release", "hatch": "closed", "pump": "on"},
             {"hook": "release", "hatch": "closed", "pump": "off"},
         ]
-        flight.tell_outcome("a delivery")
+
+
+@pytest.mark.parametrize(
+    "autopilot", [pytest.param("px4", marks=needs_peer("AERODAAS_SITL_PX4"))], indirect=True
+)
+def test_a_delivery_by_a_gripper_alone(autopilot: Autopilot) -> None:
+    """The gripper lets go where it is to; the servo is refused, which is told and flown on from."""
+    stops = [
+        Waypoint("drop", 0, 5, 3, actuate={"hook": "release"}),
+        Waypoint("away", 5, 5, 3, actuate={"hatch": "open", "pump": "on"}),
+    ]
+    order = AddNavigation(AeroNavigation(data=stops))
+    with SitlFlight(autopilot.url, order, actuators=CARRIED) as flight:
+        alerts, moved = deliver(flight)
+        assert alerts == ["away: hatch: open: not done: not supported; nor pump"]
+        assert moved == [{"hook": "grab"}, {"hook": "release"}]
+        assert flight.status.visited == ("drop", "away")

@@ -229,7 +229,7 @@ KEEPING_AWAY = {
         ("RTL_ALT_FINAL_M", 2.0, "hover over its home"),
     ],
     "px4": [
-        ("COM_OBL_RC_ACT", 5.0, "hovers"),
+        ("COM_OBL_RC_ACT", 5.0, "hover"),
         ("COM_OF_LOSS_T", 30.0, "later than 5 s"),
         ("RTL_RETURN_ALT", 130.0, "above the geofence's ceiling"),
         ("RTL_LAND_DELAY", -1.0, "hover over its home"),

@@ -67,7 +67,7 @@ _INTEGER = {
 
 
 class PX4(Autopilot):
-    """PX4 1.13 and later (flown: 1.16)."""
+    """PX4 1.13 and later (flown: 1.16, and its development version of March 2026)."""
 
     name: ClassVar[str] = "PX4"
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
@@ -81,7 +81,7 @@ class PX4(Autopilot):
     }
     alone: ClassVar[str] = (
         "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: by default, and "
-        "without a radio, it sinks where it is"
+        "without a radio, it sinks where it is; since 2026 it does what NAV_RCL_ACT says instead"
     )
     comes_home: ClassVar[str] = "PX4 leaves offboard mode within a second or so, and comes home"
     log_suffix: ClassVar[str] = ".ulg"
@@ -192,7 +192,7 @@ class PX4(Autopilot):
             software: Version of the autopilot; empty where it is not known.
         """
         after = settings.fallback_after
-        sinks = "when our setpoints stop it sinks where it is, waits for a pilot, or hovers"
+        sinks = "when our setpoints stop it may sink where it is, wait for a pilot, or hover"
         acts = FallbackParameter(("COM_OBL_RC_ACT",), lambda v: v == _RETURN, _RETURN, sinks)
         if settings.role == "ground_station":
             acts = FallbackParameter(
