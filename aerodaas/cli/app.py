@@ -157,11 +157,6 @@ _CORE = (
         "Detectors and pose models: fetch by name, try, and measure.",
     ),
     Command(
-        "plan",
-        "aerodaas.cli.plan:app",
-        "Read and write the plans of QGroundControl and Mission Planner.",
-    ),
-    Command(
         "sim",
         "aerodaas.cli.sim:app",
         "Start PX4 or ArduCopter in simulation, which has to be installed already.",

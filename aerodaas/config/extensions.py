@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import logging
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import entry_points
@@ -28,6 +28,7 @@ __all__ = [
     "extensions",
     "imported",
     "live_views",
+    "service",
 ]
 
 _PACKAGE = "aerodaas.extensions"
@@ -120,6 +121,9 @@ class Extension:
     exports: tuple[Command, ...] = ()
     """Formats of `aerodaas export`."""
     views: tuple[LiveView, ...] = ()
+    services: Mapping[str, str] = field(default_factory=dict)
+    """`module:function` by name, such as `plans.read`, of each function that the core calls by
+    `service`: what a method of the core's promises and an extension does."""
     decoders: Mapping[str, str] = field(default_factory=dict)
     """By an encoding of recorded messages: `module:function` that gets the name of a schema and
     returns the function that decodes its messages, or None for a schema that it does not know."""
@@ -158,6 +162,25 @@ def extensions() -> Mapping[str, Extension]:
 def live_views() -> dict[str, LiveView]:
     """Live views that extensions add, by name."""
     return {view.name: view for extension in extensions().values() for view in extension.views}
+
+
+def service(name: str) -> Callable[..., Any]:
+    """Import the function that an extension gives as a service.
+
+    Args:
+        name: Name of the service; the part before its dot is the extension's.
+
+    Raises:
+        ConfigError: If no extension gives it.
+    """
+    for extension in extensions().values():
+        if name in extension.services:
+            found: Callable[..., Any] = imported(extension.services[name])
+            return found
+    raise ConfigError(
+        f"this installation has no extension {name.partition('.')[0]!r}, which does this: "
+        "install aerodaas anew, whole"
+    )
 
 
 def imported(place: str) -> Any:  # noqa: ANN401 - whatever is named

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.config.extensions import service
 from aerodaas.dataflow.containers import AeroListData
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.errors import ConfigError, InvalidWaypointError
@@ -87,10 +88,7 @@ class AeroNavigation(AeroListData[NavigationItem]):
         Raises:
             ConfigError: If the file is no plan, or an item cannot be flown.
         """
-        from aerodaas.dataflow.plans.reading import flown_plan, warn_of  # noqa: PLC0415 - slow to load
-
-        waypoints, notices = flown_plan(path, home_altitude, ground, actuators)
-        warn_of(path, notices, stacklevel=2)
+        waypoints = service("plans.read")(path, home_altitude, ground, actuators, stacklevel=2)
         return cls(NavigationType.DISTANCE_DRIVEN, waypoints)
 
     def to_plan(
@@ -117,13 +115,10 @@ class AeroNavigation(AeroListData[NavigationItem]):
                 one that moves another actuator; a velocity command or a stream; the suffix is
                 another; or the file exists or cannot be written.
         """
-        from aerodaas.dataflow.plans.reading import warn_of  # noqa: PLC0415 - slow to load
-        from aerodaas.dataflow.plans.writing import planned, write_plan  # noqa: PLC0415
-
         if self.stream is not None or self.commands:
             raise ConfigError("a plan holds waypoints alone, no streams and velocity commands")
-        plan, notices = planned(self.waypoints, home, home_altitude, actuators)
-        warn_of(path, [*notices, *write_plan(path, plan)], stacklevel=2)
+        write = service("plans.write")
+        write(path, self.waypoints, home, home_altitude, actuators, stacklevel=2)
 
     @property
     def waypoints(self) -> list[Waypoint]:

@@ -6,8 +6,8 @@ import json
 import warnings
 from collections.abc import Iterable
 
-from aerodaas.dataflow.plans.areas import read_areas
 from aerodaas.errors import AeroDaaSError
+from aerodaas.extensions.plans.areas import read_areas
 from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]

@@ -1,1 +1,0 @@
-"""`aerodaas lab leaderboard`: schedulers ranked on one fixed set of cases."""

@@ -1,0 +1,1 @@
+"""Leaderboard: schedulers ranked on one fixed set of cases."""

@@ -1,0 +1,1 @@
+"""Files that plans and areas are read from and written to."""

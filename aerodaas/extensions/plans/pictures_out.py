@@ -1,0 +1,92 @@
+"""Pictures, video, gimbal, lens and places to look at of waypoints, as a plan's items."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from aerodaas.extensions.plans.commands import (
+    DO_MOUNT_CONTROL,
+    DO_SET_CAM_TRIGG_DIST,
+    DO_SET_ROI_LOCATION,
+    FRAME_MISSION,
+    IMAGE_START_CAPTURE,
+    IMAGE_STOP_CAPTURE,
+    MOUNT_MAVLINK_TARGETING,
+    NAV_DELAY,
+    OF_RANGE,
+    SET_CAMERA_FOCUS,
+    SET_CAMERA_ZOOM,
+    VIDEO_START_CAPTURE,
+    VIDEO_STOP_CAPTURE,
+)
+from aerodaas.extensions.plans.plan import PlanItem
+from aerodaas.messages.waypoints import Waypoint
+
+__all__ = ["PictureWriter"]
+
+_AT_ONCE = 1.0
+"""DO_SET_CAM_TRIGG_DIST: the first picture is taken at the beginning."""
+
+
+class PictureWriter:
+    """Items before and behind each waypoint, in order; their numbers are the caller's."""
+
+    def __init__(self) -> None:
+        """Take no pictures yet."""
+        self._distance: float | None = None
+        self._interval: float | None = None
+
+    def before(
+        self, waypoint: Waypoint, frame: int, spot: tuple[float, float, float] | None
+    ) -> Iterator[PlanItem]:
+        """Plan items on the way to `waypoint`.
+
+        Args:
+            waypoint: The waypoint.
+            frame: MAVLink frame of `spot`.
+            spot: Place to look at, by latitude and longitude in degrees and height in metres; None
+                for none.
+        """
+        yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
+        if waypoint.zoom is not None:
+            yield _item(SET_CAMERA_ZOOM, OF_RANGE, waypoint.zoom)
+        if waypoint.focus is not None:
+            yield _item(SET_CAMERA_FOCUS, OF_RANGE, waypoint.focus)
+        gimbal = waypoint.gimbal
+        if gimbal is not None:
+            values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)
+            yield PlanItem(
+                *(0, DO_MOUNT_CONTROL, FRAME_MISSION, values, 0.0, 0.0),
+                float(MOUNT_MAVLINK_TARGETING),
+            )
+        if spot is not None:
+            yield PlanItem(0, DO_SET_ROI_LOCATION, frame, (0.0, 0.0, 0.0, 0.0), *spot)
+
+    def behind(self, waypoint: Waypoint) -> Iterator[PlanItem]:
+        """Plan items at `waypoint`."""
+        if waypoint.photo:
+            yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
+        if waypoint.video is not None:
+            yield _item(VIDEO_START_CAPTURE if waypoint.video else VIDEO_STOP_CAPTURE)
+            if waypoint.hover_duration:
+                yield _item(NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
+
+    def end(self) -> Iterator[PlanItem]:
+        """Plan items that end with the last waypoint."""
+        yield from self._triggers(None, None)
+
+    def _triggers(self, distance: float | None, interval: float | None) -> Iterator[PlanItem]:
+        # A camera by distance is not stopped by what stops one by time, and the other way round.
+        if self._interval is not None and interval is None:
+            yield _item(IMAGE_STOP_CAPTURE)
+        if distance != self._distance and (distance or self._distance):
+            yield _item(DO_SET_CAM_TRIGG_DIST, distance or 0.0, 0.0, _AT_ONCE if distance else 0.0)
+        if interval is not None and interval != self._interval:
+            yield _item(IMAGE_START_CAPTURE, 0.0, interval, 0.0)
+        self._distance, self._interval = distance, interval
+
+
+def _item(command: int, *values: float) -> PlanItem:
+    first, second, third, fourth = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
+    return PlanItem(0, command, FRAME_MISSION, (first, second, third, fourth), 0.0, 0.0, 0.0)
