@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab import app
+from aerodaas.cli.app import app
 from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import ConfigError, SchedulerError
+from aerodaas.errors import AeroDaaSError, ConfigError, SchedulerError
 from aerodaas.extensions.leaderboard.command import leaderboard
 from aerodaas.extensions.leaderboard.markdown import markdown_page
 from aerodaas.extensions.leaderboard.origin import Origin
@@ -171,8 +171,9 @@ def test_what_cannot_be_is_told_before_the_simulations(tmp_path: Path) -> None:
         (("-s", "edf", "--only", "-o", str(tmp_path / "file")), "cannot write into"),
     ):
         outcome = CliRunner().invoke(app, ["leaderboard", *words], env={"COLUMNS": "200"})
-        assert outcome.exit_code == 2, outcome.output
-        assert told in outcome.output
+        assert isinstance(outcome.exception, AeroDaaSError)
+        assert outcome.exception.exit_code == 2
+        assert told in str(outcome.exception)
 
 
 def test_nothing_to_rank_is_an_error(tmp_path: Path) -> None:
