@@ -261,7 +261,7 @@ class Usages(Rows[Usage]):
 
 
 class AuditLog:
-    """Entries of the audit log, which only grow; see `aerodaas.service.access.audit.AuditLog`."""
+    """Entries of the audit log, which only grow; see `aerodaas.service.access.audit.Audit`."""
 
     def __init__(self, database: Database) -> None:
         """Keep in an open database."""
