@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 from emulated import Flight, Stepped
 from hypothesis import given
@@ -94,13 +96,13 @@ def test_an_old_one_gives_way_as_clocks_drift() -> None:
 
 
 def test_it_asks_often_at_first_and_without_answers() -> None:
-    """Each second ten times, then every other; each second again while an answer is missing."""
+    """Each second ten times, then every other; four times a second while an answer is missing."""
     world = Exchanges()
     for pause in (0.0, *[1.0] * 9, 2.0, 2.0):
         began = world.now
         world.exchange(0.0, 0.0)
         assert world.now - began == pytest.approx(pause, abs=0.1)
-    for pause in (2.0, 2.0, 1.0, 1.0):
+    for pause in (2.0, 2.0, 0.25, 0.25):
         began = world.now
         world.ask()
         assert world.now - began == pytest.approx(pause, abs=0.1)
@@ -187,6 +189,35 @@ def test_states_tell_its_clock_and_how_surely(flight: Flight) -> None:
         pair.autopilot.restart()
         pair.wait(lambda: pair.vehicle.telemetry.reboots == 1)
         pair.wait(lambda: right(pair))
+
+
+def test_one_that_never_answered_is_asked_each_second() -> None:
+    """It may not know the message: its link is not filled with requests."""
+    world = Exchanges()
+    world.ask()
+    for _ in range(20):
+        began = world.now
+        world.ask()
+        assert world.now - began == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_poor_link_is_not_one_that_is_lost() -> None:
+    """A fifth of all packets lost each way, for an hour: never five seconds without an answer."""
+    chance = random.Random(0)
+    world = Exchanges()
+    answers: list[tuple[float, int, int]] = []
+    longest = 0.0
+    while world.now < 3700.0:
+        world.now += 0.05
+        request = world.clock.request(SYSTEM)
+        if request is not None and chance.random() < 0.8 * 0.8:
+            reading = int((world.now + 0.1 - world.zero) * 1e9)
+            answers.append((world.now + 0.2, reading, request.ts1))
+        while answers and answers[0][0] <= world.now:
+            world.hear(*answers.pop(0)[1:])
+        longest = max(longest, world.clock.unanswered)
+    assert longest < 5.0
+    assert world.mistake <= world.error + 1e-6
 
 
 def test_an_uplink_that_is_lost_alone_is_told(flight: Flight) -> None:

@@ -13,6 +13,9 @@ __all__ = ["BootClock"]
 
 _OFTEN, _SELDOM = 1.0, 2.0
 """Seconds from one exchange to the next: at first and while answers are missing, and later on."""
+_AGAIN = 0.25
+"""Seconds from one request to the next while a vehicle that answered before leaves them unanswered:
+so many in a few seconds that a poor link does not look like one that is lost."""
 _FIRST = 10
 """Exchanges of the former kind: enough that one of them is likely to be swift."""
 _LONGEST = 1.0
@@ -77,13 +80,18 @@ class BootClock:
         if self._asked and now < self._due:
             return None
         self._asked += 1
-        calm = self._asked >= _FIRST and self._unanswered_since is None
-        self._due = now + (_SELDOM if calm else _OFTEN)
+        self._due = now + self._pause()
         self._unanswered_since = now if self._unanswered_since is None else self._unanswered_since
         # Every vehicle on a wire answers: its own number tells whose answer it is.
         self._system = system
         self._pending = (int(now * NANOSECONDS) // _SYSTEMS - 1) * _SYSTEMS + system
         return mavlink.MAVLink_timesync_message(0, self._pending)
+
+    def _pause(self) -> float:
+        """Seconds from this request to the next one."""
+        if self._unanswered_since is not None:
+            return _AGAIN if self._answered else _OFTEN
+        return _SELDOM if self._asked >= _FIRST else _OFTEN
 
     def on_timesync(self, message: Any) -> None:  # noqa: ANN401
         """Process a TIMESYNC of the autopilot; its own requests are none of our answers."""
