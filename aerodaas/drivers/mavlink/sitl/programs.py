@@ -76,7 +76,7 @@ def _px4(options: SitlOptions) -> SitlProgram:
         "AERODAAS_PX4",
         options.source,
         (f"build/{build}/bin/px4" for build in _PX4_BUILDS),
-        "build it in its source tree (`make px4_sitl_sih`)",
+        "build it in its source tree (`make px4_sitl`, or from 1.18 on `make px4_sitl_sih`)",
     )
     if options.port not in {None, _FIRST_PORT + options.instance}:
         raise SourceError("px4 speaks to port 14540 and its instance: give --instance, no --port")
