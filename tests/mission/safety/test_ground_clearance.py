@@ -174,6 +174,13 @@ def test_a_target_below_the_clearance_is_raised() -> None:
     assert "ground" in sent.clipped_by
 
 
+def test_a_target_out_of_range_and_below_the_clearance_names_both() -> None:
+    """What has already changed a target stays named when the ground changes it, too."""
+    asked = PositionSetpoint(np.array([200.0, 0.0, 2.0]))
+    sent = _guard(_wall).clamp(asked, at(20.0, 0.0, 30.0), 0.05)
+    assert {"max_range", "ground"} <= set(sent.clipped_by)
+
+
 def test_unknown_ground_is_not_flown_over() -> None:
     """At no height: a drone stops before a hole in the terrain, and comes back from within."""
     guard, vehicle = _guard(_hole), _in_the_air(0.0, 0.0, 30.0)
