@@ -56,11 +56,6 @@ _CORE = (
         "there.",
     ),
     Command(
-        "logs",
-        "aerodaas.cli.logs:logs",
-        "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
-    ),
-    Command(
         "schema", "aerodaas.cli.document:schema", "Print the JSON schema of environment files."
     ),
     Command("doctor", "aerodaas.cli.doctor:doctor", "Say what this machine can do."),
@@ -78,11 +73,6 @@ _CORE = (
         "report",
         "aerodaas.cli.report:report",
         "Write a recording's report: one HTML page, its plots as PNG, and the figures as JSON.",
-    ),
-    Command(
-        "attach",
-        "aerodaas.cli.report:attach",
-        "Attach an autopilot's own log to the recording of its flight, its clock laid over.",
     ),
     Command(
         "compare",

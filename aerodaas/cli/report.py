@@ -1,4 +1,4 @@
-"""`aerodaas report`, `compare`, `attach` and `view`: what a recording shows."""
+"""`aerodaas report`, `compare` and `view`: what a recording shows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 
 from aerodaas.config.printable import printable
 
-__all__ = ["attach", "compare", "report", "view"]
+__all__ = ["compare", "report", "view"]
 
 Recorded = Annotated[Path, typer.Argument(help="The .mcap file of a run.", show_default=False)]
 
@@ -31,7 +31,7 @@ def report(
     )
 
     files = write_report(recording, out or recording.parent)
-    lines = [str(files.summary), *(f"  {log}" for log in files.logs)]
+    lines = [str(files.summary), *(f"  {section.text}" for section in files.sections)]
     typer.echo(printable("\n".join(lines)) + f"\n{files.page}")
 
 
@@ -47,33 +47,6 @@ def compare(
     from aerodaas.recording.report.comparison import write_comparison  # noqa: PLC0415 - as above
 
     typer.echo(write_comparison(first, second, out))
-
-
-def attach(
-    recording: Annotated[
-        Path, typer.Argument(help="The .mcap file of the run.", show_default=False)
-    ],
-    log: Annotated[
-        Path,
-        typer.Argument(help="The log: .bin of ArduPilot or .ulg of PX4.", show_default=False),
-    ],
-    robot: Annotated[
-        str | None,
-        typer.Option(help="Whose log it is. Default: the only robot with an autopilot."),
-    ] = None,
-) -> None:
-    """Attach an autopilot's own log to the recording of its flight, its clock laid over.
-
-    `aerodaas report` draws its main topics then. `aerodaas logs ROBOT --attach RECORDING` fetches
-    the log from the vehicle first.
-
-    aerodaas attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
-    """
-    from aerodaas.recording.vehicle_log.attachment import (  # noqa: PLC0415 - slow to load
-        attach_log,
-    )
-
-    typer.echo(printable(str(attach_log(recording, log, robot))))
 
 
 def view(

@@ -128,6 +128,9 @@ class Extension:
     """By an encoding of recorded messages: `module:function` that gets the name of a schema and
     returns the function that decodes its messages, or None for a schema that it does not know."""
     vehicles: tuple[VehicleKind, ...] = ()
+    report_sections: tuple[str, ...] = ()
+    """`module:function` of what is added to the report of a recording: each gets an open
+    `Recording`, and returns a list of `ReportSection`."""
     ports: Mapping[int, str] = field(default_factory=dict)
     """UDP ports that `aerodaas doctor` tries, and what listens there."""
 

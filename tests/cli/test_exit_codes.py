@@ -44,7 +44,6 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ["view", "none.mcap"],
         ["compare", "none.mcap", "broken.mcap"],
         ["export", "topics", "none.mcap"],
-        ["attach", "none.mcap", "none.bin"],
         ["import", "none"],
         ["compile", "none.mcap"],
         ["replay", "none.mcap", "--app", "farm_survey"],

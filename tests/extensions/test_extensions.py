@@ -52,6 +52,7 @@ def test_every_folder_is_an_extension_of_its_name() -> None:
         assert extension.summary.endswith(".")
         places = [place for plugins in extension.plugins.values() for place in plugins.values()]
         places += [command.place for command in extension.commands]
+        places += extension.report_sections
         places += [kind.find for kind in extension.vehicles if kind.find]
         for place in places:
             assert imported(place) is not None

@@ -10,17 +10,21 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
+from aerodaas.config.extensions import Extension
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig
 from aerodaas.errors import RecordingError
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.report import section
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 from aerodaas.recording.report.report import write_report
+from aerodaas.recording.report.section import Drawing, ReportSection
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +76,29 @@ def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:
         assert image is not None
         assert min(image.shape[:2]) > 300
         assert len(np.unique(image[::9, ::9].reshape(-1, 3), axis=0)) > 10
+
+
+def lift_sections(recording: Recording) -> list[ReportSection]:
+    """What an extension for gliders adds to a report."""
+    text = f"`{len(recording.topics)}` topics"
+    drawings = [Drawing("lift", "Lift over time", "Lift in m/s over mission time", Figure)]
+    return [ReportSection("Gliding", text, ("by", "m/s"), [("<b>", 3.0)], "Calm.", drawings)]
+
+
+def test_an_extension_adds_a_section(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a table and a note, and its plot beside those of the flight."""
+    place = f"{__name__}:lift_sections"
+    gliders = Extension("gliders", "Gliders.", report_sections=(place,))
+    monkeypatch.setattr(section, "extensions", lambda: {"gliders": gliders})
+    files = write_report(recorded, tmp_path)
+    page = files.page.read_text()
+    for shown in ("<h2>Gliding</h2>", "</code> topics</p>", "<th>&lt;b&gt;</th>", "<p>Calm.</p>"):
+        assert shown in page
+    assert page.index("<h2>Lift over time</h2>") < page.index("<h2>Figures</h2>")
+    assert files.plots[-1] == tmp_path / "lift.png"
+    assert [added.title for added in files.sections] == ["Gliding"]
 
 
 def test_words_between_backticks_are_code(tmp_path: Path) -> None:

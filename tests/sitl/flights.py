@@ -18,7 +18,6 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
-from aerodaas.messages.vehicle_log import LogEntry
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, Command, Start
 from aerodaas.mission.loop import SetpointLoop
@@ -28,7 +27,7 @@ from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborSched
 from aerodaas.testing.channel import Impairment
 from sitl.relay import Relay
 
-__all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "newest_log", "robot_at", "survey"]
+__all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]
 
 _PERIOD = 0.05
 PERFECT = Impairment()
@@ -44,17 +43,6 @@ def survey(*places: tuple[float, float], hover: float = 1.0) -> AddNavigation:
 
 FARM = survey((0, 0), (0, 10), (10, 10), (10, 0), hover=5.0)
 FAR = survey((0, 60))
-
-
-def newest_log(vehicle: MavlinkVehicle) -> LogEntry:
-    """The newest log, once it grows no more: a busy simulator writes on after the landing."""
-    log, size = vehicle.logs()[-1], -1
-    until = time.monotonic() + 60.0
-    while log.size != size:
-        assert time.monotonic() < until, f"log {log.number} goes on growing"
-        time.sleep(2.0)
-        log, size = vehicle.logs()[-1], log.size
-    return log
 
 
 def robot_at(

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pymavlink import DFReader
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -28,7 +27,7 @@ from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightReference, NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
 from sitl.autopilot import Autopilot
-from sitl.flights import FAR, FARM, SitlFlight, newest_log, robot_at, survey
+from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
@@ -222,22 +221,6 @@ def test_a_fallback_is_put_back(autopilot: Autopilot, tmp_path: Path) -> None:
         assert [item.command for item in mission] == [16, mavlink.MAV_CMD_NAV_TAKEOFF]
         assert mission[1].z == 12.5
     assert not list(tmp_path.rglob("*.json"))
-
-
-def test_its_own_log_is_fetched(autopilot: Autopilot, tmp_path: Path) -> None:
-    """After a flight: the newest one is whole, and its own reader finds the flight in it."""
-    with SitlFlight(autopilot.url, survey((0, 3))) as flight:
-        finish(flight)
-        log = newest_log(flight.vehicle)
-        file = flight.vehicle.fetch_log(log, tmp_path)
-        print(f"\n{file.name}: {file.stat().st_size} bytes")  # noqa: T201
-        assert file.stat().st_size == log.size
-    if autopilot.family == "ardupilot":
-        reader = DFReader.DFReader_binary(str(file))
-        heights = []
-        while (message := reader.recv_match(type="CTUN")) is not None:
-            heights.append(message.Alt)
-        assert max(heights) > 2.0
 
 
 def test_process_killed(autopilot: Autopilot) -> None:

@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -26,7 +25,6 @@ from aerodaas.drivers.mavlink.control.mode_change import ModeChange
 from aerodaas.drivers.mavlink.control.permission import flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
-from aerodaas.drivers.mavlink.logs.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
@@ -49,7 +47,6 @@ from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.messages.health import HealthReadings
 from aerodaas.messages.payload import Gimbal, PhotoCamera
 from aerodaas.messages.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
-from aerodaas.messages.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
 
@@ -449,31 +446,15 @@ class MavlinkVehicle:
         """The mission on the vehicle; blocks, raises VehicleError."""
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
-    def logs(self) -> list[LogEntry]:
-        """The autopilot's own logs, oldest first; blocks, raises VehicleError, in flight always."""
-        link, software = self._grounded_link("list logs"), self._telemetry.software
-        return list_logs(link, self.connection.autopilot, software)
-
-    def fetch_log(
-        self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
-    ) -> Path:
-        """Fetch one of them into `folder`; blocks.
+    def grounded_link(self, deed: str) -> MavlinkLink:
+        """The link of a vehicle that stands, for services that need much of it.
 
         Args:
-            log: The log, as the vehicle lists it.
-            folder: Made where it is missing.
-            progress: Called with the bytes fetched and of all bytes.
-
-        Returns:
-            Path of the file.
+            deed: What the link is needed for, as an error says it: "fetch logs".
 
         Raises:
-            VehicleError: If the log cannot be fetched; in flight always.
+            VehicleError: If the vehicle is not connected, or does not stand.
         """
-        link, autopilot = partial(self._grounded_link, "fetch logs"), self.connection.autopilot
-        return fetch_log(link, autopilot, log, folder, progress, ftp=self._telemetry.serves_files)
-
-    def _grounded_link(self, deed: str) -> MavlinkLink:
         connection = self._connected()
         if not self._stands():
             raise VehicleError(f"{self._name} cannot {deed} in flight: its link is needed")

@@ -20,7 +20,6 @@ __all__ = [
     "MAX_RATIO",
     "MAX_ROS",
     "MAX_UNPACKED",
-    "MAX_VEHICLE_LOG",
     "MAX_VIDEO_GROUP",
 ]
 
@@ -50,8 +49,6 @@ MAX_METADATA = 1 << 20
 """Bytes of a metadata record; ours hold a few hundred."""
 MAX_ATTACHMENT = 64 << 20
 """Bytes of an attachment: environments and sources take a few thousand, maps more."""
-MAX_VEHICLE_LOG = 1 << 30
-"""Bytes of a vehicle's own log, attached or in a file; an hour of them takes 20 to 500 million."""
 MAX_CHANNELS = 4096
 """Channels, and schemas, of a file; a flight has a few dozen for each robot."""
 MAX_VIDEO_GROUP = 64 << 20

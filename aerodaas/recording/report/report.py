@@ -21,8 +21,8 @@ from aerodaas.recording.report.moments import (
 )
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.plot import Plot
+from aerodaas.recording.report.section import ReportSection, extension_sections
 from aerodaas.recording.report.summary import FlightSummary
-from aerodaas.recording.vehicle_log.attachment import AttachedLog, attached_logs
 
 __all__ = ["SUMMARY", "Report", "ReportFiles", "read_report", "write_report", "write_summary"]
 
@@ -37,8 +37,8 @@ class Report:
     summary: FlightSummary
     plots: list[Plot]
     moments: list[MomentPicture]
-    logs: list[AttachedLog]
-    """Vehicles' own logs that are attached."""
+    sections: list[ReportSection]
+    """What extensions add."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ class ReportFiles:
     summary_json: Path
     summary_text: Path
     plots: tuple[Path, ...]
-    logs: tuple[AttachedLog, ...]
-    """Vehicles' own logs that the page shows, or says why not."""
+    sections: tuple[ReportSection, ...]
+    """What extensions add to the page."""
 
 
 def read_report(recording: str | Path) -> Report:
@@ -69,8 +69,8 @@ def read_report(recording: str | Path) -> Report:
     with Recording.open(recording) as opened:
         flight, summary = _read(opened)
         moments = picture_moments(opened, key_moments(flight))
-        logs = attached_logs(opened)
-    return Report(summary, _plots(flight, logs), moments, logs)
+        sections = extension_sections(opened)
+    return Report(summary, _plots(flight, sections), moments, sections)
 
 
 def _read(recording: Recording) -> tuple[RecordedFlight, FlightSummary]:
@@ -82,16 +82,16 @@ def _read(recording: Recording) -> tuple[RecordedFlight, FlightSummary]:
     return flight, FlightSummary.of(recording, flight)
 
 
-def _plots(flight: RecordedFlight, logs: Sequence[AttachedLog]) -> list[Plot]:
-    """The plots of a flight and of vehicles' logs; none without the extra `plots`."""
+def _plots(flight: RecordedFlight, sections: Sequence[ReportSection]) -> list[Plot]:
+    """The plots of a flight and of what extensions add; none without the extra `plots`."""
     if not has_extra("plots"):
         return []
     from aerodaas.recording.report.page.figures import (  # noqa: PLC0415 - needs the extra
-        log_plots,
         plots_of,
+        section_plots,
     )
 
-    return [*plots_of(flight), *log_plots(logs)]
+    return [*plots_of(flight), *section_plots(sections)]
 
 
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
@@ -115,7 +115,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         folder / SUMMARY,
         folder / "summary.txt",
         tuple(folder / f"{plot.name}.png" for plot in report.plots),
-        tuple(report.logs),
+        tuple(report.sections),
     )
     contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
     if report.moments:
@@ -123,7 +123,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         contents[folder / "moments.png"] = sheet.tobytes()
     summary = report.summary
     contents |= {
-        files.page: flight_page(summary, report.plots, report.moments, report.logs).encode(),
+        files.page: flight_page(summary, report.plots, report.moments, report.sections).encode(),
         files.summary_json: _as_json(summary),
         files.summary_text: f"{summary}\n".encode(),
     }

@@ -50,12 +50,12 @@ from aerodaas.recording.report.comparison import comparison_page
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import contact_sheet, key_moments, picture_moments
-from aerodaas.recording.report.page.figures import log_plots, plots_of
+from aerodaas.recording.report.page.figures import plots_of, section_plots
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
+from aerodaas.recording.report.section import extension_sections
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.recording.tables import write_csv
-from aerodaas.recording.vehicle_log.attachment import attached_logs
 
 __all__ = ["mutate", "run", "seeds"]
 
@@ -134,12 +134,12 @@ def _report(path: Path, _folder: Path, plotted: bool) -> None:  # noqa: FBT001
         flight = RecordedFlight.read(recording)
         moments = picture_moments(recording, key_moments(flight))
         summary = FlightSummary.of(recording, flight)
-        logs = attached_logs(recording)
-    plots = [*plots_of(flight), *log_plots(logs)] if plotted else []
-    report = Report(summary, plots, moments, logs)
+        sections = extension_sections(recording)
+    plots = [*plots_of(flight), *section_plots(sections)] if plotted else []
+    report = Report(summary, plots, moments, sections)
     if moments:
         contact_sheet(moments)
-    flight_page(summary, plots, moments, logs).encode()
+    flight_page(summary, plots, moments, sections).encode()
     json.dumps(summary.as_dict()).encode()
     f"{summary}".encode()
     comparison_page("A", report, "B", report).encode()

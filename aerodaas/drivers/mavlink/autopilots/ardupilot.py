@@ -89,10 +89,6 @@ class ArduPilot(Autopilot):
     comes_home: ClassVar[str] = (
         "ArduPilot stops within 3 s, and comes home by its ground-station failsafe"
     )
-    log_suffix: ClassVar[str] = ".bin"
-    log_head: ClassVar[bytes] = b"\xa3\x95\x80"
-    log_begin_until: ClassVar[tuple[int, int]] = (0, 0)
-    log_folders: ClassVar[tuple[str, ...]] = ("/APM/LOGS", "/logs")
     ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace", "plan"})
     home_comes_first: ClassVar[bool] = True
     turns_at_waypoints: ClassVar[bool] = False

@@ -112,14 +112,6 @@ class Autopilot(ABC):
     """Its behaviour once our process is gone, with the parameters that it is delivered with."""
     comes_home: ClassVar[str]
     """The same with a fallback."""
-    log_suffix: ClassVar[str]
-    log_head: ClassVar[bytes]
-    """Of the files of its own logs, and their first bytes."""
-    log_begin_until: ClassVar[tuple[int, int]]
-    """Version from which the time that it tells of a log is when it was last written; before, when
-    it began."""
-    log_folders: ClassVar[tuple[str, ...]]
-    """Where they may lie: on its card, and in its simulator's folder."""
     ways_home: ClassVar[frozenset[str]]
     """Those of `return`, `retrace` and `plan` that its own protection can fly."""
     home_comes_first: ClassVar[bool]

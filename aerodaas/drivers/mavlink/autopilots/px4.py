@@ -84,10 +84,6 @@ class PX4(Autopilot):
         "without a radio, it sinks where it is; since 2026 it does what NAV_RCL_ACT says instead"
     )
     comes_home: ClassVar[str] = "PX4 leaves offboard mode within a second or so, and comes home"
-    log_suffix: ClassVar[str] = ".ulg"
-    log_head: ClassVar[bytes] = b"ULog\x01\x12\x35"
-    log_begin_until: ClassVar[tuple[int, int]] = (1, 16)
-    log_folders: ClassVar[tuple[str, ...]] = ("/fs/microsd/log", "/log")
     ways_home: ClassVar[frozenset[str]] = frozenset({"return"})
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(

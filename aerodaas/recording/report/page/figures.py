@@ -23,17 +23,13 @@ from aerodaas.recording.report.plots.trajectory import (
     timeline_figure,
     trajectory_figure,
 )
-from aerodaas.recording.report.plots.vehicle_log import log_figures
-from aerodaas.recording.vehicle_log.attachment import AttachedLog
+from aerodaas.recording.report.section import ReportSection
 
-__all__ = ["log_plots", "plots_of", "png_of"]
+__all__ = ["plots_of", "png_of", "section_plots"]
 
 _DPI = 200
 _MOST = 24
 """Robots, streams and analyses in one plot; more are too small to be told apart."""
-
-_MOST_LOGS = 6
-"""Logs whose plots are drawn, six of each."""
 
 V = TypeVar("V")
 
@@ -92,12 +88,12 @@ def plots_of(flight: RecordedFlight) -> list[Plot]:
     ]
 
 
-def log_plots(logs: Sequence[AttachedLog]) -> list[Plot]:
-    """Plots of the main topics of each vehicle's log, of the first few logs."""
+def section_plots(sections: Sequence[ReportSection]) -> list[Plot]:
+    """Plots of sections of a report."""
     return [
-        Plot(f"vehicle_log_{number}_{name}", title, description, _png(make))
-        for number, attached in enumerate(logs[:_MOST_LOGS], 1)
-        for name, title, description, make in log_figures(attached)
+        Plot(drawing.name, drawing.title, drawing.description, _png(drawing.draw))
+        for section in sections
+        for drawing in section.drawings
     ]
 
 

@@ -5,22 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import cv2
-import numpy as np
 
-from aerodaas.config.printable import printable
 from aerodaas.recording.report.moments import MomentPicture
 from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.plot import Plot
+from aerodaas.recording.report.section import ReportSection
 from aerodaas.recording.report.summary import FlightSummary
-from aerodaas.recording.vehicle_log.attachment import AttachedLog
 
 __all__ = ["figures", "flight_page", "origin_line"]
 
 _THUMBNAIL = 640
 """Width in pixels of the images in the page."""
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]
-_MOST_TEXTS = 200
-"""Messages of an autopilot that are listed."""
 _LATENCY = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
 _AGE = ["in mission time", "99th perc."]
 
@@ -29,7 +25,7 @@ def flight_page(
     summary: FlightSummary,
     plots: Sequence[Plot],
     moments: Sequence[MomentPicture],
-    logs: Sequence[AttachedLog] = (),
+    sections: Sequence[ReportSection] = (),
 ) -> str:
     """Return the report of a flight as one HTML page.
 
@@ -37,7 +33,7 @@ def flight_page(
         summary: Figures of the flight.
         plots: Plots of the page.
         moments: Pictures of moments of the flight.
-        logs: Logs of the vehicles.
+        sections: What extensions add.
     """
     ages = summary.simulates_executions
     return render_page(
@@ -55,7 +51,7 @@ def flight_page(
         ],
         reasons=[(*said.split(": ", 1), count) for said, count in summary.reasons.items()],
         alerts=_alerts(summary),
-        logs=list(map(_log, logs)),
+        sections=sections,
         moments=[(moment.caption, _thumbnail(moment)) for moment in moments],
     )
 
@@ -109,18 +105,6 @@ def _alerts(summary: FlightSummary) -> list[tuple[str, str, str]]:
         (at, kind, text if times[kind] == 1 else f"{text} ({times[kind]} times)")
         for kind, (at, text) in first.items()
     ]
-
-
-def _log(attached: AttachedLog) -> tuple[AttachedLog, list[tuple[str, str, str]], int]:
-    """A vehicle's own log, its first messages, and the number of the others."""
-    if attached.log is None or attached.alignment is None:
-        return attached, [], 0
-    texts, clock = attached.log.texts, attached.alignment.clock
-    rows = [
-        (f"{clock.mission_time(np.array(one.time)):.1f}", one.severity, printable(one.text))
-        for one in texts[:_MOST_TEXTS]
-    ]
-    return attached, rows, len(texts) - len(rows)
 
 
 def _thumbnail(moment: MomentPicture) -> bytes:

@@ -15,7 +15,7 @@ import numpy as np
 
 from aerodaas.config.extras import require_extra
 from aerodaas.errors import RecordingError
-from aerodaas.recording.vehicle_log.log import Floats, LogText, Series, Topic, VehicleLog
+from aerodaas.extensions.vehicle_logs.log import Floats, LogText, Series, Topic, VehicleLog
 
 if TYPE_CHECKING:
     from pyulog import ULog

@@ -6,24 +6,22 @@ import contextlib
 import queue
 import time
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
-from aerodaas.drivers.mavlink.logs.ftp import (
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
+from aerodaas.errors import VehicleError
+from aerodaas.extensions.vehicle_logs.ftp import (
     FtpClient,
     FtpEntry,
     FtpPacket,
     FtpRefusedError,
     FtpScript,
 )
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
-from aerodaas.errors import VehicleError
-from aerodaas.messages.vehicle_log import LogEntry
 
-__all__ = ["FileTransfer", "fetch_file", "find_log"]
+__all__ = ["FileTransfer", "fetch_file", "find_file"]
 
 _STEP = 1 << 15
 """Bytes between two calls of `progress`."""
@@ -99,13 +97,14 @@ class FileTransfer:
         )
 
 
-def find_log(transfer: FileTransfer, autopilot: Autopilot, log: LogEntry) -> str | None:
-    """Path of a log's file on the vehicle, which is told by its size alone.
+def find_file(transfer: FileTransfer, folders: Sequence[str], suffix: str, size: int) -> str | None:
+    """Path of a file on the vehicle, which is told by its size alone.
 
     Args:
         transfer: MAVLink FTP with the vehicle.
-        autopilot: Knows the folders and the suffix of logs.
-        log: The log, as the vehicle lists it.
+        folders: Where it may lie; the first that is there counts, with the folders in it.
+        suffix: End of its name, in small letters.
+        size: Its bytes.
 
     Returns:
         None if no file has that size, as while it is written, or several have.
@@ -113,12 +112,12 @@ def find_log(transfer: FileTransfer, autopilot: Autopilot, log: LogEntry) -> str
     Raises:
         VehicleError: If the vehicle does not answer.
     """
-    for folder in autopilot.log_folders:
+    for folder in folders:
         with contextlib.suppress(FtpRefusedError):
             found = [
                 path
-                for path, size in _files(transfer, folder)
-                if size == log.size and path.lower().endswith(autopilot.log_suffix)
+                for path, bytes_there in _files(transfer, folder)
+                if bytes_there == size and path.lower().endswith(suffix)
             ]
             return found[0] if len(found) == 1 else None
     return None

@@ -11,12 +11,13 @@ from typing import Any, Literal
 
 import pytest
 from emulated import LOOPBACK, Flight, Stepped
-from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
+from flown_logs import EPOCH, Flown, dataflash, record_flown, ulog
 
 from aerodaas.cli.app import main
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.messages.vehicle_log import LogEntry
+from aerodaas.extensions.vehicle_logs.log_service import LogEntry
+from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
 from aerodaas.recording.reader import Recording
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.store import LogStore
@@ -37,19 +38,25 @@ def pair(flight: Flight) -> Iterator[Stepped]:
         yield ends
 
 
-def test_the_list(pair: Stepped) -> None:
+@pytest.fixture
+def logs(pair: Stepped) -> MavlinkLogs:
+    """The log service of that vehicle."""
+    return MavlinkLogs(pair.vehicle)
+
+
+def test_the_list(pair: Stepped, logs: MavlinkLogs) -> None:
     """Numbers, sizes and times, of ArduPilot those of the last writing; of none it is empty."""
     ended = BEGAN
-    assert pair.vehicle.logs() == [LogEntry(1, 90, None, ended), LogEntry(2, 100_003, None, ended)]
+    assert logs.logs() == [LogEntry(1, 90, None, ended), LogEntry(2, 100_003, None, ended)]
     pair.autopilot.firmware.logs.logs = {}
-    assert pair.vehicle.logs() == []
+    assert logs.logs() == []
 
 
-def test_a_log_is_fetched_whole(pair: Stepped, tmp_path: Path) -> None:
+def test_a_log_is_fetched_whole(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None:
     """Byte by byte, in a file named after its number and time; progress is told."""
     told: list[tuple[int, int]] = []
-    log = pair.vehicle.logs()[1]
-    file = pair.vehicle.fetch_log(log, tmp_path / "new", lambda *done: told.append(done))
+    log = logs.logs()[1]
+    file = logs.fetch_log(log, tmp_path / "new", lambda *done: told.append(done))
     assert file.name == "log-2-20270115-080000.bin"
     assert file.read_bytes() == DATAFLASH
     assert told == [(36_000, 100_003), (72_000, 100_003), (100_003, 100_003)]
@@ -60,12 +67,12 @@ def test_px4_has_its_own_format(flight: Flight, tmp_path: Path) -> None:
     """ULog, numbered from zero."""
     with flight() as pair:
         pair.autopilot.firmware.logs.logs = {0: ULOG}
-        (log,) = pair.vehicle.logs()
+        (log,) = MavlinkLogs(pair.vehicle).logs()
         assert (log.began, log.ended) == (None, BEGAN)
         pair.vehicle.telemetry.software = "1.15.4.255"
-        (older,) = pair.vehicle.logs()
+        (older,) = MavlinkLogs(pair.vehicle).logs()
         assert (older.began, older.ended) == (BEGAN, None)
-        file = pair.vehicle.fetch_log(log, tmp_path)
+        file = MavlinkLogs(pair.vehicle).fetch_log(log, tmp_path)
     assert file.suffix == ".ulg"
     assert file.read_bytes() == ULOG
 
@@ -99,6 +106,7 @@ def forgets(message: Any) -> Any:  # noqa: ANN401
 def test_what_goes_wrong_is_said_and_leaves_no_file(
     monkeypatch: pytest.MonkeyPatch,
     pair: Stepped,
+    logs: MavlinkLogs,
     tmp_path: Path,
     spoil: Callable[[Any], Any],
     said: str,
@@ -113,34 +121,34 @@ def test_what_goes_wrong_is_said_and_leaves_no_file(
 
     monkeypatch.setattr(store, "handle", handle)
     with pytest.raises(VehicleError, match=said):
-        pair.vehicle.fetch_log(pair.vehicle.logs()[1], tmp_path)
+        logs.fetch_log(logs.logs()[1], tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_damaged_log_is_told_and_kept(pair: Stepped, tmp_path: Path) -> None:
+def test_a_damaged_log_is_told_and_kept(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None:
     """Somebody may mend it."""
     pair.autopilot.firmware.logs.logs = {1: b"\xff" * 500}
     with pytest.raises(VehicleError, match="is no log of ArduPilot"):
-        pair.vehicle.fetch_log(pair.vehicle.logs()[0], tmp_path)
+        logs.fetch_log(logs.logs()[0], tmp_path)
     (file,) = tmp_path.iterdir()
     assert file.read_bytes() == b"\xff" * 500
 
 
 @pytest.mark.parametrize("size", [0, 5 << 30])
-def test_a_size_that_cannot_be_is_refused(pair: Stepped, tmp_path: Path, size: int) -> None:
+def test_a_size_that_cannot_be_is_refused(logs: MavlinkLogs, tmp_path: Path, size: int) -> None:
     """Before the disk is full."""
     with pytest.raises(VehicleError, match="none to be fetched"):
-        pair.vehicle.fetch_log(LogEntry(1, size, None), tmp_path)
+        logs.fetch_log(LogEntry(1, size, None), tmp_path)
 
 
-def test_not_in_flight(pair: Stepped, tmp_path: Path) -> None:
+def test_not_in_flight(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None:
     """Setpoints and telemetry need the link."""
     connection = pair.vehicle.connection
     connection.commander.give(connection.autopilot.arm(), now=pair.now)
     pair.wait(lambda: pair.vehicle.read().armed)
     for deed in (
-        pair.vehicle.logs,
-        lambda: pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path),
+        logs.logs,
+        lambda: logs.fetch_log(LogEntry(1, 90, None), tmp_path),
     ):
         with pytest.raises(VehicleError, match="in flight"):
             deed()

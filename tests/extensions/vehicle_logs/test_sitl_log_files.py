@@ -1,4 +1,4 @@
-"""A real ArduCopter's own log by MAVLink FTP, as it lies on the simulator's disk."""
+"""Logs of real autopilots in simulation, and by MAVLink FTP as they lie on the disk."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from typing import Any
 import pytest
 from pymavlink import DFReader
 from required import needs_peer, peer
+from sitl.autopilot import Autopilot
+from sitl.flights import SitlFlight, robot_at, survey
+from sitl.relay import Relay
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.sitl.process import SitlProcess
@@ -18,17 +21,15 @@ from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.vehicle_logs.log_service import LogEntry
+from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
+from aerodaas.messages.mission import MissionState
 from aerodaas.testing.channel import Impairment
-from sitl.flights import newest_log, robot_at
-from sitl.relay import Relay
 
 STEPS = 0.01
 """Seconds by which a simulator's clock, which goes in steps of 2.5 ms, may be beside ours."""
 
-pytestmark = [
-    *(pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock),
-    needs_peer("AERODAAS_ARDUPILOT"),
-]
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
 
 @pytest.fixture
@@ -48,6 +49,18 @@ def relayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[s
             yield relay.url, relay
         finally:
             relay.close()
+
+
+def newest_log(vehicle: MavlinkVehicle) -> LogEntry:
+    """The newest log, once it grows no more: a busy simulator writes on after the landing."""
+    logs = MavlinkLogs(vehicle)
+    log, size = logs.logs()[-1], -1
+    until = time.monotonic() + 60.0
+    while log.size != size:
+        assert time.monotonic() < until, f"log {log.number} goes on growing"
+        time.sleep(2.0)
+        log, size = logs.logs()[-1], log.size
+    return log
 
 
 def is_burst(message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
@@ -76,6 +89,7 @@ def own_time(vehicle: MavlinkVehicle) -> tuple[float, float]:
     return told
 
 
+@needs_peer("AERODAAS_ARDUPILOT")
 def test_a_log_comes_down_byte_for_byte(
     relayed: tuple[str, Relay], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,16 +121,16 @@ def test_a_log_comes_down_byte_for_byte(
                 raise VehicleError("cut")
 
         with pytest.raises(VehicleError, match="cut; the next fetch goes on from"):
-            vehicle.fetch_log(log, tmp_path, cut)
+            MavlinkLogs(vehicle).fetch_log(log, tmp_path, cut)
         sent.clear()
-        file = vehicle.fetch_log(log, tmp_path)
+        file = MavlinkLogs(vehicle).fetch_log(log, tmp_path)
         assert file.read_bytes() == original.read_bytes()
         begins = [bytes(one.payload[8:12]) for one in sent if is_burst(one)]
         assert int.from_bytes(begins[0], "little") > log.size / 2
 
         bad = Impairment(loss=0.02, duplicates=0.02, jitter=0.01)
         relay.spoil(bad)
-        again = vehicle.fetch_log(log, tmp_path / "again")
+        again = MavlinkLogs(vehicle).fetch_log(log, tmp_path / "again")
         assert again.read_bytes() == original.read_bytes()
         assert not [one for one in sent if one.get_type() == "LOG_REQUEST_DATA"]
     finally:
@@ -130,3 +144,23 @@ def test_a_log_comes_down_byte_for_byte(
         f"\n{file.name}: {file.stat().st_size} bytes by MAVLink FTP; a change between {began:.4f} "
         f"and {ended:.4f} s of its clock by TIMESYNC is in it at {changes[-1]:.4f} s"
     )
+
+
+def test_its_own_log_is_fetched(
+    autopilot: Autopilot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a flight: the newest one is whole, and its own reader finds the flight in it."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "journals"))
+    with SitlFlight(autopilot.url, survey((0, 3))) as flight:
+        flight.run(180.0)
+        assert flight.mission.state is MissionState.LANDED, flight.story
+        log = newest_log(flight.vehicle)
+        file = MavlinkLogs(flight.vehicle).fetch_log(log, tmp_path)
+        print(f"\n{file.name}: {file.stat().st_size} bytes")  # noqa: T201
+        assert file.stat().st_size == log.size
+    if autopilot.family == "ardupilot":
+        reader = DFReader.DFReader_binary(str(file))
+        heights = []
+        while (message := reader.recv_match(type="CTUN")) is not None:
+            heights.append(message.Alt)
+        assert max(heights) > 2.0

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
 import numpy as np
 import pytest
-from vehicle_logs import EPOCH, Flown, dataflash, record_flown, ulog
+from flown_logs import EPOCH, Flown, dataflash, record_flown, ulog
+from matplotlib.figure import Figure
 
+from aerodaas.cli.app import main
 from aerodaas.errors import AeroDaaSError, RecordingError
+from aerodaas.extensions.vehicle_logs.attachment import (
+    AttachedLog,
+    attach_log,
+    attached_logs,
+    flight_of,
+)
+from aerodaas.extensions.vehicle_logs.log import Series
+from aerodaas.extensions.vehicle_logs.plots import log_drawings
 from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.report.page.figures import log_plots
-from aerodaas.recording.report.plots.vehicle_log import log_figures
+from aerodaas.recording.report.page.figures import section_plots
 from aerodaas.recording.report.report import read_report, write_report
-from aerodaas.recording.vehicle_log.attachment import attach_log, attached_logs, flight_of
-from aerodaas.recording.vehicle_log.log import Series
 
 FLOWN = Flown()
 PLOTS = ("battery", "attitude", "position", "gps", "vibration", "motors")
@@ -34,6 +42,11 @@ def written(folder: Path, name: str, content: bytes) -> Path:
     file = folder / name
     file.write_bytes(content)
     return file
+
+
+def figures(log: AttachedLog) -> dict[str, Figure]:
+    """The plots of a log by their topics."""
+    return {one.name.removeprefix("vehicle_log_1_"): one.draw() for one in log_drawings(1, log)}
 
 
 def test_an_attached_log_lies_over_its_flight(recording: Path, tmp_path: Path) -> None:
@@ -93,7 +106,7 @@ def test_lines_are_drawn_at_mission_seconds(recording: Path, tmp_path: Path) -> 
     attach_log(recording, written(tmp_path, "own.ulg", ulog(FLOWN)))
     with Recording.open(recording) as opened:
         (attached,) = attached_logs(opened)
-    made = {name: make() for name, _, _, make in log_figures(attached)}
+    made = figures(attached)
     assert set(made) == set(PLOTS)
     north = made["position"].axes[1].lines
     assert [str(line.get_label()) for line in north] == ["estimated", "setpoint"]
@@ -116,7 +129,7 @@ def test_a_line_is_in_order_within_the_flight_and_steps_at_north_are_none(
     heading = np.array([20.0, 5.0, 355.0, 350.0, 1.0, 2.0])
     angles = {"roll": heading, "pitch": heading, "heading": heading}
     log = replace(attached.log, topics={"attitude": Series(time, angles)})
-    (made,) = [make() for *_, make in log_figures(replace(attached, log=log))]
+    (made,) = figures(replace(attached, log=log)).values()
     roll, _, shown = (np.asarray(axes.lines[0].get_ydata()) for axes in made.axes)
     assert roll.tolist() == [350.0, 355.0, 5.0, 20.0]
     assert np.array_equal(shown, [350.0, 355.0, np.nan, 5.0, 20.0], equal_nan=True)
@@ -131,7 +144,7 @@ def test_what_was_not_measured_has_no_row(recording: Path, tmp_path: Path) -> No
     setpoint = attached.log.topics["position setpoint"]
     north = Series(setpoint.time, {"north": setpoint.columns["north"]})
     log = replace(attached.log, topics={**attached.log.topics, "position setpoint": north})
-    made = {name: make() for name, _, _, make in log_figures(replace(attached, log=log))}
+    made = figures(replace(attached, log=log))
     assert [axes.get_ylabel() for axes in made["battery"].axes] == ["Voltage (V)"]
     assert [len(axes.lines) for axes in made["position"].axes] == [1, 2, 1]
 
@@ -143,11 +156,33 @@ def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) ->
     attach_file(recording, noise, "vehicle_logs/drone/<b>x</b>", *labels)
     attach_file(recording, noise, "vehicle_logs/eagle/../../x", *labels)
     report = read_report(recording)
-    assert [one.log for one in report.logs] == [None, None]
-    assert log_plots(report.logs) == []
+    assert [section.rows for section in report.sections] == [(), ()]
+    assert section_plots(report.sections) == []
     page = write_report(recording, tmp_path / "report").page.read_text()
     assert "&lt;b&gt;x&lt;/b&gt; of drone is not shown: &lt;b&gt;x&lt;/b&gt; is no log" in page
     assert "../../x of eagle is not shown: no robot in the recording is called" in page
+
+
+def test_on_the_command_line(
+    recording: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """How the log lies over the flight is printed when it is attached, and with the report."""
+    log = written(tmp_path, "own.bin", dataflash(FLOWN))
+
+    def run(*words: str) -> tuple[object, str]:
+        monkeypatch.setattr(sys, "argv", ["aerodaas", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, capsys.readouterr().out
+
+    for words in (("attach", str(recording), str(log)), ("report", str(recording))):
+        code, told = run(*words)
+        assert code == 0
+        assert "own.bin of drone (ArduPilot) covers 0.0 to 60.0 s of the mission" in told
+    assert run("attach", str(tmp_path / "none.mcap"), "none.bin")[0] == 2
 
 
 def test_when_it_flew(recording: Path) -> None:

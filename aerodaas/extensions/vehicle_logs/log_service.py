@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from aerodaas.messages.vehicle import Vehicle
-
-__all__ = ["LogEntry", "LoggingVehicle", "log_of_flight"]
+__all__ = ["LogEntry", "LogService", "log_of_flight"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +42,8 @@ def log_of_flight(logs: Sequence[LogEntry], begin: float, end: float) -> LogEntr
 
 
 @runtime_checkable
-class LoggingVehicle(Vehicle, Protocol):
-    """A vehicle whose own logs can be fetched. Both methods block."""
+class LogService(Protocol):
+    """A vehicle's own logs, or a vehicle that hands them out itself. Both methods block."""
 
     def logs(self) -> list[LogEntry]:
         """Its logs, oldest first; raises VehicleError."""

@@ -10,9 +10,9 @@ from typing_extensions import Self
 
 from aerodaas.clock import seconds
 from aerodaas.errors import RecordingError, UnknownIdError
+from aerodaas.extensions.vehicle_logs.log import Floats, VehicleLog
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.vehicle_log.log import Floats, VehicleLog
 
 __all__ = [
     "Alignment",

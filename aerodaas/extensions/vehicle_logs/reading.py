@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from aerodaas.errors import RecordingError
-from aerodaas.recording.decoding.limits import MAX_VEHICLE_LOG
-from aerodaas.recording.vehicle_log.dataflash import DATAFLASH_HEAD, read_dataflash
-from aerodaas.recording.vehicle_log.log import Series, Topic, VehicleLog
-from aerodaas.recording.vehicle_log.ulog import ULOG_HEAD, read_ulog
+from aerodaas.extensions.vehicle_logs.dataflash import DATAFLASH_HEAD, read_dataflash
+from aerodaas.extensions.vehicle_logs.log import Series, Topic, VehicleLog
+from aerodaas.extensions.vehicle_logs.ulog import ULOG_HEAD, read_ulog
 
-__all__ = ["read_vehicle_log"]
+__all__ = ["MAX_LOG", "read_vehicle_log"]
+
+MAX_LOG = 1 << 30
+"""Bytes of a vehicle's own log, attached or in a file; an hour of them takes 20 to 500 million."""
 
 _FARTHEST = 1e8
 """More than any figure of a vehicle, in metres, volts or degrees."""
@@ -40,9 +42,9 @@ def read_vehicle_log(file: Path, name: str = "") -> VehicleLog:
         raise RecordingError(f"cannot read the log {name}: {error.strerror}") from None
     if not head:
         raise RecordingError(f"{name} is empty: the vehicle wrote no log; fetch another one")
-    if size > MAX_VEHICLE_LOG:
+    if size > MAX_LOG:
         raise RecordingError(
-            f"{name} has {size} bytes, more than the {MAX_VEHICLE_LOG} of a log that is read; have "
+            f"{name} has {size} bytes, more than the {MAX_LOG} of a log that is read; have "
             "the vehicle log less, or each flight in a log of its own"
         )
     try:

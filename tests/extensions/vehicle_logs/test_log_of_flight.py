@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.messages.vehicle_log import LogEntry, log_of_flight
+from aerodaas.extensions.vehicle_logs.log_service import LogEntry, log_of_flight
 
 BEGIN, END = 1000.0, 1400.0
 

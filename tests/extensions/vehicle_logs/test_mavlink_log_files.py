@@ -12,7 +12,8 @@ from emulated import Flight, Stepped
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.messages.vehicle_log import LogEntry
+from aerodaas.extensions.vehicle_logs.log_service import LogEntry
+from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
 from aerodaas.testing.channel import Impairment
 from tools.mavlink_vehicle import AutopilotOptions
 
@@ -41,6 +42,12 @@ def pair(flight: Flight) -> Iterator[Stepped]:
         yield ends
 
 
+@pytest.fixture
+def logs(pair: Stepped) -> MavlinkLogs:
+    """The log service of that vehicle."""
+    return MavlinkLogs(pair.vehicle)
+
+
 def begins(pair: Stepped) -> list[int]:
     """From which bytes on bursts were asked for."""
     payloads = [bytes(one.payload) for one in pair.heard("FILE_TRANSFER_PROTOCOL")]
@@ -48,10 +55,10 @@ def begins(pair: Stepped) -> list[int]:
     return [int.from_bytes(one[8:12], "little") for one in payloads if one[3] == burst]
 
 
-def test_a_log_is_fetched_as_a_file(pair: Stepped, tmp_path: Path) -> None:
+def test_a_log_is_fetched_as_a_file(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None:
     """Found by its size, named after its number; progress is told, and the session ends."""
     told: list[tuple[int, int]] = []
-    file = pair.vehicle.fetch_log(LOG, tmp_path / "new", lambda *done: told.append(done))
+    file = logs.fetch_log(LOG, tmp_path / "new", lambda *done: told.append(done))
     assert file == tmp_path / "new" / NAME
     assert file.read_bytes() == DATAFLASH
     assert [one.name for one in file.parent.iterdir()] == [NAME]
@@ -67,11 +74,13 @@ def test_a_log_is_fetched_as_a_file(pair: Stepped, tmp_path: Path) -> None:
 KIND = "FILE_TRANSFER_PROTOCOL"
 
 
-def test_lost_doubled_and_overtaken_packets(pair: Stepped, tmp_path: Path) -> None:
+def test_lost_doubled_and_overtaken_packets(
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path
+) -> None:
     """A twentieth of them, both ways."""
     bad = Impairment(loss=0.05, duplicates=0.05, jitter=0.02)
     pair.autopilot.spoil(up=bad, down=bad)
-    assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
     assert not pair.heard("LOG_REQUEST_DATA")
 
 
@@ -80,10 +89,12 @@ def cut_at(pair: Stepped, byte: int) -> Callable[[int, int], None]:
     return lambda done, _: pair.autopilot.cut() if done >= byte else None
 
 
-def test_a_vehicle_that_goes_away_and_comes_back(pair: Stepped, tmp_path: Path) -> None:
+def test_a_vehicle_that_goes_away_and_comes_back(
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path
+) -> None:
     """What came is kept, and the next fetch goes on from there."""
     with pytest.raises(VehicleError, match=r"stopped sending .* next fetch goes on from .*part"):
-        pair.vehicle.fetch_log(LOG, tmp_path, cut_at(pair, 40_000))
+        logs.fetch_log(LOG, tmp_path, cut_at(pair, 40_000))
     (part,) = tmp_path.iterdir()
     held = part.stat().st_size
     assert 40_000 <= held < len(DATAFLASH)
@@ -93,33 +104,33 @@ def test_a_vehicle_that_goes_away_and_comes_back(pair: Stepped, tmp_path: Path) 
     pair.wait(lambda: not pair.vehicle.preflight())
     pair.autopilot.heard.clear()
     later = replace(LOG, began=BEGAN + 60.0)
-    assert pair.vehicle.fetch_log(later, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(later, tmp_path).read_bytes() == DATAFLASH
     assert [one.name for one in tmp_path.iterdir()] == ["log-2-20270115-080100.bin"]
     assert begins(pair)[0] == held
 
 
 @pytest.mark.parametrize("held", [b"\xff" * 50_000, b"\xff" * 200_000])
 def test_what_is_held_of_another_log_is_fetched_anew(
-    pair: Stepped, tmp_path: Path, held: bytes
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, held: bytes
 ) -> None:
     """The vehicle's checksum tells it, or its size does."""
     (tmp_path / PART).write_bytes(held)
-    assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
     assert 0 in begins(pair)
 
 
 def test_a_checksum_that_does_not_fit(
-    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No file is better than a wrong one."""
     monkeypatch.setattr(pair.firmware.files, "checksum", lambda _: 1)
     with pytest.raises(VehicleError, match="has another checksum on the vehicle"):
-        pair.vehicle.fetch_log(LOG, tmp_path)
+        logs.fetch_log(LOG, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_without_checksums_nothing_is_gone_on_with(
-    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It comes whole, once more: what was held may be anything."""
     server, crc = pair.firmware.files, mavlink.MAV_FTP_OPCODE_CALCFILECRC
@@ -132,13 +143,13 @@ def test_without_checksums_nothing_is_gone_on_with(
         return [reply[:5] + bytes([crc]) + reply[6:]]
 
     monkeypatch.setattr(server, "answer", unsummed)
-    assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
     (tmp_path / PART).write_bytes(b"\xff" * 99_000)
-    assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
 
 
 def test_a_path_out_of_the_folder_is_not_gone(
-    pair: Stepped, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is no file of ours; the log comes by its number, into the folder."""
     ways = [
@@ -146,7 +157,7 @@ def test_a_path_out_of_the_folder_is_not_gone(
     ]
     monkeypatch.setattr(pair.firmware.files, "listing", lambda _: ways)
     folder = tmp_path / "a" / "b" / "c" / "d"
-    file = pair.vehicle.fetch_log(LOG, folder)
+    file = logs.fetch_log(LOG, folder)
     assert file == folder / NAME
     assert [one for one in tmp_path.rglob("*") if one.is_file()] == [file]
     assert pair.heard("LOG_REQUEST_DATA")
@@ -175,17 +186,19 @@ def silent(pair: Stepped) -> None:
 
 @pytest.mark.parametrize("lacks", [no_service, twins, written, silent])
 def test_without_a_file_that_is_certainly_it_comes_by_its_number(
-    pair: Stepped, tmp_path: Path, lacks: Callable[[Stepped], None]
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, lacks: Callable[[Stepped], None]
 ) -> None:
     """As ever."""
     lacks(pair)
-    assert pair.vehicle.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
+    assert logs.fetch_log(LOG, tmp_path).read_bytes() == DATAFLASH
     assert pair.heard("LOG_REQUEST_DATA")
     assert not begins(pair)
 
 
 @pytest.mark.parametrize("files", [True, False])
-def test_a_pilot_takes_off_in_between(pair: Stepped, tmp_path: Path, *, files: bool) -> None:
+def test_a_pilot_takes_off_in_between(
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path, *, files: bool
+) -> None:
     """The link is needed: no more is asked for, whichever way it comes."""
     pair.vehicle.telemetry.serves_files = files
     connection = pair.vehicle.connection
@@ -196,7 +209,7 @@ def test_a_pilot_takes_off_in_between(pair: Stepped, tmp_path: Path, *, files: b
             pair.wait(lambda: pair.vehicle.read().armed)
 
     with pytest.raises(VehicleError, match="cannot fetch logs in flight"):
-        pair.vehicle.fetch_log(LOG, tmp_path, arm)
+        logs.fetch_log(LOG, tmp_path, arm)
     asked = begins(pair) if files else [one.ofs for one in pair.heard("LOG_REQUEST_DATA")]
     assert asked
     assert max(asked) < 72_000
@@ -212,7 +225,7 @@ def test_px4_has_a_folder_for_each_day(flight: Flight, tmp_path: Path) -> None:
             "/fs/microsd/log/2027-01-14/07_00_00.ulg": ulog[:90],
             "/fs/microsd/log/2027-01-15/08_00_00.ulg": ulog,
         }
-        file = pair.vehicle.fetch_log(LogEntry(0, len(ulog), None), tmp_path)
+        file = MavlinkLogs(pair.vehicle).fetch_log(LogEntry(0, len(ulog), None), tmp_path)
         assert not pair.heard("LOG_REQUEST_DATA")
     assert file.name == "log-0.ulg"
     assert file.read_bytes() == ulog

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from vehicle_logs import Flown, dataflash, record_flown
+from flown_logs import Flown, dataflash, record_flown
 
 from aerodaas.errors import RecordingError, UnknownIdError
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.vehicle_log.alignment import (
+from aerodaas.extensions.vehicle_logs.alignment import (
     RecordedClock,
     align,
     fit_clock_line,
@@ -19,8 +18,9 @@ from aerodaas.recording.vehicle_log.alignment import (
     robot_of,
     starts_of,
 )
-from aerodaas.recording.vehicle_log.dataflash import read_dataflash
-from aerodaas.recording.vehicle_log.log import VehicleLog
+from aerodaas.extensions.vehicle_logs.dataflash import read_dataflash
+from aerodaas.extensions.vehicle_logs.log import VehicleLog
+from aerodaas.recording.reader import Recording
 
 FLOWN = Flown()
 

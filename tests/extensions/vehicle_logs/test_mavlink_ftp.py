@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.drivers.mavlink.logs.ftp import (
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.errors import VehicleError
+from aerodaas.extensions.vehicle_logs.ftp import (
     FtpClient,
     FtpEntry,
     FtpPacket,
     FtpRefusedError,
     FtpScript,
 )
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.errors import VehicleError
 from aerodaas.testing.channel import Channel, Impairment
 from tools.mavlink_vehicle.files import FileServer
 

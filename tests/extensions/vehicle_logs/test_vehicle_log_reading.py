@@ -8,18 +8,18 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
+import flown_logs
 import numpy as np
 import pytest
-import vehicle_logs
+from flown_logs import Flown, dataflash, ulog
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink import DFReader
-from vehicle_logs import Flown, dataflash, ulog
 
 from aerodaas.errors import ConfigError, RecordingError
-from aerodaas.recording.vehicle_log import reading
-from aerodaas.recording.vehicle_log.log import VehicleLog
-from aerodaas.recording.vehicle_log.reading import read_vehicle_log
+from aerodaas.extensions.vehicle_logs import reading
+from aerodaas.extensions.vehicle_logs.log import VehicleLog
+from aerodaas.extensions.vehicle_logs.reading import read_vehicle_log
 
 FLOWN = Flown()
 Write = Callable[..., bytes]
@@ -233,7 +233,7 @@ def test_a_log_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before it is read into memory."""
-    monkeypatch.setattr(reading, "MAX_VEHICLE_LOG", 1000)
+    monkeypatch.setattr(reading, "MAX_LOG", 1000)
     with pytest.raises(RecordingError, match="more than the 1000 of a log that is read"):
         read(tmp_path, dataflash(FLOWN))
 
@@ -252,9 +252,9 @@ def test_times_that_are_no_numbers_are_refused(
     """A ULog says itself of which type its timestamps are; nothing can be laid over a mission."""
     formats = {
         name: fields.replace("uint64_t timestamp", "double timestamp")
-        for name, fields in vehicle_logs._ULOG.items()
+        for name, fields in flown_logs._ULOG.items()
     }
-    monkeypatch.setattr(vehicle_logs, "_ULOG", formats)
-    monkeypatch.setattr(vehicle_logs, "_us", lambda *_: 0x7FF8 << 48)  # NaN
+    monkeypatch.setattr(flown_logs, "_ULOG", formats)
+    monkeypatch.setattr(flown_logs, "_us", lambda *_: 0x7FF8 << 48)  # NaN
     with pytest.raises(RecordingError, match="holds times that are no numbers"):
         read(tmp_path, ulog(FLOWN))

@@ -9,18 +9,17 @@ from pathlib import Path
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.printable import printable
 from aerodaas.errors import AeroDaaSError, RecordingError
-from aerodaas.recording.attaching import attach_file
-from aerodaas.recording.decoding.limits import MAX_VEHICLE_LOG
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.vehicle_log.alignment import (
+from aerodaas.extensions.vehicle_logs.alignment import (
     Alignment,
     RecordedClock,
     align,
     recorded_clocks,
     robot_of,
 )
-from aerodaas.recording.vehicle_log.log import VehicleLog
-from aerodaas.recording.vehicle_log.reading import read_vehicle_log
+from aerodaas.extensions.vehicle_logs.log import VehicleLog
+from aerodaas.extensions.vehicle_logs.reading import MAX_LOG, read_vehicle_log
+from aerodaas.recording.attaching import attach_file
+from aerodaas.recording.reader import Recording
 
 __all__ = ["AttachedLog", "attach_log", "attached_logs", "flight_of"]
 
@@ -113,7 +112,7 @@ def _attached(recording: Recording, name: str, clocks: dict[str, RecordedClock])
         recorded = clocks[robot_of(clocks, robot)]
         with tempfile.TemporaryDirectory(prefix="aerodaas-log-") as folder:
             copy = Path(folder) / "log"
-            recording.extract(name, copy, MAX_VEHICLE_LOG)
+            recording.extract(name, copy, MAX_LOG)
             log, alignment = _laid_over(copy, file, recorded)
     except (AeroDaaSError, OSError) as error:
         return AttachedLog(robot, file, None, None, str(error))

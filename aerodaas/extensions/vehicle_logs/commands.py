@@ -1,4 +1,4 @@
-"""`aerodaas logs`: the logs that a vehicle keeps itself."""
+"""`aerodaas logs` and `attach`: the logs that a vehicle keeps itself."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ import typer
 
 from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.preflight import connected_robot
+from aerodaas.config.printable import printable
 from aerodaas.errors import VehicleError
 
 if TYPE_CHECKING:
-    from aerodaas.messages.vehicle_log import LogEntry, LoggingVehicle
+    from aerodaas.extensions.vehicle_logs.log_service import LogEntry, LogService
+    from aerodaas.messages.vehicle import Vehicle
 
-__all__ = ["logs"]
+__all__ = ["attach", "logs"]
 
 
 def logs(
@@ -53,15 +55,16 @@ def logs(
     aerodaas logs drone 3 4 --env campus.json
     aerodaas logs drone --attach runs/survey-20260101-120000/flight.mcap
     """
-    from aerodaas.messages.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
+    from aerodaas.extensions.vehicle_logs.attachment import (  # noqa: PLC0415 - slow to load
+        attach_log,
+        flight_of,
+    )
 
     # Before anything is fetched: the recording may be none.
-    flown = None if attach is None else _flight(attach, robot)
+    flown = None if attach is None else flight_of(attach, robot)
     with connected_robot(robot, env, setting or ()) as (vehicle, _):
-        if not isinstance(vehicle, LoggingVehicle):
-            driver = vehicle.capabilities.driver
-            raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")
-        found = vehicle.logs()
+        service = _log_service(vehicle, robot)
+        found = service.logs()
         if numbers:
             chosen = _chosen(found, numbers)
         elif latest:
@@ -71,22 +74,47 @@ def logs(
         else:
             _show(robot, found, as_json=as_json)
             return
-        files = [_fetch(vehicle, one, to, quiet=as_json) for one in chosen]
+        files = [_fetch(service, one, to, quiet=as_json) for one in chosen]
     if as_json:
         typer.echo(json.dumps([str(file) for file in files]))
     if attach is not None:
         for file in files:
-            _attach(attach, file, robot, quiet=as_json)
+            attached = attach_log(attach, file, robot)
+            if not as_json:
+                typer.echo(printable(str(attached)))
 
 
-def _flight(recording: Path, robot: str) -> tuple[float, float]:
-    from aerodaas.recording.vehicle_log.attachment import flight_of  # noqa: PLC0415 - slow to load
+def attach(
+    recording: Annotated[
+        Path, typer.Argument(help="The .mcap file of the run.", show_default=False)
+    ],
+    log: Annotated[
+        Path,
+        typer.Argument(help="The log: .bin of ArduPilot or .ulg of PX4.", show_default=False),
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(help="Whose log it is. Default: the only robot with an autopilot."),
+    ] = None,
+) -> None:
+    """Attach an autopilot's own log to the recording of its flight, its clock laid over.
 
-    return flight_of(recording, robot)
+    `aerodaas report` draws its main topics then. `aerodaas logs ROBOT --attach RECORDING` fetches
+    the log from the vehicle first.
+
+    aerodaas attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
+    """
+    from aerodaas.extensions.vehicle_logs.attachment import (  # noqa: PLC0415 - slow to load
+        attach_log,
+    )
+
+    typer.echo(printable(str(attach_log(recording, log, robot))))
 
 
 def _written_then(found: Sequence[LogEntry], flown: tuple[float, float]) -> LogEntry:
-    from aerodaas.messages.vehicle_log import log_of_flight  # noqa: PLC0415 - slow to load
+    from aerodaas.extensions.vehicle_logs.log_service import (  # noqa: PLC0415 - slow to load
+        log_of_flight,
+    )
 
     chosen = log_of_flight(found, *flown)
     if chosen is None:
@@ -97,13 +125,19 @@ def _written_then(found: Sequence[LogEntry], flown: tuple[float, float]) -> LogE
     return chosen
 
 
-def _attach(recording: Path, file: Path, robot: str, *, quiet: bool) -> None:
-    from aerodaas.config.printable import printable  # noqa: PLC0415 - slow to load
-    from aerodaas.recording.vehicle_log.attachment import attach_log  # noqa: PLC0415 - as above
+def _log_service(vehicle: Vehicle, robot: str) -> LogService:
+    """Log service of a robot's vehicle; VehicleError if its driver has none."""
+    from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415 - slow to load
+    from aerodaas.extensions.vehicle_logs.log_service import (  # noqa: PLC0415 - as above
+        LogService,
+    )
+    from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs  # noqa: PLC0415 - as above
 
-    attached = attach_log(recording, file, robot)
-    if not quiet:
-        typer.echo(printable(str(attached)))
+    service = MavlinkLogs(vehicle) if isinstance(vehicle, MavlinkVehicle) else vehicle
+    if not isinstance(service, LogService):
+        driver = vehicle.capabilities.driver
+        raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")
+    return service
 
 
 def _chosen(found: Sequence[LogEntry], numbers: Sequence[int]) -> list[LogEntry]:
@@ -115,12 +149,12 @@ def _chosen(found: Sequence[LogEntry], numbers: Sequence[int]) -> list[LogEntry]
     return [known[number] for number in numbers]
 
 
-def _fetch(vehicle: LoggingVehicle, log: LogEntry, folder: Path, *, quiet: bool) -> Path:
+def _fetch(service: LogService, log: LogEntry, folder: Path, *, quiet: bool) -> Path:
     from rich.progress import Progress  # noqa: PLC0415 - slow to load
 
     with Progress(disable=quiet, transient=True) as bar:
         task = bar.add_task(f"log {log.number}", total=log.size)
-        file = vehicle.fetch_log(log, folder, lambda done, _: bar.update(task, completed=done))
+        file = service.fetch_log(log, folder, lambda done, _: bar.update(task, completed=done))
     if not quiet:
         typer.echo(file)
     return file

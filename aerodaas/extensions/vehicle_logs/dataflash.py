@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.errors import RecordingError
-from aerodaas.recording.vehicle_log.log import Floats, LogText, Series, Topic, VehicleLog
+from aerodaas.extensions.vehicle_logs.log import Floats, LogText, Series, Topic, VehicleLog
 
 __all__ = ["DATAFLASH_HEAD", "read_dataflash"]
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.figure import Figure
 
-from aerodaas.recording.report.plots.style import CYCLE, grid, legend, new_figure
-from aerodaas.recording.vehicle_log.attachment import AttachedLog
-from aerodaas.recording.vehicle_log.log import Floats, Topic, VehicleLog
+from aerodaas.extensions.vehicle_logs.attachment import AttachedLog
+from aerodaas.extensions.vehicle_logs.log import Floats, Topic, VehicleLog
+from aerodaas.recording.report.section import Drawing
 
-__all__ = ["log_figures"]
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
+
+__all__ = ["log_drawings"]
 
 _ROW = 1.5
 """Inches of one row."""
@@ -27,8 +30,13 @@ _Rows = Sequence[tuple[str, Sequence[tuple[Topic, str, str]]]]
 """Label of each row's axis, and its lines: topic, column, name in the legend."""
 
 
-def log_figures(attached: AttachedLog) -> Iterator[tuple[str, str, str, Callable[[], Figure]]]:
-    """Name, title, description and maker of each plot that a log has data for."""
+def log_drawings(number: int, attached: AttachedLog) -> Iterator[Drawing]:
+    """The plots that a log has data for.
+
+    Args:
+        number: The log's number among those of the recording, from 1.
+        attached: The log.
+    """
     log = attached.log
     if log is None:
         return
@@ -37,7 +45,8 @@ def log_figures(attached: AttachedLog) -> Iterator[tuple[str, str, str, Callable
         shown = [(label, lines) for label, lines in known if lines]
         if shown:
             title = f"From the autopilot's log: {what}"
-            yield name, title, f"{title} over mission time", _maker(attached, shown)
+            file, description = f"vehicle_log_{number}_{name}", f"{title} over mission time"
+            yield Drawing(file, title, description, _maker(attached, shown))
 
 
 def _holds(log: VehicleLog, topic: Topic, column: str, _: str) -> bool:
@@ -111,6 +120,13 @@ def _maker(attached: AttachedLog, rows: _Rows) -> Callable[[], Figure]:
 
 
 def _figure(attached: AttachedLog, rows: _Rows) -> Figure:
+    from aerodaas.recording.report.plots.style import (  # noqa: PLC0415 - needs the extra `plots`
+        CYCLE,
+        grid,
+        legend,
+        new_figure,
+    )
+
     figure = new_figure(1.1 + _ROW * len(rows))
     all_axes = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     handles: dict[str, Artist] = {}

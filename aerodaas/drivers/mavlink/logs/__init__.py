@@ -1,1 +1,0 @@
-"""Logs on an autopilot's card: listed and downloaded."""

@@ -1,0 +1,21 @@
+"""What vehicles' own logs add to the core: two commands, and a section of the report."""
+
+from aerodaas.config.extensions import Command, Extension
+
+EXTENSION = Extension(
+    name="vehicle_logs",
+    summary="Autopilots' own logs: fetched, attached to recordings, and shown in reports.",
+    commands=(
+        Command(
+            "logs",
+            "aerodaas.extensions.vehicle_logs.commands:logs",
+            "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
+        ),
+        Command(
+            "attach",
+            "aerodaas.extensions.vehicle_logs.commands:attach",
+            "Attach an autopilot's own log to the recording of its flight, its clock laid over.",
+        ),
+    ),
+    report_sections=("aerodaas.extensions.vehicle_logs.report:log_sections",),
+)
