@@ -134,6 +134,16 @@ def test_outside_the_fence_only_the_way_back_is_open() -> None:
     assert isinstance(home.setpoint, PositionSetpoint)
 
 
+def test_a_drone_that_follows_no_setpoints_crosses_what_it_cannot_stop_before() -> None:
+    """Named only where it flies on towards the edge too fast, or is outside already."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    assert guard.crossed(at(14.0, -7.0, 5.0, velocity=(4.0, 0.0, 0.0))) == ("geofence",)
+    assert guard.crossed(at(14.0, -7.0, 5.0, velocity=(-4.0, 0.0, 0.0))) == ()
+    assert guard.crossed(at(14.0, -7.0, 5.0)) == ()
+    assert guard.crossed(at(17.0, -7.0, 5.0)) == ("geofence",)
+    assert SetpointFilter(WIDE, np.zeros(3)).crossed(at(0, 0, 20, velocity=(9.0, 0.0, 0.0))) == ()
+
+
 def test_setpoints_that_are_not_finite_become_standing_still() -> None:
     """NaN never reaches a vehicle."""
     guard = SetpointFilter(LIMITS, np.zeros(3))
