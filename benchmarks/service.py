@@ -177,7 +177,7 @@ def show_mission(
 ) -> None:
     """Command a drone of a flying mission, unwatched and watched; `service` is its process' id."""
     while not (found := client.mission(mission)).status or any(
-        one.state != "enroute" for one in found.status.values()
+        one.mission.state != "enroute" for one in found.status.values()
     ):
         if found.reason and found.ended:
             raise SystemExit(found.reason)

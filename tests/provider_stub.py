@@ -13,10 +13,13 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse
+from robot_statuses import robot_status
 from starlette.websockets import WebSocketDisconnect
 from typing_extensions import Self
 
 from aerodaas.messages.health import Verdict
+from aerodaas.messages.mission import RobotStatus
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import (
     CommandIn,
@@ -25,7 +28,6 @@ from aerodaas.protocol.schemas import (
     MissionOut,
     MissionPhase,
     RobotOut,
-    StatusOut,
 )
 
 TOKEN = "t0k3n"  # noqa: S105 - of these tests alone
@@ -43,26 +45,16 @@ CATALOGUE: dict[str, Any] = {
 }
 
 
-def status(**changes: Any) -> StatusOut:  # noqa: ANN401
+def status(**changes: Any) -> RobotStatus:  # noqa: ANN401
     """A drone on its way."""
     known: dict[str, Any] = {
-        "time": 3.0,
-        "state": "enroute",
         "reason": "flying to a",
-        "target": "a",
-        "pending": [],
-        "visited": [],
-        "given_up": [],
-        "waypoints_visited": 0,
-        "waypoints_known": 1,
+        "target": Waypoint("a", 5, 0, 2),
+        "waypoint_counts": (0, 1),
         "distance": 2.0,
-        "faults": [],
-        "position": [1.0, 0.0, 2.0],
-        "velocity": [1.0, 0.0, 0.0],
-        "yaw": 0.0,
-        "battery": 0.9,
+        "position": (1.0, 0.0, 2.0),
     }
-    return StatusOut(**{**known, **changes})
+    return robot_status(**{**known, **changes})
 
 
 def mission(phase: MissionPhase = MissionPhase.FLYING, **changes: Any) -> MissionOut:  # noqa: ANN401
@@ -221,8 +213,8 @@ class Stub:
                 await socket.send_bytes(blob)
         while True:
             shown = self.state
-            content = shown.model_dump(mode="json")
-            await socket.send_json({"kind": "mission", "mission": content})
+            content = shown.model_dump_json()
+            await socket.send_text(f'{{"kind": "mission", "mission": {content}}}')
             if self.cuts:
                 self.cuts -= 1
                 await socket.close(1011)

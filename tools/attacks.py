@@ -318,7 +318,7 @@ class Service:
         found = self._mission(mission)
         if found["phase"] in {"failed", "refused", "cancelled", "landed"}:
             raise RuntimeError(f"the drone does not fly: {found['reason']}")
-        return found["status"].get("one", {}).get("state")
+        return found["status"].get("one", {}).get("mission", {}).get("state")
 
     def _said(self, form: str) -> str:
         self._until(lambda: re.search(form, self._log.read_text()) is not None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,9 +10,11 @@ import typer
 
 from aerodaas.analytics.remote import TOKEN_VARIABLE
 from aerodaas.cli.options import ExampleGroup
+from aerodaas.clock import seconds
 
 if TYPE_CHECKING:
     from aerodaas.environment.remote_client import RemoteClient
+    from aerodaas.messages.mission import RobotStatus
 
 __all__ = ["app"]
 
@@ -149,11 +150,13 @@ def status(
     One line: mission time, state, place, battery, progress, and the reason for the state.
 
         aerodaas remote status
-        aerodaas remote status --follow --json | jq .position
+        aerodaas remote status --follow --json | jq .vehicle.odometry.position
     """
+    from aerodaas.messages.schema import json_text  # noqa: PLC0415 - slow to load
+
     client = _client(context)
     for one in client.stream(rate) if follow else [client.status()]:
-        typer.echo(json.dumps(one) if as_json else _line(one))
+        typer.echo(json_text(one) if as_json else _line(one))
 
 
 def _client(context: typer.Context) -> RemoteClient:
@@ -166,14 +169,16 @@ def _say(context: typer.Context, command: str, done: str) -> None:
     typer.echo(done)
 
 
-def _line(status: dict[str, Any]) -> str:
-    visited, known = status["waypoints_visited"], status["waypoints_known"]
-    parts = [f"{status['time']:7.1f} s", status["state"]]
-    if status["position"] is not None:
-        east, north, up = ("?" if axis is None else f"{axis:.1f}" for axis in status["position"])
-        parts.append(f"E {east}  N {north}  up {up} m")
-    if status["battery"] is not None:
-        parts.append(f"battery {status['battery']:.0%}")
+def _line(status: RobotStatus) -> str:
+    from aerodaas.terminal.panels import place_text  # noqa: PLC0415 - slow to load
+
+    mission = status.mission
+    visited, known = mission.waypoint_counts
+    parts = [f"{seconds(mission.stamp):7.1f} s", mission.state.value]
+    if status.vehicle is not None:
+        parts.append(place_text(status.vehicle))
+    if status.charge is not None:
+        parts.append(f"battery {status.charge:.0%}")
     if known:
         parts.append(f"{visited} of {known} waypoints")
-    return "  ".join([*parts, *(text for text in (status["reason"], *status["faults"]) if text)])
+    return "  ".join([*parts, *(text for text in (mission.reason, *mission.faults) if text)])

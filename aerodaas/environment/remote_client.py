@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from aerodaas.config.checked import checked
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import ConfigError, MissionError, UnreachableError
+from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, PictureForm, StreamKind
 from aerodaas.service.own.access import OWN
@@ -44,11 +45,11 @@ class RemoteClient:
         self._client = ProviderClient(url, token or None, insecure=True)
         self._robot = robot
 
-    def status(self) -> dict[str, Any]:
-        """Return the status of mission and vehicle, with the fields of `schemas.StatusOut`."""
+    def status(self) -> RobotStatus:
+        """Return the status of mission and vehicle."""
         with _explained():
             mission = self._client.mission(OWN)
-        return mission.status[self._robot_of(mission)].model_dump(mode="json")
+        return mission.status[self._robot_of(mission)]
 
     def add_waypoints(
         self,
@@ -105,12 +106,12 @@ class RemoteClient:
                         return received.blob
         raise MissionError("the flight was over before a picture came")
 
-    def stream(self, rate: float = 5.0) -> Iterator[dict[str, Any]]:
+    def stream(self, rate: float = 5.0) -> Iterator[RobotStatus]:
         """Yield the status at each change, `rate` times a second at most, until the flight ends."""
         with _explained(), self._client.live(OWN, rate) as connection:
             for received in connection:
                 if isinstance(received, MissionOut) and received.status:
-                    yield received.status[self._robot_of(received)].model_dump(mode="json")
+                    yield received.status[self._robot_of(received)]
 
     def _commanded(self) -> str:
         """The robot that is named, or the only one that flies."""

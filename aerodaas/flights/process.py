@@ -90,6 +90,7 @@ class FlightProcess:
             began=self._began,
             ended=time.time(),
             status=meter.status,
+            places=meter.places,
             alerts=meter.alerts,
             **meter.usage({} if run is None else run.reports()),
         )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
     from pydantic_core import CoreSchema
 
 __all__ = [
@@ -64,6 +64,12 @@ class NanIsNull:
         from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
 
         return core_schema.no_info_before_validator_function(_nan_of_null, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """JSON schema of the number."""
+        return {"anyOf": [handler(core), {"type": "null"}]}
 
 
 Real: TypeAlias = Annotated[float, NanIsNull()]

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
+from aerodaas.geometry.frames import is_finite
 from aerodaas.messages.frames import Header
 from aerodaas.messages.health import HealthReport
 from aerodaas.messages.json_types import Int64, Real
@@ -17,12 +20,16 @@ __all__ = [
     "RECENT",
     "BatteryOutlook",
     "Decision",
+    "MissionPlan",
     "MissionState",
     "MissionStatus",
+    "Place",
     "RobotStatus",
     "SetpointRecord",
 ]
 
+Place: TypeAlias = tuple[float, float, float]
+"""Metres east, north and up of home."""
 RECENT = 64
 """Most ids in a status' lists: a mission of hours reaches thousands of waypoints."""
 
@@ -112,10 +119,26 @@ class MissionStatus:
     """What ended the mission before its plan was flown; empty if nothing did, or a command."""
 
     @property
+    def ahead(self) -> tuple[Waypoint, ...]:
+        """The target and the waypoints after it."""
+        return self.pending if self.target is None else (self.target, *self.pending)
+
+    @property
     def progress(self) -> float:
         """Share of the known waypoints that have been visited, 0 to 1."""
         visited, known = self.waypoint_counts
         return visited / known if known else 0.0
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class MissionPlan:
+    """The waypoints ahead of a robot, local ENU."""
+
+    stamp: Int64
+    """Mission clock, nanoseconds."""
+    waypoints: tuple[Waypoint, ...]
+    """The present target first."""
 
 
 @fast_pickle
@@ -136,6 +159,20 @@ class RobotStatus:
         """Values whose change the application is told at once, rather than at its next poll."""
         one = self.mission
         return one.state, one.reason, len(one.visited), len(one.given_up), one.faults
+
+    @property
+    def charge(self) -> float | None:
+        """Charge left, 0 to 1; None where it is not known."""
+        charge = math.nan if self.vehicle is None else self.vehicle.battery.fraction
+        return charge if math.isfinite(charge) else None
+
+    @property
+    def place(self) -> Place | None:
+        """Metres east, north and up of home; None where it is not known."""
+        if self.vehicle is None or not is_finite(self.vehicle.odometry.position):
+            return None
+        east, north, up = map(float, self.vehicle.odometry.position)
+        return east, north, up
 
     @property
     def public(self) -> RobotStatus:

@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
@@ -16,6 +16,10 @@ from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.json_types import Int64, PairsAsObject, StrictlyTyped
 from aerodaas.messages.payload import GimbalTarget, LensTarget
 from aerodaas.messages.records import fast_pickle, shared_pickle
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
 
 __all__ = [
     "DEFAULT_PRIORITY",
@@ -206,6 +210,20 @@ class Waypoint:
     the picture and before actuators move; None leaves it as it is. One that the mission has begun
     ends with it."""
 
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: type[Waypoint], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema by which pydantic reads a waypoint, and writes what is not at its default."""
+        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
+
+        schema = handler(source)
+        # A status is sent often, and most of its many waypoints have little more than a place.
+        schema["serialization"] = core_schema.plain_serializer_function_ser_schema(
+            _given, when_used="json"
+        )
+        return schema
+
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
         owner = f"waypoint {self.id!r}"
@@ -394,6 +412,14 @@ _NUMBERS = tuple(
         *("zoom", "focus"),
     }
 )
+_DEFAULTS = [(field.name, field.default) for field in fields(Waypoint)]
+
+
+def _given(waypoint: Waypoint) -> dict[str, Any]:
+    """The fields of a waypoint that are not at their default value."""
+    values = ((name, getattr(waypoint, name), default) for name, default in _DEFAULTS)
+    given = {name: value for name, value, default in values if value != default}
+    return {**given, "actuate": waypoint.moves} if waypoint.actuate else given
 
 
 class TargetState(str, enum.Enum):

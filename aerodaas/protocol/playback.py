@@ -10,84 +10,27 @@ from typing import Any
 
 from pydantic import Field
 
-from aerodaas.messages.mission import BatteryOutlook
+from aerodaas.messages.mission import MissionPlan, MissionStatus
+from aerodaas.messages.readings import Alert
+from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import AnalyticsOut, StatusOut, StreamKind, TrafficOut
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
-__all__ = [
-    "AlertOut",
-    "GpsOut",
-    "HeardOut",
-    "PlaceOut",
-    "PlaybackOut",
-    "RecordedOut",
-    "TrackOut",
-]
-
-
-class PlaceOut(AnswerModel):
-    """A waypoint of the plan."""
-
-    since: float
-    """Mission time, seconds, from which it was known."""
-    id: str
-    place: tuple[float, float, float]
-    """Metres east, north and up of home."""
-
-
-class AlertOut(AnswerModel):
-    """An alert."""
-
-    time: float
-    """Mission time, seconds."""
-    kind: str
-    text: str
-
-
-class GpsOut(AnswerModel):
-    """What a satellite receiver gives, beside the place."""
-
-    satellites: int | None
-    position_sigma: float | None
-    """Standard deviation of the place along the ground, metres."""
-
-
-class HeardOut(AnswerModel):
-    """The other aircraft that a robot heard of from a time on."""
-
-    since: float
-    """Mission seconds, for which the places hold."""
-    aircraft: list[TrafficOut]
+__all__ = ["PlaybackOut", "RecordedOut", "TrackOut"]
 
 
 class TrackOut(AnswerModel):
-    """One robot's flight.
+    """One robot's flight: its messages, thinned out."""
 
-    Its status at a time is the last one of `statuses` until then, with the figures of the last
-    row until then.
-    """
-
-    time: list[float]
-    """Mission time of each row, seconds."""
-    position: list[tuple[float | None, float | None, float | None]]
-    """Metres east, north and up of home, by row."""
-    velocity: list[tuple[float | None, float | None, float | None]]
-    yaw: list[float | None]
-    roll: list[float | None]
-    pitch: list[float | None]
-    battery: list[float | None]
-    distance: list[float]
-    outlook: list[BatteryOutlook | None]
-    """How far the battery lasts, by row; null where it was not known."""
-    gps: list[GpsOut | None]
-    """What the satellites give, by row; null without a receiver."""
-    statuses: list[StatusOut]
-    """One for each change of anything but figures and places, which they do not have."""
-    places: list[PlaceOut]
-    """Waypoints as they became known; a later one of the same id takes the place of an earlier."""
-    traffic: list[HeardOut] = Field(default_factory=list)
-    """Other aircraft, at most once a second; an empty one where the last of them was gone."""
+    states: list[VehicleState]
+    """Without truth, complaints and further figures; other aircraft stand in one a second."""
+    statuses: list[MissionStatus]
+    """One for each change, and one a second; the waypoints after the target are the plan's last."""
+    ahead: list[int]
+    """Number of waypoints after the target, by status."""
+    plans: list[MissionPlan]
+    """Plans that differ from those before them in other than their beginning."""
 
 
 class RecordedOut(AnswerModel):
@@ -109,7 +52,8 @@ class RecordedOut(AnswerModel):
     """What lies below it on the map; of a simulated world one of those that ship."""
     tracks: dict[str, TrackOut]
     """By robot."""
-    alerts: list[AlertOut]
+    alerts: list[Alert]
+    """Without their figures."""
     analytics: list[AnalyticsOut]
     streams: dict[str, StreamKind]
     """Streams of pictures and of what was found in them, by name."""

@@ -6,21 +6,18 @@ Units are metres, seconds, radians and m/s; moments are seconds of Unix time; a 
 from __future__ import annotations
 
 import enum
-import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, FailFast, Field, field_validator
 
-from aerodaas.clock import seconds
 from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
-from aerodaas.messages.mission import BatteryOutlook, MissionStatus
-from aerodaas.messages.vehicle import Traffic, VehicleState
-from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType, Waypoint
+from aerodaas.messages.mission import Place, RobotStatus
+from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType
 from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
@@ -47,13 +44,11 @@ __all__ = [
     "Role",
     "Scope",
     "SilencePolicy",
-    "StatusOut",
     "StreamKind",
     "TenantChange",
     "TenantOut",
     "TokenIn",
     "TokenOut",
-    "TrafficOut",
     "UsageOut",
     "VerdictOut",
     "Word",
@@ -182,145 +177,6 @@ class RefusalOut(AnswerModel):
     """Why, and the remedy."""
 
 
-class TrafficOut(AnswerModel):
-    """Another aircraft that the vehicle hears of, where it is at the moment of its state."""
-
-    address: int
-    """24-bit ICAO address."""
-    callsign: str
-    position: tuple[float, float, float | None]
-    """Metres east, north and up of home; `up` is null where its height is not known."""
-    velocity: tuple[float, float, float]
-    """m/s east, north and up; zeros where it is not known."""
-    age: float
-    """Seconds since it was last heard."""
-
-    @classmethod
-    def of(cls, aircraft: Traffic) -> TrafficOut:
-        """Convert one of a vehicle's state."""
-        east, north, up = map(float, aircraft.position)
-        eastward, northward, upward = map(float, aircraft.velocity)
-        return cls(
-            address=aircraft.address,
-            callsign=aircraft.callsign,
-            position=(east, north, _known(up)),
-            velocity=(eastward, northward, upward),
-            age=aircraft.age,
-        )
-
-
-class StatusOut(AnswerModel):
-    """Status of mission and vehicle at one time; unknown values are null."""
-
-    time: float
-    """Mission time, seconds."""
-    state: str
-    """One of the 13 states of `MissionState`."""
-    reason: str
-    target: str | None
-    """Waypoint being flown to or hovered at."""
-    pending: list[str]
-    visited: list[str]
-    """Waypoints reached last, in order; at most 64."""
-    given_up: list[str]
-    """Waypoints refused last; at most 64."""
-    waypoints_visited: int
-    waypoints_known: int
-    """Waypoints visited or ahead; one visited twice counts once."""
-    distance: float
-    """Metres flown."""
-    faults: list[str]
-    pilot: str = ""
-    """Who flies it by hand now; empty for nobody."""
-    places: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
-    """Waypoints by id, metres east, north and up of home: those ahead, and those known before."""
-    mode: str | None = None
-    """One of `VehicleMode`: what the vehicle itself says that it does."""
-    measured: float | None = None
-    """Mission time of position, velocity and attitude, seconds."""
-    position: list[float | None] | None = None
-    """Metres east, north and up of home."""
-    velocity: list[float | None] | None = None
-    """m/s east, north and up."""
-    yaw: float | None = None
-    """Radians counter-clockwise from east."""
-    roll: float | None = None
-    """Radians, positive with the right side down."""
-    pitch: float | None = None
-    """Radians, positive with the nose down."""
-    battery: float | None = None
-    """Charge left, 0 to 1."""
-    outlook: BatteryOutlook | None = None
-    """How far the battery lasts; null while that is not known, or of no meaning."""
-    latitude: float | None = None
-    longitude: float | None = None
-    altitude: float | None = None
-    position_sigma: float | None = None
-    """Metres, one standard deviation of latitude and longitude; null if unknown."""
-    satellites: int | None = None
-    """Satellites behind the global position; null if unknown."""
-    traffic: list[TrafficOut] = Field(default_factory=list)
-    """Other aircraft, the nearest first."""
-
-    @classmethod
-    def of(cls, status: MissionStatus, vehicle: VehicleState | None) -> StatusOut:
-        """Convert the status, and the vehicle's state if there is one."""
-        mission = cls(
-            time=seconds(status.stamp),
-            state=status.state.value,
-            reason=status.reason,
-            target=status.target.id if status.target else None,
-            pending=[waypoint.id for waypoint in status.pending],
-            visited=list(status.visited),
-            given_up=list(status.given_up),
-            waypoints_visited=status.waypoint_counts[0],
-            waypoints_known=status.waypoint_counts[1],
-            distance=status.distance,
-            faults=list(status.faults),
-            pilot=status.pilot,
-            outlook=_outlook(status),
-            places={one.id: (one.x, one.y, one.z) for one in _ahead(status)},
-        )
-        if vehicle is None:
-            return mission
-        odometry, fix = vehicle.odometry, vehicle.gps
-        return mission.model_copy(
-            update={
-                "mode": vehicle.mode.value,
-                "measured": seconds(vehicle.stamp),
-                "position": [_known(float(axis)) for axis in odometry.position],
-                "velocity": [_known(float(axis)) for axis in odometry.velocity],
-                "yaw": _known(odometry.yaw),
-                "roll": _known(odometry.roll),
-                "pitch": _known(odometry.pitch),
-                "battery": _known(vehicle.battery.fraction),
-                "latitude": _known(fix.latitude) if fix else None,
-                "longitude": _known(fix.longitude) if fix else None,
-                "altitude": _known(fix.altitude) if fix else None,
-                "position_sigma": (_known(fix.horizontal_sigma) or None) if fix else None,
-                "satellites": (fix.satellites or None) if fix else None,
-                "traffic": [TrafficOut.of(one) for one in vehicle.traffic],
-            }
-        )
-
-
-def _outlook(status: MissionStatus) -> BatteryOutlook | None:
-    """The outlook, where all of it is known."""
-    outlook = status.outlook
-    known = outlook is not None and math.isfinite(outlook.plan + outlook.hover)
-    return outlook if known else None
-
-
-def _ahead(status: MissionStatus) -> tuple[Waypoint, ...]:
-    """The target and what comes after it."""
-    return (status.target, *status.pending) if status.target else status.pending
-
-
-def _known(value: float) -> float | None:
-    """Replace a value that is not finite by None, because JSON has no NaN."""
-    return value if math.isfinite(value) else None
-
-
 class RobotOut(AnswerModel):
     """One drone of the fleet."""
 
@@ -339,8 +195,8 @@ class RobotOut(AnswerModel):
     shared: list[str] = Field(default_factory=list)
     """Cameras of that mission that one's own tenant may attach a mission to, by full id."""
     battery: float | None = None
-    position: tuple[float, float, float] | None = None
-    """Metres east, north and up of home, where it was last heard of."""
+    position: Place | None = None
+    """Where it was last heard of."""
     heard: float | None = None
     """Moment of battery and position."""
     enabled: bool = True
@@ -504,8 +360,10 @@ class MissionOut(AnswerModel):
     started: float | None = None
     ended: float | None = None
     verdict: VerdictOut | None = None
-    status: dict[str, StatusOut] = Field(default_factory=dict)
+    status: dict[str, RobotStatus] = Field(default_factory=dict)
     """Newest status by robot, while it flies and afterwards."""
+    places: dict[str, dict[str, Place]] = Field(default_factory=dict)
+    """Places of the waypoints that lie behind each robot, by id; those known last."""
     told: dict[str, float] = Field(default_factory=dict)
     """Unix seconds when that status came, by robot, while it flies: once nothing comes any more,
     what is told here is as old as that."""

@@ -21,7 +21,7 @@ from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 from aerodaas.messages.json_types import Int64
-from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.mission import Decision, MissionPlan, MissionStatus, SetpointRecord
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
@@ -48,7 +48,6 @@ __all__ = [
     "ItemRecord",
     "Labels",
     "Latency",
-    "MissionPlan",
     "NavigationRecord",
     "channel_of",
     "json_entry",
@@ -114,17 +113,6 @@ class ItemRecord:
     """Name of the class."""
     value: Any
     """What it consists of, in JSON's types."""
-
-
-@fast_pickle
-@dataclass(frozen=True, slots=True)
-class MissionPlan:
-    """The waypoints ahead of a robot, local ENU."""
-
-    stamp: Int64
-    """Mission clock, nanoseconds."""
-    waypoints: tuple[Waypoint, ...]
-    """The present target first."""
 
 
 @fast_pickle
@@ -319,7 +307,10 @@ def _schema(name: str, labels: tuple[str, ...]) -> Schema:
     properties: dict[str, Any] = {label: {} for label in labels}
     for field, part in known["properties"].items():
         if channel.elsewhere.get(field) is not True:
-            meant = definitions[part["$ref"].rpartition("/")[2]] if "$ref" in part else part
+            # Of a field that may be null, the other type.
+            known_as = part.get("anyOf", [part])[0]
+            reference = known_as.get("$ref", "").rpartition("/")[2]
+            meant = definitions[reference] if reference else known_as
             properties[field] = {"type": meant["type"]} if "type" in meant else {}
     body = {"type": "object", "properties": properties}
     return Schema(name=f"aerodaas.{name}", encoding="jsonschema", data=json.dumps(body).encode())

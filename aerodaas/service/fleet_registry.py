@@ -6,14 +6,14 @@ import contextlib
 import math
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import LinkState, StatusOut
+from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.monitor.reports import VehicleReport
 from aerodaas.service.store import RobotState, Store
@@ -30,7 +30,7 @@ _CHARGE, _METRES = 0.01, 1.0
 _HOME = (0.0, 0.0, 0.0)
 _SILENT_SECONDS = 5.0
 """Seconds without a new status of a mission that goes on, after which its drone counts as lost."""
-_OVER = {MissionState.LANDED.value, MissionState.ABORTED.value}
+_OVER = {MissionState.LANDED, MissionState.ABORTED}
 _DROPOUT_SECONDS = 3.0
 """Seconds for which a link may be lost before its drone counts as out of reach."""
 
@@ -46,8 +46,8 @@ class FleetRegistry:
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
         self._reports = {robot.id: VehicleReport() for robot in config.robots}
-        self._told: dict[str, tuple[float, float, float]] = {}
-        """Mission time of each robot's newest status; when it came, as Unix time and by
+        self._told: dict[str, tuple[int, float, float]] = {}
+        """Mission clock of each robot's newest status; when it came, as Unix time and by
         `time.monotonic`."""
         self._lost_at: dict[str, float] = {}
         """Since when each robot's link is lost, by `time.monotonic`."""
@@ -78,7 +78,7 @@ class FleetRegistry:
 
     def record_status(
         self,
-        status: Mapping[str, StatusOut],
+        status: Mapping[str, RobotStatus],
         *,
         ended: float | None = None,
     ) -> None:
@@ -95,11 +95,12 @@ class FleetRegistry:
             if name not in self._reports:
                 continue
             now = time.monotonic()
-            if self._told.get(name, (None,))[0] != one.time or ended is not None:
-                self._told[name] = one.time, time.time() if ended is None else ended, now
+            mission, mode = one.mission, "" if one.vehicle is None else one.vehicle.mode
+            if self._told.get(name, (None,))[0] != mission.stamp or ended is not None:
+                self._told[name] = mission.stamp, time.time() if ended is None else ended, now
             _, told, came = self._told[name]
-            silent = now - came > _SILENT_SECONDS and one.state not in _OVER
-            lost = silent or one.mode == VehicleMode.LOST.value
+            silent = now - came > _SILENT_SECONDS and mission.state not in _OVER
+            lost = silent or mode == VehicleMode.LOST
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.report(name)
             faults = (f"its mission has told nothing since {_moment(told)}",)
@@ -107,10 +108,10 @@ class FleetRegistry:
                 link=link,
                 since=before.since if before.link is link else told,
                 heard=before.heard if lost else told,
-                battery=one.battery,
-                position=_known(one.position),
-                mode=one.mode or "",
-                faults=faults if silent else tuple(one.faults),
+                battery=one.charge,
+                position=one.place,
+                mode=mode,
+                faults=faults if silent else mission.faults,
             )
             least = _WRITE_SECONDS if ended is None else 0.0
             self._record(name, report, heard=report.heard, least=least)
@@ -239,9 +240,3 @@ class FleetRegistry:
 
 def _moment(unix: float) -> str:
     return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(unix))
-
-
-def _known(position: Sequence[float | None] | None) -> tuple[float, float, float] | None:
-    """A place all of whose axes are known; None for any other."""
-    axes = [axis for axis in position or () if axis is not None]
-    return (axes[0], axes[1], axes[2]) if len(axes) == len(_HOME) else None

@@ -325,6 +325,7 @@ def shown(active: ActiveMission) -> MissionOut:
         ended=row.ended,
         verdict=verdict,
         status={} if newest is None else newest.status,
+        places={} if newest is None else newest.places,
         told={} if flying is None else flying.told,
         alerts=[] if newest is None else newest.alerts,
         streams={} if flying is None else flying.streams,

@@ -15,7 +15,7 @@ from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, MissionError
-from aerodaas.messages.mission import MissionState
+from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.preflight import PreflightOut
@@ -29,7 +29,6 @@ from aerodaas.protocol.schemas import (
     PictureForm,
     Role,
     Scope,
-    StatusOut,
 )
 from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.attachments import Attachments
@@ -718,7 +717,7 @@ def _is_user(principal: Principal, mission: MissionOut) -> bool:
     return mission.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
 
 
-def _may_fly(last: StatusOut) -> bool:
+def _may_fly(last: RobotStatus) -> bool:
     """Whether a drone whose mission has ended is not known to stand on the ground."""
-    down = last.mode in {None, VehicleMode.GROUNDED.value}
-    return not down and last.state != MissionState.LANDED.value
+    down = last.vehicle is None or last.vehicle.mode is VehicleMode.GROUNDED
+    return not down and last.mission.state is not MissionState.LANDED

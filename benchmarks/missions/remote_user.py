@@ -24,7 +24,7 @@ def main(url: str, places: list[list[float]]) -> None:
     given_up = time.monotonic() + _PATIENCE
     while time.monotonic() < given_up:
         try:
-            if len(client.status()["visited"]) >= _ENOUGH:
+            if len(client.status().mission.visited) >= _ENOUGH:
                 break
         except AeroDaaSError:
             time.sleep(0.2)  # not there yet

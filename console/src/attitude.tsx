@@ -1,18 +1,19 @@
 // The artificial horizon: roll and pitch as a pilot sees them, with the heading.
 
 import { bearingOf } from "./words";
-import type { StatusOut } from "./wire";
+import type { RobotStatus } from "./wire";
 
 /** Pixels of a degree of pitch; a drone pitches more than 30° in no ordinary flight. */
 const DEGREE = 0.9;
 const LADDER = [-20, -10, 10, 20];
 
 /** Nothing without an attitude. */
-export function Attitude({ status }: { status: StatusOut }) {
-  if (status.roll == null || status.pitch == null || status.yaw == null) return null;
+export function Attitude({ vehicle }: Pick<RobotStatus, "vehicle">) {
+  const { roll: side, pitch, yaw } = vehicle?.odometry ?? {};
+  if (side == null || pitch == null || yaw == null) return null;
   // Pitch is positive with the nose down, roll with the right side down, yaw counter-clockwise from east.
-  const [roll, down] = [degrees(status.roll), degrees(status.pitch)];
-  const side = (value: number, positive: string, negative: string) =>
+  const [roll, down] = [degrees(side), degrees(pitch)];
+  const words = (value: number, positive: string, negative: string) =>
     `${Math.abs(value).toFixed(0)}° ${value < 0 ? negative : positive}`;
   return (
     <div class="attitude" data-testid="attitude">
@@ -34,11 +35,11 @@ export function Attitude({ status }: { status: StatusOut }) {
       </svg>
       <dl>
         <dt>Heading</dt>
-        <dd>{bearingOf(Math.cos(status.yaw), Math.sin(status.yaw))}</dd>
+        <dd>{bearingOf(Math.cos(yaw), Math.sin(yaw))}</dd>
         <dt>Roll</dt>
-        <dd>{side(roll, "right", "left")}</dd>
+        <dd>{words(roll, "right", "left")}</dd>
         <dt>Pitch</dt>
-        <dd>{side(down, "down", "up")}</dd>
+        <dd>{words(down, "down", "up")}</dd>
       </dl>
     </div>
   );

@@ -4,7 +4,19 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import "./commands.css";
 import { NewestAlert } from "./alerts";
-import { COMMANDS, type Flight, type Order, type Stage, type Word, isEnding, speedOf, stageOf, toneOf } from "./flight";
+import {
+  COMMANDS,
+  type Flight,
+  type Order,
+  type Stage,
+  type Word,
+  chargeOf,
+  heightOf,
+  isEnding,
+  speedOf,
+  stageOf,
+  toneOf,
+} from "./flight";
 import { Badge, Button, Card, useEscape } from "./widgets";
 import { wordsOf } from "./words";
 
@@ -91,27 +103,27 @@ export function Bar(props: { label: string; flight: Flight; now: ComponentChildr
 /** The bar of one drone. */
 export function FlightBar({ flight, robot, mayFly }: { flight: Flight; robot: string; mayFly: boolean }) {
   const status = flight.status(robot);
-  const height = status?.position?.[2];
+  const [height, charge] = [heightOf(status), chargeOf(status)];
   const figures = status && [
     height == null ? "" : `${height.toFixed(1)} m`,
     `${speedOf(status)?.toFixed(1) ?? "—"} m/s`,
-    status.battery === null ? "" : `${(100 * status.battery).toFixed(0)} %`,
+    charge === null ? "" : `${(100 * charge).toFixed(0)} %`,
   ];
   const now = (
     <>
       <strong>{robot}</strong>
       {status ? (
         <>
-          <Badge tone={toneOf(status)}>{wordsOf(status.state)}</Badge>
+          <Badge tone={toneOf(status)}>{wordsOf(status.mission.state)}</Badge>
           <span class="figures">{figures?.filter(Boolean).join(" · ")}</span>
-          <span class="why" title={status.reason}>{status.reason}</span>
+          <span class="why" title={status.mission.reason}>{status.mission.reason}</span>
         </>
       ) : (
         <span class="muted">no state yet</span>
       )}
     </>
   );
-  const paused = status?.state === "paused";
+  const paused = status?.mission.state === "paused";
   const ends = status !== undefined && isEnding(status);
   const useless = { pause: paused || ends, resume: !paused, clear: ends, "return-home": false, land: false };
   return (

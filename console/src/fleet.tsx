@@ -7,7 +7,7 @@ import "./fleet.css";
 import { Alerts } from "./alerts";
 import { Camera } from "./camera";
 import { Bar, CommandButtons, CommandLog } from "./commands";
-import { type Flight, type Vehicle, aheadOf, concerns, isEnding, useFlight } from "./flight";
+import { type Flight, type Vehicle, aheadOf, chargeOf, concerns, idsOf, isEnding, useFlight } from "./flight";
 import { FlightMap } from "./map";
 import { Page, Silence } from "./page";
 import { type LeasedArea, robotsOf } from "./place";
@@ -125,7 +125,7 @@ function mayCommand({ role, scopes, tenant }: AccountOut, { mission, status }: R
 }
 
 function stateOf({ robot, status, mission }: Row): string {
-  if (status) return wordsOf(status.state);
+  if (status) return wordsOf(status.mission.state);
   if (mission) return "starting";
   if (!robot.enabled) return "out of service";
   if (robot.link === "lost") return "lost";
@@ -135,9 +135,9 @@ function stateOf({ robot, status, mission }: Row): string {
 /** What a drone does next. */
 function nextOf({ robot, status, waiting }: Row): string {
   if (status) {
-    if (isEnding(status)) return status.state === "returning" ? "lands at home" : "";
-    if (status.pilot) return `flown by hand by ${status.pilot}`;
-    const [first, ...more] = aheadOf(status);
+    if (isEnding(status)) return status.mission.state === "returning" ? "lands at home" : "";
+    if (status.mission.pilot) return `flown by hand by ${status.mission.pilot}`;
+    const [first, ...more] = idsOf(aheadOf(status));
     if (first === undefined) return "no waypoint ahead";
     return `${first}${more.length > 0 ? `, then ${more.length} more` : ""}`;
   }
@@ -215,7 +215,7 @@ function cellsOf(
   onMission: (id: string) => void,
 ): Record<(typeof COLUMNS)[number], [content: ComponentChildren, kind?: string]> {
   const { robot, mission, status } = row;
-  const charge = status?.battery ?? robot.battery;
+  const charge = chargeOf(status) ?? robot.battery;
   const open = mission && (
     <Button class="plain" onClick={() => onMission(mission.id)}>{mission.name}</Button>
   );
@@ -234,7 +234,7 @@ function cellsOf(
 function Chosen(props: { flight: Flight; account: AccountOut; row: Row; onMission(id: string): void }) {
   const { flight, account, row, onMission } = props;
   const { robot, mission, status } = row;
-  const reasons = [status?.reason ?? "", ...robot.faults, robot.objection].filter(Boolean);
+  const reasons = [status?.mission.reason ?? "", ...robot.faults, robot.objection].filter(Boolean);
   const head = (
     <>
       <State row={row} />

@@ -15,7 +15,8 @@ import type {
   NavigationIn,
   RearrangeIn,
   RobotOut,
-  StatusOut,
+  RobotStatus,
+  Waypoint,
 } from "./wire";
 
 const TRAIL = 3000;
@@ -32,6 +33,7 @@ const CONFIRMING = 30000;
 /** Milliseconds after which a command counts as one without an answer. */
 const ANSWER = 20000;
 const MOST_ORDERS = 20;
+const UNKNOWN = { x: null, y: null, z: null };
 /** States of a drone that is not in the air. */
 export const GROUNDED = new Set(["idle", "preflight", "landed", "aborted"]);
 /** States in which no waypoint is flown to any more. */
@@ -41,7 +43,7 @@ const OVER = new Set<MissionOut["phase"]>(["landed", "failed", "cancelled", "ref
 export type Word = CommandIn["command"];
 
 /** What the buttons call the commands, and whether a drone was seen to obey. */
-export const COMMANDS: Record<Word, { name: string; obeyed(status: StatusOut): boolean }> = {
+export const COMMANDS: Record<Word, { name: string; obeyed(mission: RobotStatus["mission"]): boolean }> = {
   pause: { name: "Hold", obeyed: ({ state }) => state === "paused" },
   resume: { name: "Resume", obeyed: ({ state }) => state !== "paused" },
   "return-home": { name: "Return", obeyed: ({ state }) => ENDING.has(state) && state !== "aborted" },
@@ -67,7 +69,7 @@ export interface Order {
   at: number;
   drones: { robot: string; stage: Stage; text: string; seconds: number | null }[];
   /** What was seen of the drone by which it obeyed; null before. */
-  seen(status: StatusOut): string | null;
+  seen(status: RobotStatus): string | null;
 }
 
 /** The stage of the drone that is least far. */
@@ -88,11 +90,16 @@ export class ClockOffset {
   }
 }
 
+/** Places of waypoints by id. */
+export type Places = Record<string, Spot>;
+
 /** A drone as the map draws it. */
 export interface Vehicle {
   id: string;
   /** What its mission says; undefined between missions. */
-  status: StatusOut | undefined;
+  status: RobotStatus | undefined;
+  /** Waypoints that lie behind it. */
+  behind: Places;
   position: Spot | null;
   trail: Spot[];
   stale: boolean;
@@ -160,10 +167,10 @@ export class Flight {
 
   /** Mission seconds of what is shown. */
   get now(): number {
-    return Math.max(...this.statuses.map((status) => status.time), 0);
+    return Math.max(...this.statuses.map(timeOf), 0);
   }
 
-  get statuses(): StatusOut[] {
+  get statuses(): RobotStatus[] {
     return this.vehicles().flatMap(({ status }) => status ?? []);
   }
 
@@ -173,7 +180,7 @@ export class Flight {
     return this.missions.find((one) => one.phase === "flying" && concerns(one, robot));
   }
 
-  status(robot: string): StatusOut | undefined {
+  status(robot: string): RobotStatus | undefined {
     return this.missionOf(robot)?.status[robot];
   }
 
@@ -199,14 +206,15 @@ export class Flight {
     const position = status ? spotOf(status) : parked;
     const silent = this.source.kind === "fleet" && (this.age(id) ?? 0) > STALE_DRONE;
     const stale = this.stale || (status !== undefined && silent);
-    return { id, status, position, trail: this.trails.get(id) ?? [], stale, tone };
+    const behind = this.missionOf(id)?.places[id] ?? {};
+    return { id, status, behind, position, trail: this.trails.get(id) ?? [], stale, tone };
   }
 
   command(robots: string[], command: Word): void {
     const { name, obeyed } = COMMANDS[command];
     const what = this.source.kind === "fleet" ? `${name} ${robots.join(", ")}` : name;
-    this.order(robots, what, "commands", (robot): CommandIn => ({ robot, command }), (status) =>
-      obeyed(status) ? wordsOf(status.state) : null,
+    this.order(robots, what, "commands", (robot): CommandIn => ({ robot, command }), ({ mission }) =>
+      obeyed(mission) ? wordsOf(mission.state) : null,
     );
   }
 
@@ -287,19 +295,18 @@ export class Flight {
 
   /** The drones in the air. */
   flying(): Vehicle[] {
-    return this.vehicles().filter(({ status }) => !GROUNDED.has(status?.state ?? "idle"));
+    return this.vehicles().filter(({ status }) => !GROUNDED.has(status?.mission.state ?? "idle"));
   }
 
-  private extend(robot: string, status: StatusOut, position: Spot | null, trail: Spot[]): void {
+  private extend(robot: string, status: RobotStatus, position: Spot | null, trail: Spot[]): void {
     if (position && isStep(trail.at(-1), position)) {
       trail.push(position);
       this.trails.set(robot, trail.length > TRAIL ? trail.filter((_, n) => n % 2 === 0) : trail);
     }
     const samples = this.history.get(robot) ?? [];
     const newest = samples.at(-1);
-    if (newest && status.time <= newest.time + 0.1) return;
-    const { time, battery } = status;
-    const sample = { time, height: position?.[2] ?? null, speed: speedOf(status), battery };
+    const sample = sampleOf(status);
+    if (newest && sample.time <= newest.time + 0.1) return;
     this.history.set(robot, [...samples, sample].slice(-HISTORY));
   }
 
@@ -342,10 +349,35 @@ export function concerns({ attach, robots }: MissionOut, robot: string): boolean
   return attach === null && robots.includes(robot);
 }
 
+/** Mission seconds of a message. */
+export function secondsOf({ stamp }: { stamp: number }): number {
+  return stamp / 1e9;
+}
+
+/** Mission seconds of a status. */
+export function timeOf({ mission }: RobotStatus): number {
+  return secondsOf(mission);
+}
+
 /** Where a drone is; null while that is not known. */
-export function spotOf({ position }: Pick<StatusOut, "position">): Spot | null {
-  const [east, north, up] = position ?? [];
-  return east == null || north == null ? null : [east, north, up ?? 0];
+export function spotOf({ vehicle }: Pick<RobotStatus, "vehicle">): Spot | null {
+  if (!vehicle) return null;
+  const { x, y, z } = vehicle.odometry.position;
+  return x === null || y === null ? null : [x, y, z ?? 0];
+}
+
+export function heightOf(status: Pick<RobotStatus, "vehicle"> | undefined): number | null {
+  return status?.vehicle?.odometry.position.z ?? null;
+}
+
+/** Charge left, 0 to 1. */
+export function chargeOf(status: Pick<RobotStatus, "vehicle"> | undefined): number | null {
+  return status?.vehicle?.battery.fraction ?? null;
+}
+
+/** What the charts draw of a status. */
+function sampleOf(status: RobotStatus): Sample {
+  return { time: timeOf(status), height: heightOf(status), speed: speedOf(status), battery: chargeOf(status) };
 }
 
 /** Whether a place is far enough from the last one of a trail to be added. */
@@ -354,24 +386,41 @@ export function isStep(last: Spot | undefined, [east, north, up]: Spot): boolean
 }
 
 /** Whether a drone goes home, lands or has landed: its plan is over, whatever is left of it. */
-export function isEnding({ state }: StatusOut): boolean {
-  return ENDING.has(state);
+export function isEnding({ mission }: RobotStatus): boolean {
+  return ENDING.has(mission.state);
 }
 
 /** Waypoints that lie ahead, the one being flown to first. */
-export function aheadOf(status: StatusOut): string[] {
+export function aheadOf(status: RobotStatus): Waypoint[] {
   if (isEnding(status)) return [];
-  return status.target === null ? status.pending : [status.target, ...status.pending];
+  const { target, pending } = status.mission;
+  return target === null ? pending : [target, ...pending];
 }
 
-export function speedOf({ velocity }: Pick<StatusOut, "velocity">): number | null {
-  const [east, north, up] = velocity ?? [];
-  return east == null || north == null || up == null ? null : Math.hypot(east, north, up);
+export function placeOf({ x, y, z }: Waypoint): Spot {
+  return [x, y, z];
+}
+
+/** Places of a drone's waypoints by id: those behind it, and those ahead. */
+export function placesOf({ status, behind }: Pick<Vehicle, "status" | "behind">): Places {
+  const { target = null, pending = [] } = status?.mission ?? {};
+  const ahead = target === null ? pending : [target, ...pending];
+  return { ...behind, ...Object.fromEntries(ahead.map((one) => [one.id, placeOf(one)])) };
+}
+
+export function idsOf(waypoints: Waypoint[]): string[] {
+  return waypoints.map(({ id }) => id);
+}
+
+export function speedOf({ vehicle }: Pick<RobotStatus, "vehicle">): number | null {
+  const { x, y, z } = vehicle?.odometry.velocity ?? UNKNOWN;
+  return x === null || y === null || z === null ? null : Math.hypot(x, y, z);
 }
 
 /** Class of a state's colour. */
-export function toneOf(status: StatusOut | undefined): string {
+export function toneOf(status: RobotStatus | undefined): string {
   if (!status) return "muted";
-  if (status.state === "aborted" || status.mode === "lost") return "bad";
-  return ["paused", "returning", "diverted"].includes(status.state) ? "warn" : "good";
+  const { state } = status.mission;
+  if (state === "aborted" || status.vehicle?.mode === "lost") return "bad";
+  return ["paused", "returning", "diverted"].includes(state) ? "warn" : "good";
 }

@@ -7,7 +7,7 @@ import { Alerts } from "./alerts";
 import { Camera } from "./camera";
 import { AnalyticsCharts, Charts } from "./charts";
 import { CommandLog, FlightBar } from "./commands";
-import { type Flight, GROUNDED, useFlight } from "./flight";
+import { type Flight, GROUNDED, heightOf, useFlight } from "./flight";
 import { ManualControlPanel } from "./manual_control_panel";
 import { FlightMap } from "./map";
 import { Page, Silence } from "./page";
@@ -58,7 +58,7 @@ export function FlightPage(props: FlightPageProps) {
   const robots = robotsOf(recorded ?? props.fleet);
   const config = robots.find((one) => one.id === robot);
   const scenery = useScenery(`v1/missions/${first.id}/scenery`, recorded?.scenery);
-  const up = flight?.status(robot)?.position?.[2] ?? 0;
+  const up = heightOf(flight?.status(robot)) ?? 0;
   const height = up > 0.5 ? up : (config?.limits.takeoff_height ?? 2);
   const { survey, begin } = useSurvey(flight, robot, height, config);
   if (!flight) return null;
@@ -139,7 +139,7 @@ export function FlightPage(props: FlightPageProps) {
             <PreflightPanel
               robot={robot}
               live={!flight.over}
-              open={GROUNDED.has(flight.status(robot)?.state ?? "idle")}
+              open={GROUNDED.has(flight.status(robot)?.mission.state ?? "idle")}
             />
           )}
           <Plan key={`plan ${robot}`} {...{ flight, robot, mayFly }} />

@@ -60,7 +60,7 @@ export class GroundMarks {
     const tracked = young.filter((one) => one.what.track_id !== null);
     return young
       .filter((one) => one.what.track_id !== null || !tracked.some((other) => same(one, other)))
-      .sort((one, other) => one.what.score - other.what.score)
+      .sort((one, other) => (one.what.score ?? 0) - (other.what.score ?? 0))
       .slice(-MOST);
   }
 }

@@ -1,9 +1,10 @@
 // The lanes of a timeline: one recorded drone's states, decisions, waypoints visited and alerts.
 
 import { useMemo } from "preact/hooks";
+import { secondsOf } from "./flight";
 import { lastBefore } from "./playback";
 import { clock, wordsOf } from "./words";
-import type { AnalyticsOut, RecordedOut, StatusOut } from "./wire";
+import type { AnalyticsOut, MissionStatus, RecordedOut } from "./wire";
 
 const BINS = 120;
 /** Share of the timeline below which a band is not drawn by itself. */
@@ -81,8 +82,8 @@ export function Lanes({ drone, begin, end, now, ticks }: LanesProps) {
         </svg>
       ))}
       {flight.alerts.map((alert, place) => (
-        <svg key={place} x={share(alert.time)} y="40" class="alert">
-          <title>{`${alert.time.toFixed(1)} s ${alert.kind}: ${alert.text}`}</title>
+        <svg key={place} x={share(secondsOf(alert.header))} y="40" class="alert">
+          <title>{`${secondsOf(alert.header).toFixed(1)} s ${alert.kind}: ${alert.text}`}</title>
           <path d="M0 0l5 9h-10z" />
         </svg>
       ))}
@@ -102,47 +103,47 @@ export function eventsOf(drone: RecordedDrone): number[] {
   return [
     ...bandsOf(statuses, drone.flight).map((one) => one.begin),
     ...visitsOf(statuses).map((one) => one.time),
-    ...drone.flight.alerts.map((one) => one.time),
+    ...drone.flight.alerts.map((one) => secondsOf(one.header)),
   ];
 }
 
 /** The state at a moment, in words; empty before the first one. */
 export function stateAt(drone: RecordedDrone, time: number): string {
   const statuses = statusesOf(drone);
-  const status = statuses[lastBefore(statuses, time, (one) => one.time)];
+  const status = statuses[lastBefore(statuses, time, secondsOf)];
   return status ? wordsOf(status.state) : "";
 }
 
-const NONE: StatusOut[] = [];
+const NONE: MissionStatus[] = [];
 
-function statusesOf({ flight, robot }: RecordedDrone): StatusOut[] {
+function statusesOf({ flight, robot }: RecordedDrone): MissionStatus[] {
   return flight.tracks[robot]?.statuses ?? NONE;
 }
 
-function bandsOf(statuses: StatusOut[], flight: RecordedOut): Band[] {
+function bandsOf(statuses: MissionStatus[], flight: RecordedOut): Band[] {
   const bands: Band[] = [];
   const least = NARROW * (flight.end - flight.begin);
   for (const one of statuses) {
-    const last = bands.at(-1);
+    const [last, time] = [bands.at(-1), secondsOf(one)];
     if (last?.state === one.state) continue;
-    if (last && one.time - last.begin < least) {
+    if (last && time - last.begin < least) {
       // What is too short to be seen gives way to what follows.
       last.state = one.state;
       continue;
     }
-    if (last) last.end = one.time;
-    bands.push({ state: one.state, begin: one.time, end: flight.end });
+    if (last) last.end = time;
+    bands.push({ state: one.state, begin: time, end: flight.end });
   }
   return bands;
 }
 
-function visitsOf(statuses: StatusOut[]): { id: string; time: number }[] {
+function visitsOf(statuses: MissionStatus[]): { id: string; time: number }[] {
   const visits: { id: string; time: number }[] = [];
   let before = 0;
   for (const one of statuses) {
-    const fresh = Math.min(one.waypoints_visited - before, one.visited.length);
-    if (fresh > 0) for (const id of one.visited.slice(-fresh)) visits.push({ id, time: one.time });
-    before = Math.max(before, one.waypoints_visited);
+    const fresh = Math.min(one.visits - before, one.visited.length);
+    if (fresh > 0) for (const id of one.visited.slice(-fresh)) visits.push({ id, time: secondsOf(one) });
+    before = Math.max(before, one.visits);
   }
   return visits;
 }

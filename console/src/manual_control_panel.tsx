@@ -39,7 +39,7 @@ export function ManualControlPanel(props: {
   const status = flight.status(robot);
   const holds = control !== null && !control.over;
   useEscape(holds ? () => control.release("let go") : null);
-  const others = !holds && status?.pilot ? status.pilot : "";
+  const others = !holds && status?.mission.pilot ? status.mission.pilot : "";
   const takeOver = () => {
     const climb = limits?.max_climb ?? 1.5;
     const speeds = () => {
@@ -131,7 +131,7 @@ export function ManualControlPanel(props: {
       ) : (
         <Button
           class="take"
-          disabled={!mayFly || flight.over || others !== "" || !IN_THE_AIR.has(status?.state ?? "")}
+          disabled={!mayFly || flight.over || others !== "" || !IN_THE_AIR.has(status?.mission.state ?? "")}
           onClick={takeOver}
         >
           Take over

@@ -2,7 +2,7 @@
 
 import type { ComponentChildren, RefObject } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { Flight } from "./flight";
+import { type Flight, placesOf, timeOf } from "./flight";
 import { MarkLayer, nameOf } from "./ground";
 import { Coordinates, Drones, Grid, PlaceLayer, Scale } from "./map_layers";
 import type { LeasedArea, Point } from "./place";
@@ -12,7 +12,7 @@ import { Sight, type Size, type View } from "./sight";
 import { type Drawn, SurveyLayer } from "./survey_map";
 import { useArchive } from "./tile_archive";
 import { TileLayer } from "./tiles";
-import { TrafficLayer, headingOf, heightOf, trafficOf } from "./traffic";
+import { TrafficLayer, headingOf, relativeHeight, trafficOf } from "./traffic";
 import { useEscape } from "./widgets";
 import type { RobotConfig, SceneryOut } from "./wire";
 import "./map.css";
@@ -66,7 +66,7 @@ export function FlightMap(props: MapProps) {
   const drawing = pilot?.drawn ?? null;
   const marked = pilot?.marked ?? null;
   const up = focus?.position?.[2] ?? null;
-  const now = fleet ? (focus?.status?.time ?? 0) : flight.now;
+  const now = fleet ? (focus?.status ? timeOf(focus.status) : 0) : flight.now;
   const marks = flight.marks.at(now, flight.recorded);
   const traffic = trafficOf(flight.statuses, focus?.status);
 
@@ -178,7 +178,7 @@ export function FlightMap(props: MapProps) {
         <Listed
           name="aircraft"
           word="aircraft"
-          items={traffic.map((one) => `${one.callsign} ${heightOf(one, up)}, ${headingOf(one)}`)}
+          items={traffic.map((one) => `${one.callsign} ${relativeHeight(one, up)}, ${headingOf(one)}`)}
         />
         <Listed name="leased" word="lease" items={areas.map((one) => one.title)} />
       </ul>
@@ -282,17 +282,17 @@ function useView(box: RefObject<HTMLDivElement | null>, fitted: readonly Point[]
 }
 
 function planKey(flight: Flight): string {
-  return flight.statuses.map((status) => Object.keys(status.places).length).join();
+  return flight.vehicles().map((one) => Object.keys(placesOf(one)).length).join();
 }
 
 /** Home, starts and fences; of a single flight its waypoints, too. */
 function pointsOf(flight: Flight, robots: RobotConfig[]): Point[] {
-  const statuses = flight.source.kind === "fleet" ? [] : flight.statuses;
+  const vehicles = flight.source.kind === "fleet" ? [] : flight.vehicles();
   return [
     [0, 0],
     ...robots.map(({ start }): Point => [start[0], start[1]]),
     ...robots.flatMap(({ limits }) => limits.geofence.polygon),
-    ...statuses.flatMap(({ places }) => Object.values(places).map(([e, n]): Point => [e, n])),
+    ...vehicles.flatMap((one) => Object.values(placesOf(one)).map(([e, n]): Point => [e, n])),
   ];
 }
 

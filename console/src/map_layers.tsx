@@ -1,10 +1,10 @@
 // What the map draws of a place and its drones: fences, plans, drones with their names, and the grid.
 
 import { useMemo } from "preact/hooks";
-import { type Vehicle, aheadOf, spotOf } from "./flight";
+import { type Vehicle, aheadOf, idsOf, placeOf, placesOf, spotOf, type Places } from "./flight";
 import type { LeasedArea, Point, Spot } from "./place";
 import { LETTER, LINE, Labels, type Sight, px } from "./sight";
-import type { RobotConfig, StatusOut } from "./wire";
+import type { RobotConfig, RobotStatus } from "./wire";
 
 /** Most waypoints with their names beside them; a survey has more than can be read. */
 const LABELS = 24;
@@ -55,23 +55,24 @@ function belowTop(polygon: Point[], sight: Sight): { x: string; y: string } {
 }
 
 /** The line from a drone along the waypoints that lie ahead of it. */
-function Way({ status, sight }: { status: StatusOut; sight: Sight }) {
+function Way({ status, sight }: { status: RobotStatus; sight: Sight }) {
   const ahead = aheadOf(status);
-  const way = [spotOf(status), ...ahead.map((id) => status.places[id])].filter((one) => one != null);
+  const way = [spotOf(status), ...ahead.map(placeOf)].filter((one) => one !== null);
   return ahead.length > 0 ? <polyline class="way" points={sight.line(way)} /> : null;
 }
 
-function Plan({ status, sight }: { status: StatusOut; sight: Sight }) {
-  const ahead = aheadOf(status);
-  const known = Object.entries(status.places);
+function Plan({ status, behind, sight }: { status: RobotStatus; behind: Places; sight: Sight }) {
+  const ahead = idsOf(aheadOf(status));
+  const { target, visited: reached } = status.mission;
+  const known = Object.entries(placesOf({ status, behind }));
   return (
     <g>
       <Way status={status} sight={sight} />
       {sight.tilted && known.map(([id, place]) => <Stem key={id} place={place} sight={sight} />)}
       {known.map(([id, [east, north, up]]) => {
         const number = ahead.indexOf(id);
-        const current = id === status.target;
-        const visited = number < 0 && status.visited.includes(id);
+        const current = id === target?.id;
+        const visited = number < 0 && reached.includes(id);
         const kind = current ? "current" : number >= 0 ? "coming" : visited ? "visited" : "dropped";
         return (
           <g
@@ -112,13 +113,13 @@ export function Drones({ vehicles, chosen, plans, sight }: DronesProps) {
   return (
     <>
       {vehicles.map((one) => {
-        const { id, status, trail, tone } = one;
+        const { id, status, behind, trail, tone } = one;
         return (
           <g key={id} class={`robot ${tone}`}>
             <polyline class="trail" points={sight.line(trail)} />
             {status &&
               (plans || id === chosen ? (
-                <Plan status={status} sight={sight} />
+                <Plan status={status} behind={behind} sight={sight} />
               ) : (
                 <Way status={status} sight={sight} />
               ))}
@@ -167,9 +168,9 @@ function Drone({ vehicle, chosen, name, sight }: DroneProps) {
   const { id, status, position, stale } = vehicle;
   if (!position) return null;
   const [east, north, up] = position;
-  const turn = 90 - ((status?.yaw ?? Math.PI / 2) * 180) / Math.PI;
-  const [ve, vn] = status?.velocity ?? [];
-  const unsure = SIGMAS * (status?.position_sigma ?? 0) * sight.view.scale;
+  const turn = 90 - ((status?.vehicle?.odometry.yaw ?? Math.PI / 2) * 180) / Math.PI;
+  const { x: ve, y: vn } = status?.vehicle?.odometry.velocity ?? {};
+  const unsure = SIGMAS * (status?.vehicle?.gps?.horizontal_sigma ?? 0) * sight.view.scale;
   const [text, height] = nameOf(vehicle);
   return (
     <>

@@ -17,6 +17,14 @@ const BONES = [
   ...[[5, 6], [11, 12], [5, 11], [6, 12], [0, 5], [0, 6]],
 ] as const;
 
+type Box = NonNullable<TargetItem["box"]>;
+type Found = Omit<Detection, "box" | "score"> & { box: Box; score: number };
+
+/** Whether a detection's place and score are known. */
+function isKnown(one: Detection): one is Found {
+  return one.score !== null && !one.box.includes(null);
+}
+
 export interface Painted {
   boxes: number;
   /** Points of bodies. */
@@ -39,7 +47,7 @@ export function paint(canvas: HTMLCanvasElement, picture: Picture): Painted {
     pen.drawImage(picture.depth.bitmap, 0, 0, width, height);
     pen.imageSmoothingEnabled = true;
   }
-  const all = once([...picture.found.values()].flat());
+  const all = once([...picture.found.values()].flat().filter(isKnown));
   // Labels lie over all bodies.
   for (const one of all) painted.points += drawBody(pen, one, width);
   for (const one of all) drawBox(pen, one, width);
@@ -49,7 +57,7 @@ export function paint(canvas: HTMLCanvasElement, picture: Picture): Painted {
 }
 
 /** Without the nameless boxes that a tracker has, too. */
-function once(found: Detection[]): Detection[] {
+function once(found: Found[]): Found[] {
   const tracked = found.filter((one) => one.track_id !== null);
   return found.filter(
     (one) =>
@@ -57,7 +65,7 @@ function once(found: Detection[]): Detection[] {
   );
 }
 
-function same(one: Detection, other: Detection): boolean {
+function same(one: Found, other: Found): boolean {
   const close = one.box.every((edge, side) => Math.abs(edge - (other.box[side] ?? 0)) < SAME);
   return close && one.label === other.label;
 }
@@ -73,7 +81,7 @@ const MARKS: Record<TargetItem["state"], string> = {
 function drawTarget(
   pen: CanvasRenderingContext2D,
   { state }: TargetItem,
-  box: Detection["box"],
+  box: Box,
   width: number,
   height: number,
 ): void {
@@ -114,7 +122,7 @@ export function colourOf(one: Detection): string {
   return COLOURS[(one.track_id ?? one.label.length) % COLOURS.length] ?? "#ffb000";
 }
 
-function drawBox(pen: CanvasRenderingContext2D, one: Detection, width: number): void {
+function drawBox(pen: CanvasRenderingContext2D, one: Found, width: number): void {
   const size = Math.max(11, Math.round(width / 45));
   pen.font = `600 ${size}px system-ui, sans-serif`;
   pen.lineWidth = Math.max(2, width / 320);
@@ -133,7 +141,7 @@ function drawBox(pen: CanvasRenderingContext2D, one: Detection, width: number): 
 }
 
 /** Draw the keypoints that are seen, and a body's bones between them; returns how many points. */
-function drawBody(pen: CanvasRenderingContext2D, one: Detection, width: number): number {
+function drawBody(pen: CanvasRenderingContext2D, one: Found, width: number): number {
   // A model that does not know a point gives null.
   const points = (one.keypoints ?? []).map(([u, v, sure]) => [u ?? NaN, v ?? NaN, sure ?? 0] as const);
   const seen = points.map(([u, v, sure]) => sure >= VISIBLE && Number.isFinite(u + v));

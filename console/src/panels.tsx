@@ -1,11 +1,11 @@
 // The panels beside the map: a drone's state, and the form of a waypoint.
 
 import { Attitude } from "./attitude";
-import { type Flight, speedOf, toneOf } from "./flight";
+import { type Flight, chargeOf, heightOf, speedOf, timeOf, toneOf } from "./flight";
 import type { Point } from "./place";
 import { Badge, Button, Card, Field, Figure, type FigureProps } from "./widgets";
 import { clock, wordsOf } from "./words";
-import type { StatusOut, Waypoint } from "./wire";
+import type { RobotStatus, Waypoint } from "./wire";
 
 /** Reasons of states for which the mission gives none. */
 const REASONS: Record<string, string> = {
@@ -22,7 +22,8 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
       </Card>
     );
   }
-  const { state, mode, faults, reason } = status;
+  const { state, faults, reason } = status.mission;
+  const mode = status.vehicle?.mode ?? null;
   const link = mode === "lost" ? "lost" : flight.stale ? "stale" : "up";
   const head = (
     <Badge tone={toneOf(status)} testid="state">{wordsOf(state)}</Badge>
@@ -30,14 +31,14 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
   return (
     <Card kind={`state ${flight.stale ? "stale" : ""}`} label="State" title={robot} head={head}>
       <p class="why" data-testid="why">{reason || REASONS[state] || "follows the plan"}</p>
-      <Attitude status={status} />
+      <Attitude vehicle={status.vehicle} />
       <dl>
         {figuresOf(status).map((figure) => (
           <Figure key={figure.name} {...figure} />
         ))}
         <Figure name="Link" value={link} tone={link === "up" ? "good" : "bad"} />
         <Figure name="Mode" value={mode} />
-        {status.satellites != null && <Gps {...status} />}
+        <Gps vehicle={status.vehicle} />
       </dl>
       {faults.length > 0 && (
         <ul class="faults">
@@ -50,15 +51,16 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
   );
 }
 
-function figuresOf(status: StatusOut): FigureProps[] {
-  const { battery, outlook } = status;
-  const percent = (share: number | undefined) => (share === undefined ? null : (100 * share).toFixed(0));
+function figuresOf(status: RobotStatus): FigureProps[] {
+  const { outlook, waypoint_counts: [visited, known] } = status.mission;
+  const battery = chargeOf(status);
+  const percent = (share: number | null) => (share === null ? null : (100 * share).toFixed(0));
   const ahead: FigureProps[] = outlook
     ? [
         {
           name: "Returns at",
           value: percent(outlook.returns_at),
-          unit: `%, in ${clock(outlook.hover)}`,
+          unit: `%, in ${clock(outlook.hover ?? 0)}`,
           title: "Charge at which it returns home from here; how long it can hover until then",
         },
         {
@@ -66,24 +68,28 @@ function figuresOf(status: StatusOut): FigureProps[] {
           value: percent(outlook.plan),
           unit: "%",
           title: "Charge that the rest of the plan, the way home and the reserve for landing need",
-          tone: battery !== null && outlook.plan > battery ? "bad" : "",
+          // Null: more than any battery has.
+          tone: battery !== null && (outlook.plan ?? Infinity) > battery ? "bad" : "",
         },
       ]
     : [];
   return [
-    { name: "Height", value: status.position?.[2]?.toFixed(1), unit: "m" },
+    { name: "Height", value: heightOf(status)?.toFixed(1), unit: "m" },
     { name: "Speed", value: speedOf(status)?.toFixed(1), unit: "m/s" },
-    { name: "Battery", value: percent(battery ?? undefined), unit: "%", bar: battery },
+    { name: "Battery", value: percent(battery), unit: "%", bar: battery },
     ...ahead,
-    { name: "Flown", value: status.distance.toFixed(0), unit: "m" },
-    { name: "Waypoints", value: String(status.waypoints_visited), unit: `of ${status.waypoints_known}` },
-    { name: "Mission time", value: status.time.toFixed(0), unit: "s" },
+    { name: "Flown", value: status.mission.distance?.toFixed(0), unit: "m" },
+    { name: "Waypoints", value: String(visited), unit: `of ${known}` },
+    { name: "Mission time", value: timeOf(status).toFixed(0), unit: "s" },
   ];
 }
 
-function Gps({ satellites, position_sigma: sigma }: StatusOut) {
-  const unit = sigma == null ? "satellites" : `sat., ±${sigma.toFixed(1)} m`;
-  return <Figure name="GPS" unit={unit} value={satellites?.toString()} />;
+/** Zeros stand for what a receiver does not tell. */
+function Gps({ vehicle }: Pick<RobotStatus, "vehicle">) {
+  const { satellites, horizontal_sigma: sigma } = vehicle?.gps ?? {};
+  if (!satellites) return null;
+  const unit = sigma ? `sat., ±${sigma.toFixed(1)} m` : "satellites";
+  return <Figure name="GPS" unit={unit} value={satellites.toString()} />;
 }
 
 export function WaypointForm(props: {
@@ -95,7 +101,8 @@ export function WaypointForm(props: {
   onDone(): void;
 }) {
   const { flight, robot, point, onDone } = props;
-  const time = flight.status(robot)?.time ?? 0;
+  const status = flight.status(robot);
+  const time = status ? timeOf(status) : 0;
   const send = (event: SubmitEvent) => {
     event.preventDefault();
     const given = new FormData(event.currentTarget as HTMLFormElement);
@@ -108,8 +115,8 @@ export function WaypointForm(props: {
       deadline: within ? time + Number(within) : null,
     };
     const what = `${waypoint.id}: ${x.toFixed(1)} E, ${y.toFixed(1)} N`;
-    flight.fly({ robot, waypoints: [waypoint] }, what, ({ visited }) =>
-      visited.includes(waypoint.id) ? "visited" : null,
+    flight.fly({ robot, waypoints: [waypoint] }, what, ({ mission }) =>
+      mission.visited.includes(waypoint.id) ? "visited" : null,
     );
     onDone();
   };

@@ -1,10 +1,10 @@
 // The coming waypoints: dragged or moved by keys into another order, or left out.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { type Flight, aheadOf, isEnding } from "./flight";
+import { type Flight, aheadOf, idsOf, isEnding } from "./flight";
 import { Badge, Button, Card } from "./widgets";
 import { wordsOf } from "./words";
-import type { StatusOut } from "./wire";
+import type { RobotStatus, Waypoint } from "./wire";
 
 /** Milliseconds after the last key before the order is asked for. */
 const PAUSE = 600;
@@ -14,8 +14,8 @@ const PATIENCE = 3000;
 export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) {
   const { flight, robot } = props;
   const status = flight.status(robot);
-  const target = status?.target ?? null;
-  const coming = status?.pending ?? [];
+  const { target = null, pending = [] } = status?.mission ?? {};
+  const coming = idsOf(pending);
   const [draft, setDraft] = useState<string[] | null>(null);
   const [dragged, setDragged] = useState<string | null>(null);
   const list = useRef<HTMLOListElement>(null);
@@ -46,7 +46,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   };
   const remove = (id: string) =>
     flight.rearrange({ robot, remove: [id] }, `leave out ${id}`, (now) =>
-      aheadOf(now).includes(id) ? null : "not in the plan any more",
+      idsOf(aheadOf(now)).includes(id) ? null : "not in the plan any more",
     );
   const placeAt = (y: number) => {
     const rows = [...(list.current?.querySelectorAll("li[data-coming]") ?? [])];
@@ -70,10 +70,10 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   };
 
   const left = coming.length + (target === null ? 0 : 1);
-  const now = target === null ? "" : `, now ${target}`;
+  const now = target === null ? "" : `, now ${target.id}`;
   const head = (
     <Badge testid="to-go">
-      {over ? `${wordsOf(status.state)}: ${left} left out` : `${left} to go${now}`}
+      {over ? `${wordsOf(status.mission.state)}: ${left} left out` : `${left} to go${now}`}
     </Badge>
   );
   return (
@@ -83,10 +83,10 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
       )}
       <ol ref={list} data-testid="plan">
         {target !== null && (
-          <li class={over ? "" : "current"} data-plan={target}>
+          <li class={over ? "" : "current"} data-plan={target.id}>
             <span class="handle" aria-hidden="true">{over ? "○" : "▶"}</span>
-            <Place status={status} id={target} />
-            {mayFly && <Remove id={target} word="Skip" onRemove={remove} />}
+            <Place id={target.id} at={target} />
+            {mayFly && <Remove id={target.id} word="Skip" onRemove={remove} />}
           </li>
         )}
         {shown.map((id, place) => (
@@ -121,7 +121,7 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
             ) : (
               <span class="handle" aria-hidden="true">○</span>
             )}
-            <Place status={status} id={id} />
+            <Place id={id} at={pending.find((one) => one.id === id)} />
             {mayFly && <Remove id={id} word="Leave out" onRemove={remove} />}
           </li>
         ))}
@@ -130,13 +130,12 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
   );
 }
 
-function Place({ status, id }: { status: StatusOut; id: string }) {
-  const at = status.places[id];
+function Place({ id, at }: { id: string; at: Waypoint | undefined }) {
   return (
     <span class="what">
       <strong>{id}</strong>{" "}
       {at && (
-        <small>{at[0].toFixed(1)} E, {at[1].toFixed(1)} N, {at[2].toFixed(1)} m</small>
+        <small>{at.x.toFixed(1)} E, {at.y.toFixed(1)} N, {at.z.toFixed(1)} m</small>
       )}
     </span>
   );
@@ -165,8 +164,8 @@ function between(before: string[], after: string[]): string[] {
 }
 
 /** Whether those that are still ahead are so in this order. */
-function inOrder(status: StatusOut, order: string[]): boolean {
-  const left = aheadOf(status);
+function inOrder(status: RobotStatus, order: string[]): boolean {
+  const left = idsOf(aheadOf(status));
   const expected = order.filter((one) => left.includes(one));
   return left.filter((one) => order.includes(one)).every((one, place) => one === expected[place]);
 }

@@ -2,10 +2,10 @@
 
 import { AlertLog } from "./alerts";
 import { answered } from "./connection";
-import { type Sample, isStep, speedOf, spotOf } from "./flight";
+import { type Sample, chargeOf, heightOf, isStep, secondsOf, speedOf, spotOf } from "./flight";
 import type { Spot } from "./place";
 import type { Past, PictureListener, Source, StateListener, Watched } from "./source";
-import type { AnalyticsOut, ItemMessage, MissionOut, RecordedOut, StatusOut, TrackOut, TrafficOut } from "./wire";
+import type { AnalyticsOut, ItemMessage, MissionOut, RecordedOut, RobotStatus, TrackOut, Traffic, Waypoint } from "./wire";
 
 /** Milliseconds between two moments shown while it plays, and between two pictures asked for. */
 const STEP = 50;
@@ -183,7 +183,8 @@ export class Playback implements Source {
 
   private publish(): void {
     this.shown = performance.now();
-    const status: Record<string, StatusOut> = {};
+    const status: Record<string, RobotStatus> = {};
+    const places: MissionOut["places"] = {};
     const past: Past = {
       trails: new Map<string, Spot[]>(),
       history: new Map<string, Sample[]>(),
@@ -193,12 +194,13 @@ export class Playback implements Source {
     for (const [robot, track] of this.tracks) {
       const one = track.at(this.time);
       if (one) status[robot] = one;
+      places[robot] = track.placesAt(this.time);
       past.trails.set(robot, track.trail(this.time));
       past.history.set(robot, track.history);
     }
     const robots = this.tracks.map(([robot]) => robot);
     const { name, streams } = this.flight;
-    const mission = { ...this.mission, name, robots, status, streams };
+    const mission: MissionOut = { ...this.mission, name, robots, status, places, streams };
     this.listener?.onState({ missions: [mission], robots: [], now: null, past });
     for (const one of this.watchers) one();
     this.led?.show(this.time);
@@ -207,7 +209,7 @@ export class Playback implements Source {
   /** Commands and alerts until now. */
   private log(): AlertLog {
     const log = new AlertLog();
-    const until = lastBefore(this.flight.alerts, this.time, (one) => one.time);
+    const until = lastBefore(this.flight.alerts, this.time, (one) => secondsOf(one.header));
     for (const { kind, text } of this.flight.alerts.slice(0, until + 1)) log.add(kind, text);
     return log;
   }
@@ -219,16 +221,16 @@ class Track {
   private way: { time: number; spot: Spot }[] = [];
 
   constructor(private readonly track: TrackOut) {
-    this.history = track.time.map((time, row) => ({
-      time,
-      height: track.position[row]?.[2] ?? null,
-      speed: speedOf({ velocity: track.velocity[row] ?? null }),
-      battery: track.battery[row] ?? null,
+    this.history = track.states.map((vehicle) => ({
+      time: secondsOf(vehicle),
+      height: heightOf({ vehicle }),
+      speed: speedOf({ vehicle }),
+      battery: chargeOf({ vehicle }),
     }));
-    track.time.forEach((time, row) => {
-      const spot = spotOf({ position: track.position[row] ?? null });
-      if (spot && isStep(this.way.at(-1)?.spot, spot)) this.way.push({ time, spot });
-    });
+    for (const vehicle of track.states) {
+      const spot = spotOf({ vehicle });
+      if (spot && isStep(this.way.at(-1)?.spot, spot)) this.way.push({ time: secondsOf(vehicle), spot });
+    }
     while (this.way.length > TRAIL) this.way = this.way.filter((_, place) => place % 2 === 0);
   }
 
@@ -238,42 +240,47 @@ class Track {
   }
 
   /** Other aircraft at a time: from their last known place on, at their last known velocity. */
-  private trafficAt(time: number): TrafficOut[] {
-    const last = this.track.traffic[lastBefore(this.track.traffic, time, (one) => one.since)];
-    const later = time - (last?.since ?? 0);
-    // Where the recording has no states any more, nothing is heard either.
-    return (last?.aircraft ?? [])
-      .map(({ position: [east, north, up], velocity, age, ...one }): TrafficOut => {
-        const [ve, vn, vu] = velocity;
-        const high = up === null ? null : up + later * vu;
-        return { ...one, velocity, position: [east + later * ve, north + later * vn, high], age: age + later };
+  private trafficAt(time: number): Traffic[] {
+    const { states } = this.track;
+    let row = lastBefore(states, time, secondsOf);
+    while (row > 0 && states[row]?.traffic.length === 0 && time - secondsOf(states[row]!) <= FORGOTTEN) row -= 1;
+    const last = states[row];
+    if (!last) return [];
+    const later = time - secondsOf(last);
+    const moved = (from: number | null, speed: number | null) => (from === null ? null : from + later * (speed ?? 0));
+    return last.traffic
+      .map((one): Traffic => {
+        const { position: at, velocity: to } = one;
+        const position = { x: moved(at.x, to.x), y: moved(at.y, to.y), z: moved(at.z, to.z) };
+        return { ...one, position, age: (one.age ?? 0) + later };
       })
-      .filter((one) => one.age <= FORGOTTEN);
+      .filter((one) => (one.age ?? 0) <= FORGOTTEN);
   }
 
-  at(time: number): StatusOut | undefined {
-    const { statuses, places } = this.track;
-    const status = statuses[lastBefore(statuses, time, (one) => one.time)];
-    const row = lastBefore(this.track.time, time, (one) => one);
-    if (!status) return undefined;
-    const until = lastBefore(places, time, (one) => one.since);
-    const known = places.slice(0, until + 1).map((one) => [one.id, one.place] as const);
+  /** The waypoints of the plan at a time, the target first. */
+  private planAt(time: number): Waypoint[] {
+    const { plans } = this.track;
+    return plans[lastBefore(plans, time, secondsOf)]?.waypoints ?? [];
+  }
+
+  /** Places of all waypoints that were known by a time. */
+  placesAt(time: number): MissionOut["places"][string] {
+    const { plans } = this.track;
+    const known = plans.slice(0, lastBefore(plans, time, secondsOf) + 1).flatMap((one) => one.waypoints);
+    return Object.fromEntries(known.map(({ id, x, y, z }) => [id, [x, y, z]]));
+  }
+
+  at(time: number): RobotStatus | undefined {
+    const { states, statuses, ahead } = this.track;
+    const row = lastBefore(statuses, time, secondsOf);
+    const mission = statuses[row];
+    if (!mission) return undefined;
+    const plan = this.planAt(time);
+    const pending = plan.slice(Math.max(0, plan.length - (ahead[row] ?? 0)));
+    const vehicle = states[lastBefore(states, time, secondsOf)];
     return {
-      ...status,
-      time,
-      measured: this.track.time[row] ?? null,
-      position: this.track.position[row] ?? null,
-      velocity: this.track.velocity[row] ?? null,
-      yaw: this.track.yaw[row] ?? null,
-      roll: this.track.roll[row] ?? null,
-      pitch: this.track.pitch[row] ?? null,
-      battery: this.track.battery[row] ?? null,
-      distance: this.track.distance[row] ?? 0,
-      outlook: this.track.outlook[row] ?? null,
-      satellites: this.track.gps[row]?.satellites ?? null,
-      position_sigma: this.track.gps[row]?.position_sigma ?? null,
-      places: Object.fromEntries(known),
-      traffic: this.trafficAt(time),
+      mission: { ...mission, pending, stamp: time * 1e9 },
+      vehicle: vehicle ? { ...vehicle, traffic: this.trafficAt(time) } : null,
     };
   }
 }

@@ -2,7 +2,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { ask, messageOf } from "./connection";
-import { type Flight, aheadOf } from "./flight";
+import { type Flight, aheadOf, idsOf } from "./flight";
 import { type Point, camerasOf, surveyCamera } from "./place";
 import type { Drawn } from "./survey_map";
 import { Button, Field, type FieldProps, Figure, type FigureProps, Select } from "./widgets";
@@ -95,7 +95,7 @@ export function useSurvey(
       if (!last) return;
       const list = waypoints as [Waypoint, ...Waypoint[]];
       flight.fly({ robot, waypoints: list }, `survey ${name.current}`, (status) => {
-        const known = [...aheadOf(status), ...status.visited];
+        const known = [...idsOf(aheadOf(status)), ...status.mission.visited];
         return known.includes(last.id) ? `its ${waypoints.length} waypoints are in the plan` : null;
       });
       setArea(null);

@@ -2,7 +2,7 @@
 
 import type { Sight } from "./sight";
 import { bearingOf } from "./words";
-import type { StatusOut, TrafficOut } from "./wire";
+import type { RobotStatus, Traffic } from "./wire";
 
 /** Seconds without a word after which an aircraft is shown as old; after 10 it is gone. */
 const OLD = 3;
@@ -10,10 +10,10 @@ const OLD = 3;
 const SLOW = 0.5;
 
 /** The aircraft that the drones of a flight hear of, each once: as the chosen drone hears it. */
-export function trafficOf(statuses: StatusOut[], chosen: StatusOut | undefined): TrafficOut[] {
-  const found = new Map<number, TrafficOut>();
+export function trafficOf(statuses: RobotStatus[], chosen: RobotStatus | undefined): Traffic[] {
+  const found = new Map<number, Traffic>();
   for (const status of [chosen, ...statuses]) {
-    for (const one of status?.traffic ?? []) {
+    for (const one of status?.vehicle?.traffic ?? []) {
       if (!found.has(one.address)) found.set(one.address, one);
     }
   }
@@ -21,7 +21,7 @@ export function trafficOf(statuses: StatusOut[], chosen: StatusOut | undefined):
 }
 
 /** How much higher than the drone it is, which is `own` metres up. */
-export function heightOf({ position: [, , up] }: TrafficOut, own: number | null): string {
+export function relativeHeight({ position: { z: up } }: Traffic, own: number | null): string {
   if (up === null) return "height unknown";
   if (own === null) return `${up.toFixed(0)} m up`;
   const above = Math.round(up - own);
@@ -29,21 +29,24 @@ export function heightOf({ position: [, , up] }: TrafficOut, own: number | null)
 }
 
 /** Where it flies to. */
-export function headingOf({ velocity: [east, north] }: TrafficOut): string {
+export function headingOf({ velocity }: Traffic): string {
+  const [east, north] = [velocity.x ?? 0, velocity.y ?? 0];
   return Math.hypot(east, north) < SLOW ? "heading unknown" : bearingOf(east, north);
 }
 
 export function TrafficLayer(
-  props: { traffic: TrafficOut[]; own: number | null; stale: boolean; sight: Sight },
+  props: { traffic: Traffic[]; own: number | null; stale: boolean; sight: Sight },
 ) {
   return (
     <g>
       {props.traffic.map((one) => {
-        const [east, north] = one.position;
-        const [ve, vn] = one.velocity;
+        const { x: east, y: north } = one.position;
+        if (east === null || north === null) return null;
+        const [ve, vn] = [one.velocity.x ?? 0, one.velocity.y ?? 0];
         const turn = (Math.atan2(ve, vn) * 180) / Math.PI;
         const moves = Math.hypot(ve, vn) >= SLOW;
-        const old = props.stale || one.age > OLD;
+        const age = one.age ?? 0;
+        const old = props.stale || age > OLD;
         return (
           <g
             key={one.address}
@@ -62,9 +65,9 @@ export function TrafficLayer(
             <text y="-34">
               {one.callsign}{" "}
               <tspan class="small" x="0" dy="15">
-                {heightOf(one, props.own)}
+                {relativeHeight(one, props.own)}
                 {moves && `, ${headingOf(one)}`}
-                {one.age > OLD && `, ${one.age.toFixed(0)} s old`}
+                {age > OLD && `, ${age.toFixed(0)} s old`}
               </tspan>
             </text>
           </g>

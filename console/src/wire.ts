@@ -26,10 +26,6 @@ export type MissionPhase =
   | "cancelled"
   | "failed";
 /**
- * What a page can draw of a stream.
- */
-export type StreamKind = "pictures" | "detections" | "navigation";
-/**
  * Reference of a waypoint's z, whatever its x and y are.
  */
 export type HeightReference = "home" | "sea" | "ground";
@@ -37,6 +33,45 @@ export type HeightReference = "home" | "sea" | "ground";
  * The reference of a waypoint's x, y and z.
  */
 export type WaypointType = "relative" | "local" | "global" | "global_relative";
+/**
+ * The 13 states of a mission (the paper's stat-stream).
+ */
+export type MissionState =
+  | "idle"
+  | "preflight"
+  | "taking_off"
+  | "holding"
+  | "enroute"
+  | "loitering"
+  | "following"
+  | "diverted"
+  | "paused"
+  | "returning"
+  | "landing"
+  | "landed"
+  | "aborted";
+/**
+ * How a flight ended, as reported by a driver that can tell.
+ */
+export type FlightEnd = "landed" | "fell" | "unheard";
+/**
+ * The vehicle's flight mode, as it reports it.
+ */
+export type VehicleMode =
+  | "grounded"
+  | "taking_off"
+  | "guided"
+  | "holding"
+  | "mission"
+  | "returning"
+  | "landing"
+  | "manual"
+  | "failsafe"
+  | "lost";
+/**
+ * What a page can draw of a stream.
+ */
+export type StreamKind = "pictures" | "detections" | "navigation";
 
 export interface Wire {
   AccountOut: AccountOut;
@@ -290,32 +325,32 @@ export interface Detection {
    * @minItems 4
    * @maxItems 4
    */
-  box: [number, number, number, number];
+  box: [number | null, number | null, number | null, number | null];
   depth: number | null;
   keypoints: [number | null, number | null, number | null][] | null;
   label: string;
-  score: number;
+  score: number | null;
   track_id: number | null;
 }
 /**
  * Where the vehicle believes it is: ENU position and velocity, attitude and body rates.
  */
 export interface Odometry {
-  pitch: number;
+  pitch: number | null;
   position: {
     x: number | null;
     y: number | null;
     z: number | null;
   };
-  position_sigma: number;
-  roll: number;
+  position_sigma: number | null;
+  roll: number | null;
   velocity: {
     x: number | null;
     y: number | null;
     z: number | null;
   };
-  yaw: number;
-  yaw_rate: number;
+  yaw: number | null;
+  yaw_rate: number | null;
 }
 /**
  * In place of an item that cannot be sent.
@@ -341,13 +376,22 @@ export interface MissionOut {
   lease: string | null;
   name: string;
   phase: MissionPhase;
+  places: {
+    [k: string]: {
+      /**
+       * @minItems 3
+       * @maxItems 3
+       */
+      [k: string]: [number, number, number];
+    };
+  };
   reason: string;
   recording: boolean;
   robots: string[];
   share: string[];
   started: number | null;
   status: {
-    [k: string]: StatusOut;
+    [k: string]: RobotStatus;
   };
   streams: {
     [k: string]: StreamKind;
@@ -373,95 +417,47 @@ export interface AnalyticsOut {
   time: number;
 }
 /**
- * Status of mission and vehicle at one time; unknown values are null.
+ * Status of one robot at one time: of its mission and of its vehicle.
  */
-export interface StatusOut {
-  altitude: number | null;
-  battery: number | null;
-  distance: number;
+export interface RobotStatus {
+  mission: MissionStatus;
+  vehicle: VehicleState | null;
+}
+/**
+ * The mission at one moment.
+ */
+export interface MissionStatus {
+  distance: number | null;
   faults: string[];
   given_up: string[];
-  latitude: number | null;
-  longitude: number | null;
-  measured: number | null;
-  mode: string | null;
   outlook: BatteryOutlook | null;
-  pending: string[];
+  pending: Waypoint[];
+  /**
+   * @minItems 2
+   * @maxItems 2
+   */
+  photos: [number, number];
   pilot: string;
-  pitch: number | null;
-  places: {
-    /**
-     * @minItems 3
-     * @maxItems 3
-     */
-    [k: string]: [number, number, number];
-  };
-  position: (number | null)[] | null;
-  position_sigma: number | null;
   reason: string;
-  roll: number | null;
-  satellites: number | null;
-  state: string;
-  target: string | null;
-  time: number;
-  traffic: TrafficOut[];
-  velocity: (number | null)[] | null;
+  stamp: number;
+  state: MissionState;
+  target: Waypoint | null;
+  unfinished: string;
   visited: string[];
-  waypoints_known: number;
-  waypoints_visited: number;
-  yaw: number | null;
+  visits: number;
+  /**
+   * @minItems 2
+   * @maxItems 2
+   */
+  waypoint_counts: [number, number];
 }
 /**
  * How far the battery lasts, by the energy model as this flight scaled it; charges 0 to 1.
  */
 export interface BatteryOutlook {
-  hover: number;
-  plan: number;
-  returns_at: number;
-}
-/**
- * Another aircraft that the vehicle hears of, where it is at the moment of its state.
- */
-export interface TrafficOut {
-  address: number;
-  age: number;
-  callsign: string;
-  /**
-   * @minItems 3
-   * @maxItems 3
-   */
-  position: [number, number, number | null];
-  /**
-   * @minItems 3
-   * @maxItems 3
-   */
-  velocity: [number, number, number];
-}
-/**
- * Result of the rehearsal in simulation.
- */
-export interface VerdictOut {
-  approved: boolean;
-  battery_used: number | null;
-  distance: number | null;
-  picture: string | null;
-  reasons: string[];
-  seconds: number | null;
-}
-/**
- * Waypoints for one robot of a mission in flight: one command, carried out whole.
- */
-export interface NavigationIn {
-  clear_first?: boolean;
-  deadline?: number | null;
-  index?: number | null;
-  ordered?: boolean;
-  robot: string;
-  /**
-   * @minItems 1
-   * @maxItems 1000
-   */
-  waypoints: [Waypoint, ...Waypoint[]];
+  hover: number | null;
+  plan: number | null;
+  returns_at: number | null;
 }
 /**
  * A place to fly to, with hover time, yaw, speed and priority.
@@ -496,6 +492,102 @@ export interface Waypoint {
   zoom?: number | null;
 }
 /**
+ * The newest knowledge about a vehicle.
+ */
+export interface VehicleState {
+  actuators: {
+    [k: string]: string;
+  };
+  armed: boolean;
+  battery: Battery;
+  below: number | null;
+  ended: FlightEnd | null;
+  extra: {
+    [k: string]: number | null;
+  };
+  faults: string[];
+  gimbal: GimbalAttitude | null;
+  gps: GpsFix | null;
+  mode: VehicleMode;
+  odometry: Odometry;
+  stamp: number;
+  traffic: Traffic[];
+  truth: Odometry | null;
+  zoom: number | null;
+}
+/**
+ * State of the flight battery.
+ */
+export interface Battery {
+  current: number | null;
+  fraction: number | null;
+  voltage: number | null;
+}
+/**
+ * Where a gimbal says that it looks; radians.
+ */
+export interface GimbalAttitude {
+  pitch: number | null;
+  roll: number | null;
+  stamp: number;
+  yaw: number | null;
+}
+/**
+ * A global position: WGS84 degrees, metres above the ellipsoid, and its accuracy.
+ */
+export interface GpsFix {
+  altitude: number | null;
+  horizontal_sigma: number | null;
+  latitude: number | null;
+  longitude: number | null;
+  satellites: number;
+  vertical_sigma: number | null;
+}
+/**
+ * One aircraft, where it is at the stamp of the state that it stands in.
+ */
+export interface Traffic {
+  address: number;
+  age: number | null;
+  callsign: string;
+  position: {
+    x: number | null;
+    y: number | null;
+    z: number | null;
+  };
+  velocity: {
+    x: number | null;
+    y: number | null;
+    z: number | null;
+  };
+}
+/**
+ * Result of the rehearsal in simulation.
+ */
+export interface VerdictOut {
+  approved: boolean;
+  battery_used: number | null;
+  distance: number | null;
+  picture: string | null;
+  reasons: string[];
+  seconds: number | null;
+}
+/**
+ * Waypoints for one robot of a mission in flight: one command, carried out whole.
+ */
+export interface NavigationIn {
+  clear_first?: boolean;
+  deadline?: number | null;
+  index?: number | null;
+  ordered?: boolean;
+  robot: string;
+  /**
+   * @minItems 1
+   * @maxItems 1000
+   */
+  waypoints: [Waypoint, ...Waypoint[]];
+}
+/**
  * How far a recording has been read, and the flight once it was.
  */
 export interface PlaybackOut {
@@ -506,7 +598,7 @@ export interface PlaybackOut {
  * A recorded flight.
  */
 export interface RecordedOut {
-  alerts: AlertOut[];
+  alerts: Alert[];
   analytics: AnalyticsOut[];
   began: number;
   begin: number;
@@ -526,12 +618,19 @@ export interface RecordedOut {
   };
 }
 /**
- * An alert.
+ * An alert for the operator: raised by monitoring, emergencies, the watchdogs.
  */
-export interface AlertOut {
+export interface Alert {
+  header: {
+    id: number;
+    source: string;
+    stamp: number;
+  };
   kind: string;
   text: string;
-  time: number;
+  values: {
+    [k: string]: unknown;
+  };
 }
 /**
  * What the map draws below a flight; empty where nothing is known.
@@ -561,51 +660,20 @@ export interface TilesOut {
   url: string;
 }
 /**
- * One robot's flight.
- *
- * Its status at a time is the last one of `statuses` until then, with the figures of the last
- * row until then.
+ * One robot's flight: its messages, thinned out.
  */
 export interface TrackOut {
-  battery: (number | null)[];
-  distance: number[];
-  gps: (GpsOut | null)[];
-  outlook: (BatteryOutlook | null)[];
-  pitch: (number | null)[];
-  places: PlaceOut[];
-  position: [number | null, number | null, number | null][];
-  roll: (number | null)[];
-  statuses: StatusOut[];
-  time: number[];
-  traffic: HeardOut[];
-  velocity: [number | null, number | null, number | null][];
-  yaw: (number | null)[];
+  ahead: number[];
+  plans: MissionPlan[];
+  states: VehicleState[];
+  statuses: MissionStatus[];
 }
 /**
- * What a satellite receiver gives, beside the place.
+ * The waypoints ahead of a robot, local ENU.
  */
-export interface GpsOut {
-  position_sigma: number | null;
-  satellites: number | null;
-}
-/**
- * A waypoint of the plan.
- */
-export interface PlaceOut {
-  id: string;
-  /**
-   * @minItems 3
-   * @maxItems 3
-   */
-  place: [number, number, number];
-  since: number;
-}
-/**
- * The other aircraft that a robot heard of from a time on.
- */
-export interface HeardOut {
-  aircraft: TrafficOut[];
-  since: number;
+export interface MissionPlan {
+  stamp: number;
+  waypoints: Waypoint[];
 }
 /**
  * The list before take-off of one robot, as it was when it was gone through last.

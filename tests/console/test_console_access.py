@@ -214,8 +214,11 @@ def test_a_browsers_socket_brings_its_token_as_a_subprotocol(
             if status:
                 break
     assert message["now"] > 10**18
-    assert status["places"] == {"wp1": [3, 4, 2]}
-    assert (status["position"], status["mode"]) == ([1, 2, 3], "guided")
+    target = {"id": "wp1", "x": 3, "y": 4, "z": 2, "waypoint_type": "local"}
+    assert status["mission"]["target"] == target
+    vehicle = status["vehicle"]
+    assert vehicle["odometry"]["position"] == {"x": 1, "y": 2, "z": 3}
+    assert vehicle["mode"] == "guided"
     with pytest.raises(InvalidStatus) as refused:
         connect(url, subprotocols=[Subprotocol("aerodaas"), Subprotocol("bearer.wrong")])
     assert refused.value.response.status_code == 401

@@ -29,7 +29,7 @@ def test_places_behind_are_remembered() -> None:
     meter = FlightMeter()
     meter.record(flying_to(1, 2))
     meter.record(flying_to(2))
-    assert meter.status["drone"].places == {"wp1": (1, 2, 3), "wp2": (2, 2, 3)}
+    assert meter.places["drone"] == {"wp1": (1, 2, 3)}
 
 
 def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
@@ -37,11 +37,12 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
     meter = FlightMeter()
     for number in range(300):
         meter.record(flying_to(number))
-    places = meter.status["drone"].places
-    assert (len(places), "wp99" in places, "wp100" in places) == (200, False, True)
+    places = meter.places["drone"]
+    assert (len(places), "wp99" in places, "wp100" in places) == (199, False, True)
     meter.record(flying_to(*range(1000, 1400)))
-    places = meter.status["drone"].places
-    assert set(places) == {f"wp{number}" for number in range(1000, 1400)}
+    assert meter.places["drone"] == {}
+    ahead = meter.status["drone"].mission.ahead
+    assert [one.id for one in ahead] == [f"wp{number}" for number in range(1000, 1400)]
 
 
 def test_the_same_status_again_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from typing_extensions import Self
 
@@ -25,6 +25,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.clock import seconds
 from aerodaas.environment.remote_client import RemoteClient
 from aerodaas.errors import AeroDaaSError
+from aerodaas.messages.mission import RobotStatus
 
 __all__ = ["Drift", "RemoteUser", "ScriptedDetector", "free_port"]
 
@@ -94,11 +95,11 @@ class RemoteUser:
         if self.failure is not None:
             raise self.failure
 
-    def until(self, happened: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    def until(self, happened: Callable[[RobotStatus], bool]) -> RobotStatus:
         """Watch the status until `happened`; returns it."""
         return next(status for status in self._statuses() if happened(status))
 
-    def _statuses(self) -> Iterator[dict[str, Any]]:
+    def _statuses(self) -> Iterator[RobotStatus]:
         given_up = time.monotonic() + 120
         while time.monotonic() < given_up:
             try:

@@ -295,7 +295,7 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
     actors: set[psutil.Process] = set()
 
     def kill_and_watch(user: RemoteUser) -> None:
-        user.until(lambda status: status["distance"] > 20.0)
+        user.until(lambda status: status.mission.distance > 20.0)
         actors.update(actors_below(os.getpid()) - before)
         application.kill()
         application.wait()
@@ -317,7 +317,7 @@ def test_application_killed_on_one_machine(flyer: Flyer) -> None:
     port = free_port()
     application = start_application(flyer, port)
     user = RemoteUser(port, lambda _: None)
-    user.until(lambda status: status["distance"] > 20.0)
+    user.until(lambda status: status.mission.distance > 20.0)
     left = set(psutil.Process(application.pid).children(recursive=True))
     folders = {Path(one.environ()[VARIABLE]) for one in left if VARIABLE in one.environ()}
     application.kill()
@@ -339,7 +339,7 @@ def test_application_suspended_on_one_machine(flyer: Flyer) -> None:
     port = free_port()
     application = start_application(flyer, port, stderr=subprocess.PIPE)
     user = RemoteUser(port, lambda _: None)
-    user.until(lambda status: status["distance"] > 20.0)
+    user.until(lambda status: status.mission.distance > 20.0)
     actors = actors_below(application.pid)
     application.send_signal(signal.SIGSTOP)
     assert wait_for(lambda: gone(actors), 90.0)

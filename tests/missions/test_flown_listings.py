@@ -123,7 +123,7 @@ def test_listing_3_disaster_zone_survey(flyer: Flyer) -> None:
     pictures: list[bytes] = []
 
     def look_closer(user: RemoteUser) -> None:
-        user.until(lambda status: "wp1" in status["visited"])
+        user.until(lambda status: "wp1" in status.mission.visited)
         user.client.add_waypoints([{"id": "closer", "x": 30, "y": 60, "z": 5}])
         pictures.append(user.client.frame())
 

@@ -87,14 +87,14 @@ def test_b_dynamic_waypoints_from_a_remote_user(flyer: Flyer) -> None:
         )
 
     def add(user: RemoteUser) -> None:
-        user.until(lambda status: "wp0" in status["visited"])
+        user.until(lambda status: "wp0" in status.mission.visited)
         user.client.command("pause")
         near = {"id": "near", "x": 19, "y": 40, "z": 2}
         far = {"id": "far", "x": 0, "y": 100, "z": 2}
         outside = {"id": "outside", "x": 0, "y": 5000, "z": 2}
         answer = user.client.add_waypoints([far, near, outside], ordered=False)
         assert list(answer["refused"]) == ["outside"]
-        assert user.client.status()["state"] == "paused"
+        assert user.client.status().mission.state == "paused"
         user.client.command("resume")
 
     with RemoteUser(port, add):

@@ -105,10 +105,10 @@ def test_an_old_recording_is_played() -> None:
     assert last[0]["captured"] <= 10 * NANOSECONDS
     assert kinds == ["Detections", "Target", "Picture"]
     track = flight.tracks["drone"]
-    assert {one.id for one in track.places} == {"a", "b"}
-    ahead = [one.pending for one in track.statuses if one.target == "a"]
-    assert ahead
-    assert all(one == ["b"] for one in ahead)
+    assert {one.id for plan in track.plans for one in plan.waypoints} == {"a", "b"}
+    told = zip(track.statuses, track.ahead, strict=True)
+    first = [(one, ahead) for one, ahead in told if one.target and one.target.id == "a"]
+    assert {(ahead, one.waypoint_counts) for one, ahead in first} == {(1, (0, 2))}
     assert [one.kind for one in flight.alerts] == ["person"]
     assert flight.analytics[-1].in_time == 14
 

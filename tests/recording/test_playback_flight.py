@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import pytest
 from mcap.writer import Writer
@@ -47,20 +48,24 @@ def states(path: Path) -> dict[float, VehicleState]:
         return {seconds(stamp): state for stamp, state in vehicle_states(recording, "tello")}
 
 
-def test_figures_are_those_of_the_recording(path: Path) -> None:
-    """Each row is a recorded state, at most a tenth of a second after the one before it."""
+def test_states_are_those_of_the_recording(path: Path) -> None:
+    """Each is a recorded one, at most a tenth of a second after the one before it."""
     told = read(path).tracks["tello"]
     recorded = states(path)
-    assert len(told.time) > 0.9 * (max(recorded) - min(recorded)) / track.ROW_SECONDS
-    for row, time in enumerate(told.time):
+    times = [seconds(one.stamp) for one in told.states]
+    assert len(times) > 0.9 * (max(recorded) - min(recorded)) / track.STATE_SECONDS
+    for time, drawn in zip(times, told.states, strict=True):
         state = recorded[time]
-        assert told.position[row] == tuple(state.odometry.position)
-        assert told.velocity[row] == tuple(state.odometry.velocity)
-        assert (told.yaw[row], told.battery[row]) == (state.odometry.yaw, state.battery.fraction)
-        assert (told.roll[row], told.pitch[row]) == (state.odometry.roll, state.odometry.pitch)
-    gaps = [later - time for time, later in pairwise(told.time)]
-    assert 0.99 * track.ROW_SECONDS < min(gaps) <= max(gaps) < 2 * track.ROW_SECONDS
-    assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
+        for name in ("odometry", "battery", "mode", "armed", "gps"):
+            assert getattr(drawn, name) == getattr(state, name)
+    gaps = [later - time for time, later in pairwise(times)]
+    assert 0.99 * track.STATE_SECONDS < min(gaps) <= max(gaps) < 2 * track.STATE_SECONDS
+
+
+def test_a_page_gets_no_secrets_of_a_state(path: Path) -> None:
+    """Truth and further figures are the recording's alone, and as long as a stranger likes."""
+    told = read(path).tracks["tello"].states
+    assert all(not (one.truth or one.extra or one.faults or one.actuators) for one in told)
 
 
 def test_the_first_picture_is_told(path: Path) -> None:
@@ -73,44 +78,44 @@ def test_the_first_picture_is_told(path: Path) -> None:
     assert read(blind).pictured is None
 
 
-def test_rows_tell_how_far_the_battery_lasts_and_of_satellites(path: Path) -> None:
-    """As the status did just before; what was infinite, or not there, is not known."""
-    told = read(path).tracks["tello"]
-    known = [(time, one) for time, one in zip(told.time, told.outlook, strict=True) if one]
-    assert len(known) > 0.5 * len(told.time)
-    for time, one in known:
+def test_statuses_tell_how_far_the_battery_lasts(path: Path) -> None:
+    """Once a second at least; what was infinite, or not there, is not known."""
+    told = read(path).tracks["tello"].statuses
+    known = {
+        seconds(one.stamp): one.outlook
+        for one in told
+        if one.outlook and not math.isnan(one.outlook.plan)
+    }
+    assert len(known) > 0.5 * len(told)
+    for time, one in known.items():
         assert (one.plan, one.returns_at) == (0.2, 0.1)
         assert one.hover == pytest.approx(600.0 - time, abs=0.11)
-    assert (told.outlook[0], told.outlook[-1]) == (None, None)
-    assert [(one.satellites, one.position_sigma) for one in told.gps if one] == [(12, 1.0)] * len(
-        told.time
-    )
+    assert (told[0].outlook, told[-1].outlook) == (None, None)
+    assert told[-1].distance == pytest.approx(FLIGHT_END.distance, abs=0.5)
 
 
 def test_statuses_are_those_of_the_mission(path: Path) -> None:
     """At each step: state, reason, target, what lies ahead, what has been visited."""
     told = read(path).tracks["tello"]
-    wanted: dict[str, Any] = {}
-    place = 0
+    place, last = 0, None
     for step in SyntheticFlight().steps():
-        status, time = step.status, seconds(step.status.stamp)
-        while place + 1 < len(told.statuses) and told.statuses[place + 1].time <= time:
+        status = step.status
+        while place + 1 < len(told.statuses) and told.statuses[place + 1].stamp <= status.stamp:
             place += 1
-        found = told.statuses[place]
-        wanted = {
-            "state": status.state.value,
-            "reason": status.reason,
-            "target": status.target.id if status.target else None,
-            "visited": list(status.visited),
-            "pending": [one.id for one in status.pending],
-            "waypoints_visited": len(status.visited),
-        }
-        assert {name: getattr(found, name) for name in wanted} == wanted, time
-    assert wanted["state"] == "landed"
-    assert {one.id: one.place for one in told.places} == {
-        "north": (0, 10, 1.5), "far": (10, 10, 1.5), "east": (10, 0, 1.5), "start": (0, 0, 1.5)
+        figures = {"stamp": 0, "distance": 0.0, "outlook": None}
+        wanted = replace(status, pending=(), **figures)
+        assert replace(told.statuses[place], **figures) == wanted, status.stamp
+        plan = [one for one in told.plans if one.stamp <= status.stamp]
+        ahead = told.ahead[place]
+        pending = plan[-1].waypoints[-ahead:] if ahead else ()
+        assert pending == status.pending
+        last = wanted.state
+    assert last == "landed"
+    assert {one.id for plan in told.plans for one in plan.waypoints} == {
+        "north", "far", "east", "start"
     }  # fmt: skip
-    assert len(told.statuses) < 20
+    gaps = [later.stamp - one.stamp for one, later in pairwise(told.statuses)]
+    assert max(gaps) < 1.2e9
 
 
 def test_who_flew_by_hand_is_told(path: Path, tmp_path: Path) -> None:
@@ -185,8 +190,8 @@ def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path)
     flight = read(cut)
     assert 0.2 * whole.end < flight.end < 0.9 * whole.end
     assert flight.remark == f"it breaks off at {flight.end:.1f} s"
-    rows = len(flight.tracks["tello"].time)
-    assert flight.tracks["tello"].time == whole.tracks["tello"].time[:rows]
+    read_states = flight.tracks["tello"].states
+    assert read_states == whole.tracks["tello"].states[: len(read_states)]
     with Recording.open(path) as recording:
         block = recording._index.blocks[1]
     data[block.offset + block.length // 2] ^= 0xFF
@@ -211,21 +216,16 @@ def test_what_it_is_told_says_how_far_it_has_come(path: Path) -> None:
 
 
 def test_a_long_flight_is_thinned_out(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Evenly, from its start to its end, with figures that stay together."""
-    monkeypatch.setattr(track, "_MOST_ROWS", 100)
-    thin = read(path).tracks["tello"]
+    """Evenly, from its start to its end."""
+    monkeypatch.setattr(track, "_MOST_STATES", 100)
+    thin = read(path).tracks["tello"].states
     recorded = states(path)
-    flown = {seconds(one.status.stamp): one.status.distance for one in FLIGHT.steps()}
-    assert 50 <= len(thin.time) <= 101
-    assert thin.time[0] == min(recorded)
-    assert thin.time[-1] > 0.97 * max(recorded)
-    for row, time in enumerate(thin.time):
-        assert thin.position[row] == tuple(recorded[time].odometry.position)
-        assert thin.battery[row] == recorded[time].battery.fraction
-        assert thin.distance[row] == pytest.approx(flown[time], abs=0.1)
-        outlook = thin.outlook[row]
-        assert outlook is None or outlook.hover == pytest.approx(600.0 - time, abs=0.11)
-    assert len(thin.time) == len(thin.outlook) == len(thin.gps)
+    assert 50 <= len(thin) <= 101
+    times = [seconds(one.stamp) for one in thin]
+    assert times[0] == min(recorded)
+    assert times[-1] > 0.97 * max(recorded)
+    for time, drawn in zip(times, thin, strict=True):
+        assert drawn.odometry == recorded[time].odometry
 
 
 def test_a_page_has_room_for_so_much(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,9 +234,9 @@ def test_a_page_has_room_for_so_much(path: Path, monkeypatch: pytest.MonkeyPatch
     flight = read(path)
     told = flight.tracks["tello"]
     named = (
-        len(told.places)
+        sum(1 + len(plan.waypoints) for plan in told.plans)
         + len(flight.alerts)
-        + sum(1 + len(one.visited) + len(one.pending) for one in told.statuses)
+        + sum(1 + len(one.visited) for one in told.statuses)
     )
     assert named <= 12
     assert "more than a page has room for" in flight.remark
@@ -274,10 +274,10 @@ def test_a_strangers_recording_is_no_flight_of_ours(tmp_path: Path) -> None:
     flight = read(path)
     assert len(flight.tracks) == 256
     told = flight.tracks["x"].statuses
-    assert [one.target for one in told] == [None, None, "late"]
-    assert [one.pending for one in told] == [[], ["a", "b"], []]
-    assert [one.time for one in told] == sorted(one.time for one in told)
-    assert [one.waypoints_visited for one in told] == [0, 3, 0]
+    assert [one.target and one.target.id for one in told] == [None, "late"]
+    assert flight.tracks["x"].ahead == [10**9, 0]
+    assert [one.stamp for one in told] == sorted(one.stamp for one in told)
+    assert [one.visits for one in told] == [3, 0]
     assert flight.environment == {}
 
 

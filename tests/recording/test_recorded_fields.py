@@ -18,7 +18,7 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.mission import Decision, MissionPlan, MissionStatus, SetpointRecord
 from aerodaas.messages.odometry import Battery
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
@@ -30,7 +30,6 @@ from aerodaas.recording.messages import (
     CHANNELS,
     FrameInfo,
     Labels,
-    MissionPlan,
     NavigationRecord,
     json_entry,
     labels_and_message,

@@ -56,7 +56,7 @@ class Api:
     def status(self) -> dict[str, Any]:
         """The drone's status."""
         _, mission = self._ask("GET", "", b"")
-        found: dict[str, Any] = mission["status"]["drone"]
+        found: dict[str, Any] = mission["status"]["drone"]["mission"]
         return found
 
     def _ask(self, method: str, path: str, body: bytes) -> tuple[int, dict[str, Any]]:

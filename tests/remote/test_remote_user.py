@@ -82,23 +82,23 @@ def test_mission_obeys_and_says_so(service: Served) -> None:
     client.command("pause")
     flown.run(1.0)
     time.sleep(0.2)
-    assert client.status()["state"] == "paused"
+    assert client.status().mission.state == "paused"
     client.command("resume")
     with pytest.raises(MissionError, match="not paused"):
         client.command("resume")
     client.command("clear")
     flown.run(1.0)
     time.sleep(0.2)
-    status = client.status()
-    assert (status["state"], status["pending"], status["target"]) == ("holding", [], None)
+    mission = client.status().mission
+    assert (mission.state, mission.ahead) == ("holding", ())
     client.command("return-home")
     flown.run(0.2)
     time.sleep(0.2)
-    assert client.status()["reason"] == "its user asked to return"
+    assert client.status().mission.reason == "its user asked to return"
     client.command("land")
     flown.run()
     time.sleep(0.2)
-    assert client.status()["state"] == "landed"
+    assert client.status().mission.state == "landed"
     with pytest.raises(MissionError, match="the mission is over"):
         client.command("pause")
     with pytest.raises(ConfigError, match="command"):
@@ -226,7 +226,7 @@ def test_stream_ends_with_the_mission(service: Served) -> None:
     seen: list[str] = []
 
     def follow() -> None:
-        seen.extend(status["state"] for status in service.client().stream(rate=0.5))
+        seen.extend(status.mission.state for status in service.client().stream(rate=0.5))
 
     follower = threading.Thread(target=follow)
     follower.start()
@@ -328,7 +328,7 @@ def test_command_line_speaks_it(service: Served, monkeypatch: pytest.MonkeyPatch
     service.flown.run()
     threading.Timer(1.0, service.flight.close).start()
     lines = run(cli, ["remote", "status", "--follow", "--json"]).output.splitlines()
-    assert json.loads(lines[-1])["state"] == "landed"
+    assert json.loads(lines[-1])["mission"]["state"] == "landed"
     monkeypatch.setenv(TOKEN_VARIABLE, "something else")
     refused = run(cli, ["remote", "pause"])
     assert isinstance(refused.exception, ConfigError)

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
+from robot_statuses import robot_status
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.mission import MissionState
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import (
@@ -21,7 +24,6 @@ from aerodaas.protocol.schemas import (
     MissionPhase,
     Role,
     Scope,
-    StatusOut,
     StreamKind,
 )
 from aerodaas.service import mission as missions
@@ -197,11 +199,8 @@ class Provider:
 
     def land(self, **changes: object) -> None:
         """End the newest flight, with its drone on the ground but for the changes."""
-        numbers = ("time", "distance", "waypoints_visited", "waypoints_known")
-        lists = ("pending", "visited", "given_up", "faults")
-        content: dict[str, Any] = {"state": "landed", "reason": "", "target": None}
-        content |= {"mode": "grounded", "battery": 0.7, **dict.fromkeys(numbers, 1)}
-        status = StatusOut(**{**content, **{name: [] for name in lists}, **changes})
+        ended: dict[str, Any] = {"state": MissionState.LANDED, "mode": VehicleMode.GROUNDED}
+        status = robot_status(**{**ended, "battery": 0.7, **changes})
         self.started[-1].end(
             Outcome(landed=True, began=0.0, ended=1.0, status={"one": status}, reason="over")
         )

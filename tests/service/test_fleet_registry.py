@@ -11,11 +11,14 @@ from typing import Any
 
 import pytest
 from offered import PILOT, Provider
+from robot_statuses import robot_status
 
 from aerodaas.errors import MissionError
 from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.messages.mission import MissionState, RobotStatus
+from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.preflight import PreflightOut
-from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role, StatusOut
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service import fleet_registry as garages
 from aerodaas.service.errors import RefusedError
 
@@ -47,12 +50,9 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.missions.close()
 
 
-def status(at: float, **changes: Any) -> dict[str, StatusOut]:  # noqa: ANN401 - its fields
+def status(at: float, **changes: Any) -> dict[str, RobotStatus]:  # noqa: ANN401 - its fields
     """What a mission tells of drone `one` at its own time."""
-    lists: dict[str, Any] = {name: [] for name in ("pending", "visited", "given_up", "faults")}
-    counts = dict.fromkeys(("distance", "waypoints_visited", "waypoints_known"), 1)
-    flying = {"state": "enroute", "reason": "", "target": None, "mode": "guided", "battery": 0.7}
-    return {"one": StatusOut(time=at, **{**lists, **counts, **flying, **changes})}
+    return {"one": robot_status(at, **{"battery": 0.7, **changes})}
 
 
 def seen(provider: Provider) -> RobotOut:
@@ -108,7 +108,7 @@ def test_the_end_of_a_flight_is_of_its_own_time(provider: Provider, clock: Clock
     """Also where the service was away meanwhile."""
     clock.now = T0 + 3600.0
     provider.registry.record_status(
-        status(90.0, state="landed", mode="grounded", battery=0.4), ended=T0
+        status(90.0, state=MissionState.LANDED, mode=VehicleMode.GROUNDED, battery=0.4), ended=T0
     )
     assert (seen(provider).battery, seen(provider).heard) == (0.4, T0)
 

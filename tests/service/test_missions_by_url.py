@@ -73,7 +73,8 @@ def test_the_farm_survey_flies_by_url_as_it_flies_at_home(farm: Served, tmp_path
     assert status == 200
     assert picture.startswith(b"\x89PNG")
     (used,) = farm.ask("GET", "/v1/usage", token=token)
-    assert used["distance"] == pytest.approx(mission["status"]["quadrotor_base"]["distance"])
+    status = mission["status"]["quadrotor_base"]
+    assert used["distance"] == pytest.approx(status["mission"]["distance"])
 
 
 @pytest.fixture(scope="module")

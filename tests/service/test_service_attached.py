@@ -81,8 +81,12 @@ def test_another_tenant_senses_beside_the_flight(provider: Served) -> None:
     assert provider.send("GET", f"/v1/missions/{host}", token=bela)[0] == 404
     stuck = process_of(provider, id_)
     stuck.suspend()
-    flown = provider.mission(host)["status"]["one"]["distance"]
-    provider.until(lambda: provider.mission(host)["status"]["one"]["distance"] > flown + 4.0)
+
+    def flown() -> float:
+        return float(provider.mission(host)["status"]["one"]["mission"]["distance"])
+
+    before = flown()
+    provider.until(lambda: flown() > before + 4.0)
     stuck.resume()
     assert provider.mission(host)["alerts"] == []
     provider.ask("DELETE", f"/v1/missions/{host}/grants/tbela", None, users["asha"])
@@ -98,7 +102,7 @@ def test_another_tenant_senses_beside_the_flight(provider: Served) -> None:
         assert recording.complete
         assert any("seen" in topic for topic in recording.topics)
     provider.ask("DELETE", f"/v1/missions/{host}", None, users["asha"])
-    assert provider.until_phase(host)["status"]["one"]["state"] == "landed"
+    assert provider.until_phase(host)["status"]["one"]["mission"]["state"] == "landed"
     (used,) = [one for one in provider.ask("GET", "/v1/usage") if one["mission"] == id_]
     assert (used["tenant"], used["flight_seconds"]) == ("tbela", 0.0)
     noted = [one for one in provider.ask("GET", "/v1/audit?limit=200") if not one["accepted"]]

@@ -43,7 +43,7 @@ def submitted(provider: Served, name: str, *places: tuple[float, float], **more:
 
 def state_of(mission: dict[str, Any], name: str) -> str:
     """State of a mission's drone."""
-    return str(mission["status"].get(name, {}).get("state", ""))
+    return str(mission["status"].get(name, {}).get("mission", {}).get("state", ""))
 
 
 def flying(provider: Served, id_: str, name: str, *states: str) -> None:
@@ -82,7 +82,7 @@ def test_commands_reach_the_drone_and_answers_come_back(provider: Served) -> Non
     assert provider.ask("POST", command, {"robot": "one", "command": "resume"})["accepted"]
     ended = provider.until_phase(id_)
     assert ended["phase"] == "landed"
-    assert set(ended["status"]["one"]["visited"]) == {"wp0", "wp1", "wp2", "more"}
+    assert set(ended["status"]["one"]["mission"]["visited"]) == {"wp0", "wp1", "wp2", "more"}
     late = provider.ask("POST", command, {"robot": "one", "command": "pause"})
     assert late == (409, f"{id_} is over: landed")
 
@@ -100,7 +100,7 @@ def test_waypoints_take_the_place_of_a_queue(provider: Served) -> None:
     assert provider.ask("POST", navigation, {**new, "deadline": 1000.0})["accepted"]
     ended = provider.until_phase(id_)
     assert ended["phase"] == "landed"
-    assert ended["status"]["one"]["visited"] == ["new"]
+    assert ended["status"]["one"]["mission"]["visited"] == ["new"]
 
 
 def test_a_pilot_surveys_rearranges_and_flies_by_hand(provider: Served) -> None:
@@ -122,7 +122,7 @@ def test_a_pilot_surveys_rearranges_and_flies_by_hand(provider: Served) -> None:
         assert provider.send("POST", route, body, viewer)[0] == 403
         assert provider.send("POST", route, body, stranger)[0] == 404
     assert provider.ask("POST", routes["plan"], order)["accepted"]
-    provider.until(lambda: told(provider, id_)["pending"] == ["wp2", "wp1"])
+    provider.until(lambda: planned(provider, id_) == ["wp2", "wp1"])
     for token, status in ((viewer, 403), (stranger, 404), ("aerodaas_wrong", 401)):
         with pytest.raises(InvalidStatus) as refused, by_hand(provider, id_, token):
             pass
@@ -133,15 +133,15 @@ def test_a_pilot_surveys_rearranges_and_flies_by_hand(provider: Served) -> None:
             answer = json.loads(second.recv(20))
         assert (answer["held"], answer["text"]) == (False, "hana has the controls")
         until = time.monotonic() + 30.0
-        while told(provider, id_)["position"][2] < 3.0:
+        while height(provider, id_) < 3.0:
             assert time.monotonic() < until
             climb(controls)
-        assert told(provider, id_)["pilot"] == "hana"
+        assert told(provider, id_)["mission"]["pilot"] == "hana"
         provider.ask("PATCH", "/v1/accounts/hana", {"disabled": True})
         with pytest.raises(ConnectionClosed):
             climb(controls, until)
-    provider.until(lambda: told(provider, id_)["pilot"] == "")
-    assert told(provider, id_)["state"] == "paused"
+    provider.until(lambda: told(provider, id_)["mission"]["pilot"] == "")
+    assert told(provider, id_)["mission"]["state"] == "paused"
     home = {"robot": "one", "command": "return-home"}
     assert provider.ask("POST", f"/v1/missions/{id_}/commands", home)["accepted"]
     assert provider.until_phase(id_)["phase"] == "landed"
@@ -153,6 +153,16 @@ def told(provider: Served, id_: str) -> dict[str, Any]:
     """What the mission's drone says of itself."""
     status: dict[str, Any] = provider.mission(id_)["status"]["one"]
     return status
+
+
+def planned(provider: Served, id_: str) -> list[str]:
+    """Ids of the waypoints after the drone's target."""
+    return [one["id"] for one in told(provider, id_)["mission"]["pending"]]
+
+
+def height(provider: Served, id_: str) -> float:
+    """Metres of the drone above home."""
+    return float(told(provider, id_)["vehicle"]["odometry"]["position"]["z"])
 
 
 def by_hand(provider: Served, id_: str, token: str) -> ClientConnection:
@@ -179,7 +189,7 @@ def test_a_flight_that_is_cancelled_while_it_is_launched_does_not_fly(provider: 
     assert answer["phase"] == "flying", answer
     ended = provider.until_phase(id_)
     assert ended["phase"] == "cancelled", ended["reason"]
-    assert ended["status"].get("one", {}).get("visited", []) == []
+    assert ended["status"].get("one", {}).get("mission", {}).get("visited", []) == []
 
 
 def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> None:
@@ -202,7 +212,7 @@ def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> N
     provider.ask("POST", f"/v1/missions/{id_}/commands", {"robot": "one", "command": "resume"})
     ended = provider.until_phase(id_)
     assert ended["phase"] == "landed"
-    assert ended["status"]["one"]["visited"] == ["wp0", "wp1", "wp2"]
+    assert ended["status"]["one"]["mission"]["visited"] == ["wp0", "wp1", "wp2"]
 
 
 def test_what_ended_while_the_service_was_away_is_told(provider: Served) -> None:
@@ -216,7 +226,7 @@ def test_what_ended_while_the_service_was_away_is_told(provider: Served) -> None
     provider.start()
     ended = provider.until_phase(id_)
     assert ended["phase"] == "landed"
-    assert ended["status"]["one"]["visited"] == ["wp0"]
+    assert ended["status"]["one"]["mission"]["visited"] == ["wp0"]
     assert [one["mission"] for one in provider.ask("GET", "/v1/usage")].count(id_) == 1
 
 
@@ -254,7 +264,7 @@ def test_a_lease_that_ends_brings_the_drone_home(provider: Served) -> None:
     assert late["text"].startswith("the drones come home: the lease has ended")
     ended = provider.until_phase(id_)
     assert "the lease has ended" in ended["reason"]
-    assert len(ended["status"]["one"]["visited"]) < 3
+    assert len(ended["status"]["one"]["mission"]["visited"]) < 3
 
 
 def test_a_revoked_lease_brings_the_drone_home(provider: Served) -> None:
@@ -265,7 +275,7 @@ def test_a_revoked_lease_brings_the_drone_home(provider: Served) -> None:
     provider.ask("DELETE", f"/v1/leases/{lease['id']}")
     ended = provider.until_phase(id_)
     assert "the lease has ended" in ended["reason"]
-    assert len(ended["status"]["one"]["visited"]) < 3
+    assert len(ended["status"]["one"]["mission"]["visited"]) < 3
 
 
 def test_a_silent_user_is_a_reason_to_return_where_the_mission_says_so(provider: Served) -> None:
@@ -277,7 +287,7 @@ def test_a_silent_user_is_a_reason_to_return_where_the_mission_says_so(provider:
     provider.start()
     ended = provider.until_phase(id_)
     assert "nothing was heard of the user for 4 s" in ended["reason"]
-    assert len(ended["status"]["one"]["visited"]) < 3
+    assert len(ended["status"]["one"]["mission"]["visited"]) < 3
 
 
 def test_a_cancelled_mission_comes_home(provider: Served) -> None:
@@ -287,7 +297,7 @@ def test_a_cancelled_mission_comes_home(provider: Served) -> None:
     provider.ask("DELETE", f"/v1/missions/{id_}")
     ended = provider.until_phase(id_)
     assert ended["phase"] == "cancelled"
-    assert ended["status"]["one"]["state"] == "landed"
+    assert ended["status"]["one"]["mission"]["state"] == "landed"
 
 
 def test_missions_for_one_drone_wait_for_each_other(provider: Served) -> None:

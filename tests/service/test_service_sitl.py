@@ -83,20 +83,20 @@ def test_who_provides_it_stays_in_command(served: Served, relay: Relay) -> None:
     assert served.ask("POST", way, instead, token)["accepted"]
     beyond = {"robot": "drone", "waypoints": [place("beyond", 200, 0)]}
     assert "beyond" in str(served.ask("POST", way, beyond, token))
-    served.until(lambda: "near" in served.mission(id_)["status"]["drone"]["visited"])
+    served.until(lambda: "near" in served.mission(id_)["status"]["drone"]["mission"]["visited"])
     served.ask("DELETE", f"/v1/leases/{lease}")
     ended = served.until_phase(id_)
     assert ended["phase"] == "landed"
     assert "lease has ended" in ended["reason"]
-    assert "far" not in ended["status"]["drone"]["visited"]
+    assert "far" not in ended["status"]["drone"]["mission"]["visited"]
     assert relay.witness.away < 1.5
     assert not relay.witness.armed
 
 
 def north(mission: dict[str, Any]) -> float:
     """Metres north of home, as far as the service knows."""
-    position = mission["status"].get("drone", {}).get("position") or (0.0, 0.0, 0.0)
-    return float(position[1])
+    vehicle = mission["status"].get("drone", {}).get("vehicle")
+    return float(vehicle["odometry"]["position"]["y"] or 0.0) if vehicle else 0.0
 
 
 def place(name: str, east: float, north: float) -> dict[str, object]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import nan
+
 import pytest
 from provider_stub import mission, status
 
-from aerodaas.messages.waypoints import Waypoint
+from aerodaas.messages.mission import MissionState
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.terminal.provided import ProvidedView, phase_text
 
 
 def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -> None:
     """State, place and charge, as of a flight of one's own; alerts once."""
-    with ProvidedView(shown=True, places={"a": Waypoint("a", 5, 0, 2)}) as view:
+    with ProvidedView(shown=True) as view:
         view.update(mission(alerts=["low battery"]))
         view.show_message("the connection is lost")
     captured = capsys.readouterr()
@@ -22,12 +25,13 @@ def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_what_is_unknown_is_shown_as_such(capsys: pytest.CaptureFixture[str]) -> None:
-    """A drone without a position or a state that this version does not know."""
-    lost = status(position=[None, None, None], battery=None, state="somersaulting", yaw=None)
+    """A drone without a position, and one without a vehicle's state."""
+    lost = status(position=(nan, nan, nan), battery=nan)
+    early = replace(status(), vehicle=None)
     with ProvidedView(shown=True) as view:
-        view.update(mission(status={"drone": lost, "other": status(position=None)}))
+        view.update(mission(status={"drone": lost, "other": early}))
     shown = capsys.readouterr().out
-    assert "drone idle" in shown
+    assert "drone enroute" in shown
     assert "other enroute" in shown
 
 
@@ -37,7 +41,7 @@ def test_what_was_not_told_anew_is_called_old(
     """A provider repeats what it knows of a flight that hangs; who has landed tells no more."""
     now = 100.0
     monkeypatch.setattr("aerodaas.terminal.provided.time.monotonic", lambda: now)
-    flying, landed = status(), status(state="landed")
+    flying, landed = status(), status(state=MissionState.LANDED)
     with ProvidedView(shown=True) as view:
         view.update(mission(status={"one": flying, "two": landed}))
         now += 40.0

@@ -406,7 +406,7 @@ class ProviderClient:
         body = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
         answer = self._exchange.ask(method, path, body, headers)
         try:
-            return TypeAdapter(kind).validate_python(answer)
+            return TypeAdapter(kind).validate_python(answer, extra="ignore")
         except ValidationError as error:
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"]))

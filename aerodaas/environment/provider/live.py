@@ -53,7 +53,7 @@ class LiveConnection(WireConnection):
 
     def _mission(self, message: dict[str, Any]) -> MissionOut:
         try:
-            return MissionOut.model_validate(printed(message.get("mission")))
+            return MissionOut.model_validate(printed(message.get("mission")), extra="ignore")
         except ValidationError as error:
             place = ".".join(map(str, error.errors()[0]["loc"]))
             raise self.exchange.strange(f"the mission's {place}") from None

@@ -9,8 +9,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NoReturn
 
-import numpy as np
-
+from aerodaas.clock import seconds
 from aerodaas.config.extras import require_extra
 from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
@@ -30,7 +29,6 @@ from aerodaas.errors import (
     RecordingError,
     SourceError,
 )
-from aerodaas.messages.waypoints import HeightDatum, Waypoint
 from aerodaas.mission.commands import Answer, Command, initial_commands
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
 from aerodaas.runtime.checks import check_graph
@@ -109,7 +107,7 @@ class ProvidedRun:
             mission = submit(
                 self._client, written.document, written.models, self.options, starting.begin
             )
-            view = self._view = ProvidedView(shown=self.options.view, places=self._places())
+            view = self._view = ProvidedView(shown=self.options.view)
             follower = self._follower = MissionFollower(
                 self._client, mission, self._say, on_state=view.print_alerts
             )
@@ -267,22 +265,10 @@ class ProvidedRun:
                 if mission.phase.over:
                     return
 
-    def _places(self) -> dict[str, Waypoint]:
-        """The application's own waypoints by id, in local ENU; the map shows them."""
-        home, found = self.config.home, {}
-        origin = home.origin if home else None
-        starts = {robot.id: np.array(robot.start) for robot in self.config.robots}
-        # How high sea and ground lie, the provider may know alone, and a map does not show.
-        level = HeightDatum(0.0, lambda *_: 0.0)
-        for edge in self.graph.navigation:
-            for waypoint in edge.navigation.waypoints:
-                found[waypoint.id] = waypoint.resolve(starts[edge.robot], origin, level)
-        return found
-
-    def _come_home(self, seconds: float) -> None:
+    def _come_home(self, patience: float) -> None:
         """Have the provider end the mission, and watch it for a limited time."""
         self._called_home = True
-        until, waiting = time.monotonic() + seconds, pauses()
+        until, waiting = time.monotonic() + patience, pauses()
         while not self.over and time.monotonic() < until:
             try:
                 self._client.cancel(self._id)
@@ -330,8 +316,9 @@ class ProvidedRun:
         here = self._fetch(mission)
         for hook in self.on_end:
             hook()
-        times = [status.time for status in mission.status.values()]
-        show_speed(self.options, max(times, default=0.0), flown, self._flying_since - self._began)
+        stamps = [one.mission.stamp for one in mission.status.values()]
+        time_flown = seconds(max(stamps, default=0))
+        show_speed(self.options, time_flown, flown, self._flying_since - self._began)
         if here and self.recording is not None:
             show_results(self.options, [self.recording])
         self._report()

@@ -12,14 +12,14 @@ from foxglove.messages import Log, LogLevel
 from aerodaas.clock import seconds
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.envelope import Message
-from aerodaas.messages.mission import MissionStatus
+from aerodaas.messages.mission import MissionPlan, MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import Vitals
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, convert, robot_of
 from aerodaas.recording.converters.plan import plan_entries
 from aerodaas.recording.encoding import Entry, plain
-from aerodaas.recording.messages import MissionPlan, NavigationRecord, json_entry
+from aerodaas.recording.messages import NavigationRecord, json_entry
 
 __all__ = ["log_entry"]
 
@@ -117,9 +117,8 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
     if session.changed("faults", stream, item.faults):
         for fault in item.faults:
             yield log_entry(session, item.stamp, LogLevel.Warning, f"{robot} safety", fault)
-    ahead = ((item.target,) if item.target is not None else ()) + item.pending
-    if _is_new_plan(ahead, stream, session):
-        yield from plan_entries(MissionPlan(item.stamp, ahead), robot, stream, session)
+    if _is_new_plan(item.ahead, stream, session):
+        yield from plan_entries(MissionPlan(item.stamp, item.ahead), robot, stream, session)
 
 
 def _is_new_plan(ahead: tuple[Waypoint, ...], stream: str, session: Session) -> bool:

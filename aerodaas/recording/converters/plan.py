@@ -25,10 +25,11 @@ from foxglove.messages import (
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.identifiers import internal
+from aerodaas.messages.mission import MissionPlan
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.recording.converters.base import Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, topic
-from aerodaas.recording.messages import MissionPlan, json_entry
+from aerodaas.recording.messages import json_entry
 from aerodaas.recording.reference_frames import MAP_FRAME, from_rpy
 from aerodaas.recording.report.overlay import OKABE_ITO, rgb
 

@@ -47,11 +47,14 @@ def _vehicle_state(value: dict[str, Any]) -> dict[str, Any]:
 
 
 def _mission_status(value: dict[str, Any]) -> dict[str, Any]:
-    """The number of waypoints ahead was `pending`; early ones name all visits and count none."""
+    """The number of waypoints ahead was `pending`; early ones name all visits and count nothing."""
     pending = value.get("pending")
     ahead = pending if type(pending) is int and pending > 0 else 0
     kept = {name: one for name, one in value.items() if name != "pending"}
-    return {"visits": len(value["visited"]), **kept, "ahead": ahead}
+    visited = len(set(value["visited"]))
+    known = visited + ahead + (value.get("target") is not None)
+    counts = {"visits": len(value["visited"]), "waypoint_counts": [visited, known]}
+    return {**counts, **kept, "ahead": ahead}
 
 
 def _plan(value: dict[str, Any]) -> dict[str, Any]:

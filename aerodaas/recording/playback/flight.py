@@ -10,14 +10,13 @@ from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError
-from aerodaas.messages.mission import Decision
+from aerodaas.messages.mission import Decision, MissionPlan
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
-from aerodaas.protocol.playback import AlertOut, RecordedOut
+from aerodaas.protocol.playback import RecordedOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 from aerodaas.recording.decoding.limits import MAX_KEYS
-from aerodaas.recording.messages import MissionPlan
 from aerodaas.recording.pictures import (
     CALIBRATION_SCHEMA,
     DETECTIONS_SCHEMA,
@@ -107,7 +106,7 @@ class _Reading:
         self._recording = recording
         self._room = Room()
         self._robots: dict[str, TrackBuilder] = {}
-        self._alerts: list[AlertOut] = []
+        self._alerts: list[Alert] = []
         self._sums = DecisionSums()
         known = recording.topics
         pictures = picture_topics(recording)[:MAX_KEYS]
@@ -156,18 +155,16 @@ class _Reading:
         message = record.value
         if isinstance(message, Alert):
             if self._room.reserve(1):
-                time = seconds(message.header.stamp)
-                alert = AlertOut(time=time, kind=message.kind, text=message.text)
-                self._alerts.append(alert)
+                self._alerts.append(Alert(message.header, message.kind, message.text))
         elif isinstance(message, Decision):
             self._sums.add(message)
         elif (robot := self._robot(record.labels.robot)) is not None:
             if isinstance(message, VehicleState):
-                robot.state(message)
+                robot.add_state(message)
             elif isinstance(message, MissionPlan):
-                robot.plan(message)
+                robot.add_plan(message)
             else:
-                robot.mission(message, record.labels.ahead)
+                robot.add_status(message, record.labels.ahead)
 
     def _robot(self, name: str) -> TrackBuilder | None:
         known = self._robots.get(name)
@@ -191,7 +188,7 @@ class _Reading:
             remark=_remark(recording, last, self._room.untold),
             **_surroundings(recording),
             tracks={name: one.track for name, one in self._robots.items()},
-            alerts=sorted(self._alerts, key=lambda one: one.time),
+            alerts=sorted(self._alerts, key=lambda one: one.header.stamp),
             analytics=self._sums.rows,
             streams={
                 **dict.fromkeys(self._pictures, StreamKind.PICTURES),

@@ -13,13 +13,13 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.messages.mission import Place, RobotStatus
 from aerodaas.protocol.schemas import (
     Area,
     Positive,
     Role,
     Scope,
     SilencePolicy,
-    StatusOut,
     VerdictOut,
 )
 from aerodaas.service.access.principal import Principal, require
@@ -154,8 +154,10 @@ class Outcome(_Record):
     began: float
     ended: float
     """Unix seconds."""
-    status: dict[str, StatusOut] = Field(default_factory=dict)
+    status: dict[str, RobotStatus] = Field(default_factory=dict)
     """Last status by robot."""
+    places: dict[str, dict[str, Place]] = Field(default_factory=dict)
+    """As `MissionOut` has them."""
     alerts: list[str] = Field(default_factory=list)
     flight_seconds: float = 0.0
     """Sum of its robots' time in flight, mission seconds."""

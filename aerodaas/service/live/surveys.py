@@ -11,9 +11,9 @@ import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.errors import MissionError
+from aerodaas.messages.mission import Place, RobotStatus
 from aerodaas.mission.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
-from aerodaas.protocol.schemas import StatusOut
 from aerodaas.schedulers.trajectory.coverage import footprint
 
 __all__ = ["SurveyPlanner"]
@@ -34,7 +34,7 @@ class SurveyPlanner:
         self._places = threading.BoundedSemaphore(_MOST_ASKED)
 
     def plan(
-        self, wanted: SurveyIn, config: EnvironmentConfig, status: StatusOut | None
+        self, wanted: SurveyIn, config: EnvironmentConfig, status: RobotStatus | None
     ) -> SurveyOut:
         """Plan a survey by a robot.
 
@@ -67,7 +67,7 @@ class SurveyPlanner:
             length=survey.length,
             seconds=survey.seconds,
             battery=survey.battery,
-            available=None if status.battery is None else max(0.0, status.battery - reserve),
+            available=None if status.charge is None else max(0.0, status.charge - reserve),
             start=start,
             photos=_photos(survey.photos),
         )
@@ -128,10 +128,8 @@ def _photos(photos: SurveyPhotos | None) -> SurveyPhotosOut | None:
     )
 
 
-def _start(status: StatusOut, takeoff: tuple[float, float, float]) -> tuple[float, float, float]:
+def _start(status: RobotStatus, takeoff: Place) -> Place:
     """Where the drone will come from: its last coming waypoint, or where it is."""
-    ahead = [one for one in (status.target, *status.pending) if one in status.places]
-    if ahead:
-        return status.places[ahead[-1]]
-    east, north, up = status.position or takeoff
-    return takeoff if east is None or north is None or up is None else (east, north, up)
+    if ahead := status.mission.ahead:
+        return ahead[-1].x, ahead[-1].y, ahead[-1].z
+    return status.place or takeoff

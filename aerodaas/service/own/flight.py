@@ -5,18 +5,18 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections import OrderedDict, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol
 
 from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
-from aerodaas.messages.mission import GROUNDED
+from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus, Place, RobotStatus
 from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, told_of_controls
@@ -33,7 +33,6 @@ from aerodaas.protocol.schemas import (
     PictureForm,
     RobotOut,
     Role,
-    StatusOut,
 )
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.backend import PilotCommand
@@ -49,18 +48,17 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightMeter", "FlightRun", "OwnFlight"]
 
-_Place: TypeAlias = tuple[float, float, float]
 _ALERTS = 50
 """Most alerts told, the newest ones."""
 _PLACES = 200
-"""Most waypoints of a robot whose places are told, unless more lie ahead."""
+"""Most waypoints of a robot whose places are known, unless more lie ahead."""
 
 
 class FlightMeter:
     """Newest status of each robot, and sums over the flight."""
 
     def __init__(self) -> None:
-        self.status: dict[str, StatusOut] = {}
+        self.status: dict[str, RobotStatus] = {}
         """By robot; replaced and never changed, because other threads read it."""
         self.told: dict[str, float] = {}
         """Host time in seconds when each robot's newest status came; replaced as that is."""
@@ -69,7 +67,8 @@ class FlightMeter:
         self.alerts: list[str] = []
         self.analytics: AnalyticsOut | None = None
         """Figures of the analytics scheduler; None before its first outcome."""
-        self._places: dict[str, OrderedDict[str, _Place]] = defaultdict(OrderedDict)
+        self._known: dict[str, dict[str, Place]] = defaultdict(dict)
+        """Places of each robot's waypoints by id, those known last at the end."""
         self._flown: dict[str, float] = defaultdict(float)
         self._charges: dict[str, tuple[float, float]] = {}
         """First and newest known charge by robot."""
@@ -77,45 +76,49 @@ class FlightMeter:
     @property
     def time(self) -> float:
         """Mission seconds of the newest status."""
-        return max((one.time for one in self.status.values()), default=0.0)
+        return seconds(max((one.mission.stamp for one in self.status.values()), default=0))
+
+    @property
+    def places(self) -> dict[str, dict[str, Place]]:
+        """Places of the waypoints that lie behind each robot, by id."""
+        known = {name: dict(self._known[name]) for name in self.status}
+        for name, status in self.status.items():
+            for waypoint in status.mission.ahead:
+                known[name].pop(waypoint.id, None)
+        return known
 
     def record(self, state: FlightState) -> None:
         """Record a state of the run."""
         told = {}
         for name, report in state.robots.items():
-            now, before = seconds(report.mission.stamp), self.status.get(name)
+            now, before = report.mission.stamp, self.status.get(name)
             # The same status again is no news: who told it may hang.
-            same = before is not None and before.time == now
+            same = before is not None and before.mission.stamp == now
             told[name] = self.told[name] if same else seconds(host_time_ns())
             if before is not None and report.mission.state not in GROUNDED:
-                self._flown[name] += max(0.0, now - before.time)
+                self._flown[name] += seconds(max(0, now - before.mission.stamp))
+            self._remember(name, report.mission)
         self.told = told
-        self.status = {
-            name: self._remembering(name, StatusOut.of(report.mission, report.vehicle))
-            for name, report in state.robots.items()
-        }
+        self.status = {name: report.public for name, report in state.robots.items()}
         self.preflight = {
             name: PreflightOut.of_flight(name, report.health, report.mission.stamp)
             for name, report in state.robots.items()
         }
         for name, status in self.status.items():
-            if status.battery is not None:
-                first, _ = self._charges.get(name, (status.battery, status.battery))
-                self._charges[name] = first, status.battery
+            if (charge := status.charge) is not None:
+                first, _ = self._charges.get(name, (charge, charge))
+                self._charges[name] = first, charge
         self.alerts = [f"{one.kind}: {one.text}" for one in state.alerts[-_ALERTS:]]
         dispatcher = state.reports.get("dispatcher")
         if dispatcher is not None:
             self.analytics = AnalyticsOut.of(self.time, dispatcher.values)
 
-    def _remembering(self, name: str, status: StatusOut) -> StatusOut:
-        """A status with the places of waypoints that lie behind, too: those known last."""
-        known = self._places[name]
-        for waypoint, place in status.places.items():
-            known[waypoint] = place
-            known.move_to_end(waypoint)
-        while len(known) > max(_PLACES, len(status.places)):
-            known.popitem(last=False)
-        return status.model_copy(update={"places": dict(known)})
+    def _remember(self, name: str, mission: MissionStatus) -> None:
+        """Add the places of the waypoints ahead, and forget those known for longest."""
+        ahead = {one.id: (one.x, one.y, one.z) for one in mission.ahead}
+        behind = [one for one in self._known[name].items() if one[0] not in ahead]
+        spare = max(0, len(behind) - max(0, _PLACES - len(ahead)))
+        self._known[name] = {**dict(behind[spare:]), **ahead}
 
     def usage(self, reports: Mapping[str, ActorReport]) -> dict[str, Any]:
         """Usage of the flight, as `Outcome` has it; `reports` are its actors'."""
@@ -129,7 +132,7 @@ class FlightMeter:
                 calls += sum(one["frames"] for one in report.values.get("sites", {}).values())
         return {
             "flight_seconds": sum(self._flown.values()),
-            "distance": sum(one.distance for one in self.status.values()),
+            "distance": sum(one.mission.distance for one in self.status.values()),
             "battery_used": sum(max(0.0, first - last) for first, last in self._charges.values()),
             "compute_seconds": dict(compute),
             "cloud_calls": calls,
@@ -426,8 +429,8 @@ class OwnFlight:
             self._run.publish_alert("console_command", f"{asked}: {answer}")
 
     def _shown(self) -> MissionOut:
-        states = {one.state for one in self.meter.status.values()}
-        ended = MissionPhase.FAILED if "aborted" in states else MissionPhase.LANDED
+        states = {one.mission.state for one in self.meter.status.values()}
+        ended = MissionPhase.FAILED if MissionState.ABORTED in states else MissionPhase.LANDED
         return MissionOut(
             id=OWN,
             name=self._name,
@@ -438,6 +441,7 @@ class OwnFlight:
             submitted=self._began,
             started=self._began,
             status=self.meter.status,
+            places=self.meter.places,
             told={} if self.over else self.meter.told,
             alerts=self.meter.alerts,
             analytics=self.meter.analytics,
