@@ -78,8 +78,10 @@ class MessageDecoder:
             ConfigError: If decoding needs an extra that is not installed.
         """
         name = schema.name if schema else ""
+        if name in CHANNELS and channel.message_encoding != "json":
+            raise BrokenMessageError(f"{channel.topic}: {name} is not encoded as JSON")
         try:
-            if name in CHANNELS and channel.message_encoding == "json":
+            if name in CHANNELS:
                 labels, message = self._message(name, data)
                 return labels, decode_json(data) if as_json else message
             value = self._decoder(channel, schema)(data)
