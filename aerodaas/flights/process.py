@@ -154,7 +154,7 @@ class FlightProcess:
 
     @property
     def config(self) -> EnvironmentConfig:
-        """What is flown in, once the limits have been found to leave room for the flight."""
+        """Environment of the flight; raises MissionError before it has begun."""
         return self._built.config
 
     @property

@@ -1,4 +1,4 @@
-"""What a page is told of a flight's state and pictures, live as of a recording.
+"""Messages to a page about a flight's state and pictures, live as of a recording.
 
 Each message is one JSON object. Where `blob` is true, the bytes of its picture follow it.
 """
@@ -56,7 +56,7 @@ class DepthItem(AnswerModel):
 
 
 class TargetItem(AnswerModel):
-    """What a drone follows, in the frame that its command was made from."""
+    """Target that a drone follows, in the frame that its command was made from."""
 
     is_: Literal["Target"] = Field("Target", alias="is")
     header: Header
@@ -66,7 +66,7 @@ class TargetItem(AnswerModel):
 
 
 class FoundItem(AnswerModel):
-    """What an analysis found in a frame."""
+    """Detections of an analysis in a frame."""
 
     is_: Literal["Detections"] = Field("Detections", alias="is")
     of: Detections

@@ -210,7 +210,7 @@ class ControlsOut(AnswerModel):
 
 
 def told_of_controls(command: TakeControls | Steer | ReleaseControls) -> str:
-    """What people are told that somebody asked for; empty for a velocity, of which many come."""
+    """Words for a command in an alert; empty for a velocity, of which many come."""
     if isinstance(command, TakeControls):
         return f"be flown by hand by {command.operator}"
     return "be let go of" if isinstance(command, ReleaseControls) else ""

@@ -32,7 +32,7 @@ class PreflightOut(AnswerModel):
 
     @classmethod
     def of_flight(cls, robot: str, report: HealthReport | None, now: int) -> PreflightOut:
-        """What a flight's setpoint loop has found; `now` is its clock's, nanoseconds."""
+        """The list of a flight's setpoint loop; `now` is its clock's, nanoseconds."""
         if report is None:
             return cls(robot=robot)
         return cls.of(robot, report.items, seconds(max(0, now - report.stamp)))

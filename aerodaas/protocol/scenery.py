@@ -44,7 +44,7 @@ class TilesOut(AnswerModel):
 
 
 class SceneryOut(AnswerModel):
-    """What the map draws below a flight; empty where nothing is known."""
+    """Scenery that the map draws below a flight; empty where nothing is known."""
 
     shapes: list[ShapeOut] = Field(default_factory=list)
     tiles: TilesOut | None = None

@@ -68,7 +68,7 @@ _MOST_STORED = 2**63 - 1
 
 
 class Role(str, enum.Enum):
-    """What an account may do; each role may do what those before it may."""
+    """Role of an account; each role may do what those before it may."""
 
     VIEWER = "viewer"
     """See the fleet and one's own tenant's missions."""
@@ -86,7 +86,7 @@ class Role(str, enum.Enum):
 
 
 class Scope(str, enum.Enum):
-    """What a token may be used for, within its account's role."""
+    """Purpose of a token, within its account's role."""
 
     FLY = "fly"
     SENSE = "sense"
@@ -96,7 +96,7 @@ class Scope(str, enum.Enum):
 
 
 class SilencePolicy(str, enum.Enum):
-    """What a mission does when its user's connection is lost."""
+    """Behaviour of a mission when its user's connection is lost."""
 
     CONTINUE = "continue"
     RETURN = "return"
@@ -134,7 +134,7 @@ class MissionPhase(str, enum.Enum):
 
 
 class StreamKind(str, enum.Enum):
-    """What a page can draw of a stream."""
+    """Kind of items of a stream that a page can draw."""
 
     PICTURES = "pictures"
     DETECTIONS = "detections"
@@ -157,7 +157,7 @@ class PictureForm(str, enum.Enum):
 
 
 class LinkState(str, enum.Enum):
-    """Who is connected to a drone, and whether it answers."""
+    """State of the link to a drone: who is connected, and whether it answers."""
 
     UNWATCHED = "unwatched"
     """Nobody is: it is out of service, or this service does not watch."""
@@ -261,7 +261,7 @@ class LeaseOut(AnswerModel):
 
 
 class GrantIn(RequestModel):
-    """What a tenant may attach missions to."""
+    """Cameras that a tenant may attach missions to."""
 
     sensors: list[ScopedWord] = Field(default_factory=list, max_length=_MOST_ROBOTS)
     """Cameras by full id; none for all of the mission's."""
@@ -304,7 +304,7 @@ class VerdictOut(AnswerModel):
 
 
 class AnalyticsOut(AnswerModel):
-    """What the analytics scheduler has made of its tasks, from the start up to one time."""
+    """Sums over the tasks of the analytics scheduler, from the start up to one time."""
 
     time: float
     """Mission time, seconds."""
@@ -477,7 +477,7 @@ class AuditOut(AnswerModel):
 
 
 class TenantChange(RequestModel):
-    """What a tenant may use; what is not given stays, and null is no limit."""
+    """Quotas of a tenant; what is not given stays, and null is no limit."""
 
     weight: Positive = 1.0
     """Share of an edge that is shared, relative to the other tenants'."""
@@ -501,7 +501,7 @@ class TenantOut(TenantChange):
 
 
 class UsageOut(AnswerModel):
-    """What one mission has used."""
+    """Usage of one mission."""
 
     mission: str
     tenant: str

@@ -96,7 +96,7 @@ class EdgeArbiter:
 
     @staticmethod
     def _met(connection: socket.socket) -> _Flight | None:
-        """Whose flight it is, by its first line; None for one that does not tell."""
+        """Flight of a connection by its first line; None without one."""
         try:
             with connection.makefile("rb", buffering=0) as lines:
                 told = json.loads(lines.readline(_LONGEST_HEAD))

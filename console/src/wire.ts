@@ -1,7 +1,7 @@
 // Made from wire.schema.json by types.mjs; not to be edited.
 
 /**
- * What a token may be used for, within its account's role.
+ * Purpose of a token, within its account's role.
  */
 export type Scope = "fly" | "sense" | "compute";
 /**
@@ -69,7 +69,7 @@ export type VehicleMode =
   | "failsafe"
   | "lost";
 /**
- * What a page can draw of a stream.
+ * Kind of items of a stream that a page can draw.
  */
 export type StreamKind = "pictures" | "detections" | "navigation";
 
@@ -104,7 +104,7 @@ export interface AccountOut {
   disabled: boolean;
   name: string;
   /**
-   * What an account may do; each role may do what those before it may.
+   * Role of an account; each role may do what those before it may.
    */
   role: "viewer" | "pilot" | "operator" | "admin";
   scopes: Scope[];
@@ -194,7 +194,7 @@ export interface RobotOut {
   id: string;
   lease: string | null;
   /**
-   * Who is connected to a drone, and whether it answers.
+   * State of the link to a drone: who is connected, and whether it answers.
    */
   link: "unwatched" | "connecting" | "connected" | "mission" | "lost";
   mission: string | null;
@@ -256,7 +256,7 @@ export interface DepthItem {
   range: number;
 }
 /**
- * What a drone follows, in the frame that its command was made from.
+ * Target that a drone follows, in the frame that its command was made from.
  */
 export interface TargetItem {
   box: [number, number, number, number] | null;
@@ -269,7 +269,7 @@ export interface TargetItem {
   state: TargetState;
 }
 /**
- * What an analysis found in a frame.
+ * Detections of an analysis in a frame.
  */
 export interface FoundItem {
   is: "Detections";
@@ -404,7 +404,7 @@ export interface MissionOut {
   verdict: VerdictOut | null;
 }
 /**
- * What the analytics scheduler has made of its tasks, from the start up to one time.
+ * Sums over the tasks of the analytics scheduler, from the start up to one time.
  */
 export interface AnalyticsOut {
   cloud: number;
@@ -633,7 +633,7 @@ export interface Alert {
   };
 }
 /**
- * What the map draws below a flight; empty where nothing is known.
+ * Scenery that the map draws below a flight; empty where nothing is known.
  */
 export interface SceneryOut {
   shapes: ShapeOut[];
@@ -787,7 +787,7 @@ export interface SensorConfig {
   type: "camera" | "odometry" | "gps" | "battery" | "status";
 }
 /**
- * What the map draws below a flight; empty where nothing is known.
+ * Scenery that the map draws below a flight; empty where nothing is known.
  */
 export interface SceneryOut1 {
   shapes: ShapeOut[];

@@ -392,7 +392,7 @@ class ProviderClient:
         return self._ask(list[AuditOut], "GET", f"/v1/audit?limit={limit:d}")
 
     def usage(self) -> list[UsageOut]:
-        """What missions have used: the tenant's own, or all as an operator."""
+        """Usage of missions: the tenant's own, or all as an operator."""
         return self._ask(list[UsageOut], "GET", "/v1/usage")
 
     def _ask(

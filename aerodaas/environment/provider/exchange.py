@@ -224,7 +224,7 @@ def _text(answer: bytes) -> str:
 
 
 def printed(content: Any) -> Any:  # noqa: ANN401 - JSON
-    """The same JSON, its texts safe for a terminal: they are another's."""
+    """JSON of another's with texts that are safe for a terminal."""
     if isinstance(content, str):
         return printable(content)
     if isinstance(content, list):

@@ -175,7 +175,7 @@ _HOUR = 3600.0
 def rehearsal_config(
     config: EnvironmentConfig, battery: Mapping[str, float], seed: int | None = None
 ) -> EnvironmentConfig:
-    """The same environment with every driver and camera simulated.
+    """Copy of an environment with every driver and camera simulated.
 
     Limits, fences, starts, the world and its wind stay as they are. A robot with a driver of its
     own becomes a simulated drone whose full battery hovers for the `endurance` of its limits, and

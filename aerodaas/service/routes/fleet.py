@@ -40,7 +40,7 @@ class FleetRoutes:
         return self._fleet.seen_by(self._admission.require(request, Role.VIEWER))
 
     def scenery(self, request: Request) -> SceneryOut:
-        """What lies below the fleet on a map."""
+        """Scenery below the fleet on a map."""
         self._admission.require(request, Role.VIEWER)
         return self._fleet.fleet_scenery()
 

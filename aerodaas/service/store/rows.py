@@ -134,7 +134,7 @@ class Tenant(Row):
 
 
 class Account(Row):
-    """Somebody who uses the service."""
+    """Account of a user of the service."""
 
     __tablename__ = "accounts"
 
