@@ -11,7 +11,7 @@ from pydantic import Field
 
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Header
-from aerodaas.messages.waypoints import TargetState
+from aerodaas.messages.waypoints import FollowedTarget
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.schemas import MissionOut
 
@@ -60,9 +60,7 @@ class TargetItem(AnswerModel):
 
     is_: Literal["Target"] = Field("Target", alias="is")
     header: Header
-    state: TargetState
-    box: tuple[float, float, float, float] | None
-    """Left, top, right and bottom, pixels; null where it is not known."""
+    of: FollowedTarget
 
 
 class FoundItem(AnswerModel):

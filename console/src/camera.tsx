@@ -6,7 +6,7 @@ import type { Flight } from "./flight";
 import { type Painted, paint } from "./paint";
 import { KEPT, Pictures } from "./pictures";
 import { Badge, Button, Card, NameChoice } from "./widgets";
-import type { MissionOut, TargetItem } from "./wire";
+import type { FollowedTarget, MissionOut } from "./wire";
 
 const STALE = 1500;
 
@@ -15,13 +15,13 @@ interface Seen extends Painted {
   stamp: number;
   captured: number;
   measured: boolean;
-  target: TargetItem["state"] | null;
+  target: FollowedTarget["state"] | null;
   /** Metres at which the depth's colours end, where it is shown. */
   range: number | null;
 }
 
 /** What is said of the target in the picture that is shown. */
-const TARGETS: Record<TargetItem["state"], { text: string; tone: string }> = {
+const TARGETS: Record<FollowedTarget["state"], { text: string; tone: string }> = {
   sure: { text: "◎ follows", tone: "good" },
   likely: { text: "◎ follows the likelier one", tone: "warn" },
   uncertain: { text: "target uncertain: holds", tone: "warn" },

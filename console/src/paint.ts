@@ -1,7 +1,7 @@
 // What was found in a picture, drawn on it: depth, boxes, labels and the skeletons of bodies.
 
 import type { Picture } from "./pictures";
-import type { Detection, TargetItem } from "./wire";
+import type { Detection, FollowedTarget } from "./wire";
 
 const COLOURS = ["#ffb000", "#00c2a8", "#ff5d8f", "#6aa8ff", "#c6e03a", "#d58bff"];
 const SHADOW = "#10151c";
@@ -17,7 +17,7 @@ const BONES = [
   ...[[5, 6], [11, 12], [5, 11], [6, 12], [0, 5], [0, 6]],
 ] as const;
 
-type Box = NonNullable<TargetItem["box"]>;
+type Box = NonNullable<FollowedTarget["box"]>;
 type Found = Omit<Detection, "box" | "score"> & { box: Box; score: number };
 
 /** Whether a detection's place and score are known. */
@@ -70,7 +70,7 @@ function same(one: Found, other: Found): boolean {
   return close && one.label === other.label;
 }
 
-const MARKS: Record<TargetItem["state"], string> = {
+const MARKS: Record<FollowedTarget["state"], string> = {
   sure: "followed",
   likely: "followed?",
   uncertain: "",
@@ -80,7 +80,7 @@ const MARKS: Record<TargetItem["state"], string> = {
 /** Draw corners around what is followed, dashed where that is not sure, and the word below it. */
 function drawTarget(
   pen: CanvasRenderingContext2D,
-  { state }: TargetItem,
+  { state }: FollowedTarget,
   box: Box,
   width: number,
   height: number,

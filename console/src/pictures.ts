@@ -2,7 +2,7 @@
 
 import { type Depth, coloured } from "./depth";
 import { VideoDecoding } from "./video_decoder";
-import type { Detection, ItemMessage, PictureItem, TargetItem } from "./wire";
+import type { Detection, FollowedTarget, ItemMessage, PictureItem } from "./wire";
 
 type Header = PictureItem["header"];
 
@@ -20,7 +20,7 @@ export interface Picture {
   captured: number;
   camera: string;
   found: Map<string, Detection[]>;
-  target: TargetItem | undefined;
+  target: FollowedTarget | undefined;
   /** Whether the camera measured depth with it. */
   measured: boolean;
   depth: Depth | undefined;
@@ -29,7 +29,7 @@ export interface Picture {
 /** What came before its picture. */
 interface Early {
   found: Map<string, Detection[]>;
-  target: TargetItem | undefined;
+  target: FollowedTarget | undefined;
   depth: Depth | undefined;
 }
 
@@ -55,7 +55,7 @@ export class Pictures {
   async add(message: ItemMessage, data: ArrayBuffer | null): Promise<void> {
     const { item, stream } = message;
     if (item.is === "Detections") this.of(item.of.header).found.set(stream, item.of.items);
-    if (item.is === "Target") this.of(item.header).target = item;
+    if (item.is === "Target") this.of(item.header).target = item.of;
     if (!data || !("bytes" in item)) return;
     const bytes = new Uint8Array(data, 0, item.bytes[0]);
     if (item.is === "Depth") {

@@ -259,14 +259,21 @@ export interface DepthItem {
  * Target that a drone follows, in the frame that its command was made from.
  */
 export interface TargetItem {
-  box: [number, number, number, number] | null;
   header: {
     id: number;
     source: string;
     stamp: number;
   };
   is: "Target";
+  of: FollowedTarget;
+}
+/**
+ * The target of a velocity command. Its frame is the one that the command was made from.
+ */
+export interface FollowedTarget {
+  box: [number, number, number, number] | null;
   state: TargetState;
+  track_id: number | null;
 }
 /**
  * Detections of an analysis in a frame.

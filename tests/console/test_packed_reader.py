@@ -169,7 +169,8 @@ def test_a_page_is_told_what_is_followed_in_a_frame_and_nothing_else_of_commands
         assert found is not None
         item = found[0]["item"]
         assert item["header"] == {"id": 7, "stamp": 5, "source": SOURCE}
-        assert (item["is"], item["state"], item["box"]) == ("Target", "sure", [1.0, 2.0, 3.0, 4.0])
+        assert (item["is"], item["of"]["state"]) == ("Target", "sure")
+        assert item["of"]["box"] == [1.0, 2.0, 3.0, 4.0]
     reader = PackedReader(Commands(), "follower", PictureForm.WHOLE)
     whole = [reader.next_packed(0.1) for _ in commands]
     assert [unpack(one[0]["item"], one[1]).commands[0] for one in whole if one] == [

@@ -114,8 +114,8 @@ def test_any_time_gives_the_last_picture_captured(film: FrameIndex, times: list[
         assert len(followed) == (number % 4 == 0)
         for target in followed:
             assert target["header"]["stamp"] == CAPTURED[number]
-            assert (target["is"], target["state"]) == ("Target", "likely")
-            assert target["box"] == [number, 1.0, number + 2, 4.0]
+            assert (target["is"], target["of"]["state"]) == ("Target", "likely")
+            assert target["of"]["box"] == [number, 1.0, number + 2, 4.0]
         for one, _ in found:
             assert one["item"]["of"]["header"]["stamp"] == CAPTURED[number]
 

@@ -95,7 +95,7 @@ def packed_target(header: Header, target: FollowedTarget) -> dict[str, Any]:
         header: Header of the frame.
         target: The target.
     """
-    item = TargetItem.model_construct(header=header, state=target.state, box=target.box)
+    item = TargetItem.model_construct(header=header, of=target)
     return _json(item)
 
 
