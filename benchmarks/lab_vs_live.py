@@ -5,7 +5,7 @@ wall clock, and `SyntheticAnalytics` take the published models' times on the edg
 cloud. What this machine takes on the way to an executor and back is measured first and taken off
 the synthetic times, as the table's times include it. The lab then simulates the recorded flight:
 each task arrives when it did, and takes the time that was observed where it ran, or what it
-would have taken there at that time (`aerodaas.cli.recorded_workload`). So both see the same
+would have taken there at that time (`aerodaas.cli.lab.recorded_workload`). So both see the same
 machine, busy as it may be.
 """
 
@@ -24,7 +24,7 @@ from rich.progress import track
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.recorded_workload import RecordedWorkload, flown_trace, flown_workload
+from aerodaas.cli.lab.recorded_workload import RecordedWorkload, flown_trace, flown_workload
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace

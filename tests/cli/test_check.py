@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from flying import FLAT, robot
 
-from aerodaas.cli import check, doctor
+from aerodaas.cli import doctor
 from aerodaas.cli.app import main
+from aerodaas.cli.flying import check
 
 PARTS = """
 import math
@@ -176,7 +177,7 @@ def test_a_vehicle_is_judged_by_what_it_says_in_the_end(
     checked: Checked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Some is told late; until then it is read, and once it is judged."""
-    monkeypatch.setattr("aerodaas.cli.preflight._SETTLING", 0.5)
+    monkeypatch.setattr("aerodaas.cli.flying.preflight._SETTLING", 0.5)
     code, told = checked(vehicle="check_parts:Slow", camera="simulated")
     assert code == 0, told
     assert "ok drone check_parts:Slow answers: grounded, battery 100 %" in told
@@ -189,7 +190,7 @@ def test_a_charge_that_no_vehicle_tells_is_called_unknown(
     checked: Checked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is no number."""
-    monkeypatch.setattr("aerodaas.cli.preflight._SETTLING", 0.1)
+    monkeypatch.setattr("aerodaas.cli.flying.preflight._SETTLING", 0.1)
     _, told = checked(vehicle="check_parts:Uncharged", camera="simulated")
     assert "check_parts:Uncharged answers: grounded, battery unknown" in told
 

@@ -65,7 +65,7 @@ def look(monkeypatch: pytest.MonkeyPatch, command: str) -> int:
 def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    monkeypatch.setattr("aerodaas.cli.preflight._SETTLING", 0.2)
+    monkeypatch.setattr("aerodaas.cli.flying.preflight._SETTLING", 0.2)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -18,8 +18,8 @@ import pytest
 from flying import FLAT, Flyer, hop, recorded
 
 from aerodaas.cli.app import main
-from aerodaas.cli.seeds.figures import rows
-from aerodaas.cli.seeds.runs import SeededRun
+from aerodaas.cli.flying.seeds.figures import rows
+from aerodaas.cli.flying.seeds.runs import SeededRun
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 

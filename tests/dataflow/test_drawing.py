@@ -9,7 +9,7 @@ import pytest
 
 from aerodaas import Environment, MonitoringAnalytics
 from aerodaas.cli.app import main
-from aerodaas.cli.application import build_application
+from aerodaas.cli.flying.application import build_application
 from aerodaas.config.options import RunOptions
 from aerodaas.dataflow import graph as module
 from aerodaas.dataflow.drawing import mermaid

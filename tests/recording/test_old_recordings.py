@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from aerodaas import Environment
-from aerodaas.cli.recorded_workload import RecordedWorkload
+from aerodaas.cli.lab.recorded_workload import RecordedWorkload
 from aerodaas.clock import NANOSECONDS
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.environment.document.building import build_mission

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from rewritten import rewritten
 from synthetic_flight import SyntheticFlight, record
 
-from aerodaas.cli.recorded_workload import RecordedWorkload
+from aerodaas.cli.lab.recorded_workload import RecordedWorkload
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.config.preflight import PreflightConfig

@@ -10,7 +10,7 @@ import pytest
 from offered import PILOT, Provider
 from served import document
 
-from aerodaas.cli.serve import _actuators
+from aerodaas.cli.provider.serve import _actuators
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn

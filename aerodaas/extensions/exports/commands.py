@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.export import Folder, export
-from aerodaas.cli.report import Recorded
+from aerodaas.cli.recordings.export import Folder, export
+from aerodaas.cli.recordings.report import Recorded
 from aerodaas.extensions.exports.coco import write_coco
 from aerodaas.extensions.exports.lerobot import write_lerobot
 from aerodaas.extensions.exports.track import write_gpx, write_kml

@@ -12,8 +12,8 @@ from typing import Any
 
 import typer
 
-from aerodaas.cli.lab_study import spread_of
-from aerodaas.cli.lab_sweep import write_csv
+from aerodaas.cli.lab.study import spread_of
+from aerodaas.cli.lab.sweep import write_csv
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.leaderboard.markdown import markdown_page
 from aerodaas.extensions.leaderboard.origin import Origin

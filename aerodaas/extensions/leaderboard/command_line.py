@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.lab import Address, Jobs
+from aerodaas.cli.lab.command_line import Address, Jobs
 
 __all__ = ["leaderboard"]
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.flying.preflight import connected_robot
 from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.preflight import connected_robot
 from aerodaas.config.printable import printable

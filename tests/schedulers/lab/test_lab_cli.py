@@ -8,7 +8,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab import app
+from aerodaas.cli.lab.command_line import app
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop

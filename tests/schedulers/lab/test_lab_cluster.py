@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab import app
+from aerodaas.cli.lab.command_line import app
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.lab import Workload, run_lab
 

@@ -15,8 +15,8 @@ import pytest
 from matplotlib.axes import Axes
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab import app
-from aerodaas.cli.lab_sweep import parse_sweeps
+from aerodaas.cli.lab.command_line import app
+from aerodaas.cli.lab.sweep import parse_sweeps
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import extras
 from aerodaas.errors import ConfigError, SchedulerError, UnknownIdError
@@ -285,7 +285,7 @@ def test_the_command_explains_mistakes(tmp_path: Path, monkeypatch: pytest.Monke
     words = ("--sweep", "drones=1", "-s", "edf", "--duration", "2", "--seeds", "1", "--jobs", "1")
     code, text = run(*words, "-o", str(blocked))
     assert (code, "cannot write into" in text) == (2, True)
-    monkeypatch.setattr("aerodaas.cli.lab_sweep.has_extra", lambda _: False)
+    monkeypatch.setattr("aerodaas.cli.lab.sweep.has_extra", lambda _: False)
     code, text = run(*words, "-o", str(tmp_path / "out"))
     assert (code, "pip install 'aerodaas[plots]'" in text) == (0, True)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from aerodaas.cli.export import Folder, export
-from aerodaas.cli.report import Recorded
+from aerodaas.cli.recordings.export import Folder, export
+from aerodaas.cli.recordings.report import Recorded
 from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
 

@@ -138,7 +138,7 @@ def run(
 
         aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
     """
-    from aerodaas.cli.lab_study import study  # noqa: PLC0415 - loads numpy and the lab
+    from aerodaas.cli.lab.study import study  # noqa: PLC0415 - loads numpy and the lab
 
     with _errors_told():
         study(
@@ -217,7 +217,7 @@ def sweep(
         aerodaas lab sweep --sweep network=steady,trapezium --sweep cloud_slots=4,16 -s dems,gems
         aerodaas lab sweep --sweep scheduler.slack=10,50,100 -s mine.py:Mine,dems --baseline dems
     """
-    from aerodaas.cli.lab_sweep import sweep as run_all  # noqa: PLC0415 - loads numpy and the lab
+    from aerodaas.cli.lab.sweep import sweep as run_all  # noqa: PLC0415 - loads numpy and the lab
 
     with _errors_told():
         run_all(
@@ -242,6 +242,6 @@ def sweep(
 @app.command("list")
 def list_all() -> None:
     """Show the registered schedulers, the published models and the workloads' names."""
-    from aerodaas.cli.lab_study import registered  # noqa: PLC0415 - as above
+    from aerodaas.cli.lab.study import registered  # noqa: PLC0415 - as above
 
     registered()

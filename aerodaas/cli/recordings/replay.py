@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.application import run_application, speed_option
-from aerodaas.cli.report import Recorded
+from aerodaas.cli.flying.application import run_application, speed_option
+from aerodaas.cli.recordings.report import Recorded
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
 from aerodaas.config.printable import printable

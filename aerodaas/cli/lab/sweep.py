@@ -12,7 +12,7 @@ from typing import Any
 import typer
 from rich.console import Console
 
-from aerodaas.cli.lab_study import spread_of, workload_of
+from aerodaas.cli.lab.study import spread_of, workload_of
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import ConfigError, UnknownIdError
 from aerodaas.schedulers.lab.metrics import seeds_needed

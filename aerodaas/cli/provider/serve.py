@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.cli.application import speed_option
+from aerodaas.cli.flying.application import speed_option
 from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.deferred import deferred_group
-from aerodaas.cli.report import Recorded
+from aerodaas.cli.recordings.report import Recorded
 from aerodaas.config.extensions import Command, extensions
 from aerodaas.config.printable import printable
 from aerodaas.recording.reader import Recording
@@ -23,9 +23,9 @@ _Topics = Annotated[
     list[str], typer.Argument(metavar="TOPIC…", help="Channels, as `topics` lists them.")
 ]
 _CORE = (
-    Command("topics", "aerodaas.cli.export:topics", "List the channels of a recording."),
-    Command("csv", "aerodaas.cli.export:csv", "Write channels as CSV."),
-    Command("parquet", "aerodaas.cli.export:parquet", "Write channels as Parquet."),
+    Command("topics", "aerodaas.cli.recordings.export:topics", "List the channels of a recording."),
+    Command("csv", "aerodaas.cli.recordings.export:csv", "Write channels as CSV."),
+    Command("parquet", "aerodaas.cli.recordings.export:parquet", "Write channels as Parquet."),
 )
 
 

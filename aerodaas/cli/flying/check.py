@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.cli.application import build_application
+from aerodaas.cli.flying.application import build_application
+from aerodaas.cli.flying.preflight import settled_items
 from aerodaas.cli.options import OtherEnvironment, Overrides
-from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.errors import AeroDaaSError, GraphError, SourceError, VehicleError, failure_line

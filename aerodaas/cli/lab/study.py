@@ -182,7 +182,7 @@ def _loads(
         wanted = SIX if names == "six" else names.split(",")
         return [workload_of(name.strip(), duration, edges) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
-    from aerodaas.cli.recorded_workload import (  # noqa: PLC0415
+    from aerodaas.cli.lab.recorded_workload import (  # noqa: PLC0415
         RecordedWorkload,
         flown_trace,
         flown_workload,

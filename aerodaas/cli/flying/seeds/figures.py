@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from aerodaas.cli.seeds.runs import SeededRun
+from aerodaas.cli.flying.seeds.runs import SeededRun
 from aerodaas.schedulers.lab.metrics import mean_of
 from aerodaas.terminal.figures import Row, show_figures
 

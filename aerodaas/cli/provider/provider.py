@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from aerodaas.cli.application import run_application, submit_application
+from aerodaas.cli.flying.application import run_application, submit_application
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
 from aerodaas.errors import ConfigError, MissionError

@@ -19,8 +19,8 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
-from aerodaas.cli.application import run_application
 from aerodaas.cli.failure import Failure, failure_of, show_failure
+from aerodaas.cli.flying.application import run_application
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.signals import heed_interrupts, raise_on_signals
 from aerodaas.errors import ConfigError, IncompleteError, RecordingError

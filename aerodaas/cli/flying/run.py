@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.application import run_application, runtime_option, speed_option
+from aerodaas.cli.flying.application import run_application, runtime_option, speed_option
 from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.extensions import live_views
@@ -134,8 +134,8 @@ def run(
         application=application.resolve(),
     )
     if seeds is not None:
-        from aerodaas.cli.seeds.command import run_seeds  # noqa: PLC0415 - slow to load
-        from aerodaas.cli.seeds.runs import ApplicationRun  # noqa: PLC0415 - as above
+        from aerodaas.cli.flying.seeds.command import run_seeds  # noqa: PLC0415 - slow to load
+        from aerodaas.cli.flying.seeds.runs import ApplicationRun  # noqa: PLC0415 - as above
 
         seeded = ApplicationRun(application, context.args, options)
         run_seeds(seeded, seeds, jobs=jobs, json_path=json_path, csv_path=csv_path)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.application import build_application
+from aerodaas.cli.flying.application import build_application
 from aerodaas.cli.options import OtherEnvironment
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions

@@ -1,0 +1,1 @@
+"""`aerodaas lab`: analytics schedulers compared in simulation."""

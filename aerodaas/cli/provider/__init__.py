@@ -1,0 +1,1 @@
+"""Commands of a provider's fleet: serving it, and flying on it."""
