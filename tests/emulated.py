@@ -22,8 +22,8 @@ from autopilot import COMMANDS, SteppedClock, robot_of
 from typing_extensions import Self
 
 from aerodaas.clock import Clock
-from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig, MissionConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import LimitsConfig, MissionConfig, RobotConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.geometry.frames import GeodeticOrigin, Vector, wrap_angle
 from aerodaas.messages.mission import MissionState, MissionStatus, SetpointRecord

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import TypeAdapter, create_model
 from pydantic.json_schema import JsonSchemaMode
 
-from aerodaas.config.robot import CameraConfig, RobotConfig
+from aerodaas.config.sections.robot import CameraConfig, RobotConfig
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.live import EndMessage, ItemMessage, LeftOutMessage, StateMessage
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut

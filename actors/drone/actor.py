@@ -18,8 +18,8 @@ from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import IdleGarbageCollector, punctual, raise_niceness
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.losses import ALONE
-from aerodaas.config.file_lock import actor_lock, exclusive
 from aerodaas.errors import MissionError
+from aerodaas.files.file_lock import actor_lock, exclusive
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.options import ExampleGroup
-from aerodaas.config.printable import printable
+from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.analytics.detection.detector import OnnxDetector

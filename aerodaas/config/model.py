@@ -13,20 +13,19 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, SecretStr, field_serializer, model_validator
 from typing_extensions import Self
 
-from aerodaas.config.actuators import (
+from aerodaas.config.checked import Finite, NotNegative, Positive, Strict, checked
+from aerodaas.config.sections.actuators import (
     GripperConfig,
     ParachuteConfig,
     RelayConfig,
     ServoConfig,
 )
-from aerodaas.config.checked import Finite, NotNegative, Positive, Strict, checked
-from aerodaas.config.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
-from aerodaas.config.home import HomeConfig
-from aerodaas.config.json_text import check_plain, read_json
-from aerodaas.config.map_tiles import MapTilesConfig
-from aerodaas.config.preflight import PreflightConfig
-from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
-from aerodaas.config.robot import (
+from aerodaas.config.sections.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
+from aerodaas.config.sections.home import HomeConfig
+from aerodaas.config.sections.map_tiles import MapTilesConfig
+from aerodaas.config.sections.preflight import PreflightConfig
+from aerodaas.config.sections.remote_id import OperatorPlaceConfig, RemoteIdConfig
+from aerodaas.config.sections.robot import (
     CameraConfig,
     GeofenceConfig,
     GimbalConfig,
@@ -35,9 +34,10 @@ from aerodaas.config.robot import (
     RobotConfig,
     SensorConfig,
 )
-from aerodaas.config.terrain import TerrainConfig
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.terrain import TerrainConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier, ScopedName
+from aerodaas.text.json_text import check_plain, read_json
 
 __all__ = [
     "CameraConfig",

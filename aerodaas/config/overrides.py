@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerodaas.config.json_text import parse_json
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
 from aerodaas.errors import AmbiguousIdError, ConfigError, UnknownIdError
+from aerodaas.text.json_text import parse_json
 
 __all__ = ["located", "overridden", "parse_setting"]
 

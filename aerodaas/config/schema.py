@@ -7,8 +7,9 @@ import inspect
 import json
 from typing import Any
 
-from aerodaas.config import compute, home, model, preflight, robot, terrain
+from aerodaas.config import model
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.sections import compute, home, preflight, robot, terrain
 
 __all__ = ["environment_schema"]
 

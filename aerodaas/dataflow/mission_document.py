@@ -22,7 +22,6 @@ from pydantic import (
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
-from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError
 from aerodaas.identifiers import ScopedWord, Word
@@ -30,6 +29,7 @@ from aerodaas.messages.detections import Detections
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.readings import Readings
 from aerodaas.messages.waypoints import LARGEST, Waypoint
+from aerodaas.text.json_text import check_plain, read_json
 
 __all__ = [
     "HERE_CONDITION",

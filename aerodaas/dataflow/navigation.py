@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
-from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.extensions import service
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.dataflow.containers import AeroListData
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.errors import ConfigError, InvalidWaypointError

@@ -13,9 +13,9 @@ import numpy as np
 
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.sections.actuators import ACTUATOR_TYPES
 from aerodaas.drivers.setpoints import require_finite, slowed
 from aerodaas.errors import ClockError, InvalidWaypointError, VehicleError
 from aerodaas.messages.health import HealthReadings

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from aerodaas.config.actuators import actuator_objection
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.sections.actuators import actuator_objection
 from aerodaas.dataflow.graph import NavigationEdge, refusal
 from aerodaas.errors import GraphError
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aerodaas.config.actuators import actuator_objection, parachute_objection
 from aerodaas.config.model import RobotConfig
 from aerodaas.config.options import Speed
+from aerodaas.config.sections.actuators import actuator_objection, parachute_objection
 from aerodaas.dataflow.graph import NavigationEdge, refusal
 from aerodaas.dataflow.handles import Sensor
 from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor

@@ -11,13 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.config.actuators import (
+from aerodaas.config.sections.actuators import (
     RelayConfig,
     ServoConfig,
     actuator_objection,
     parachute_objection,
 )
-from aerodaas.config.robot import RobotConfig
+from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult

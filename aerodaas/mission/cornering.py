@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from aerodaas.config.robot import LimitsConfig
+from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.geometry.braking import braking_distance, braking_speed
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.messages.odometry import Odometry

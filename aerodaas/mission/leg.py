@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from aerodaas.clock import seconds
-from aerodaas.config.robot import LimitsConfig
+from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.geometry.frames import Vector, body_to_enu, length, wrap_angle
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint

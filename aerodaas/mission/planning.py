@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from aerodaas.clock import seconds
-from aerodaas.config.robot import RobotConfig
+from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.geometry.energy import EnergyMeter
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.vehicle import VehicleState

@@ -13,7 +13,7 @@ import shapely
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, LimitsConfig, RobotConfig, SensorConfig
-from aerodaas.config.robot import SIMULATED_INTERVAL
+from aerodaas.config.sections.robot import SIMULATED_INTERVAL
 from aerodaas.errors import SchedulerError
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector

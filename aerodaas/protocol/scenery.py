@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.config.robot import RobotConfig
+from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.simulation.ground_plan import ShapeKind, ground_plan
 from aerodaas.simulation.world import World

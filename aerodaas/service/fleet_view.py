@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
-from aerodaas.config.actuators import permitted
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.sections.actuators import permitted
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut

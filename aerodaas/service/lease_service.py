@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from aerodaas.clock import WallOffset
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.config.private_file import write_private
+from aerodaas.files.private_file import write_private
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.access.quotas import Quotas

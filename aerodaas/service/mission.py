@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
+from aerodaas.files.private_file import write_private
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import LeaseState, MissionOut, MissionPhase, VerdictOut
 from aerodaas.service.errors import without_folders

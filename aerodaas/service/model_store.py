@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.models import DETECTOR
-from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.errors import ConfigError
+from aerodaas.files.private_file import write_private
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.limits import RequestLimits
 

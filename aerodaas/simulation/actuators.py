@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.messages.actuators import MoveResult
 
 __all__ = ["SimulatedActuators"]

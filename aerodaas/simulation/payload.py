@@ -11,7 +11,7 @@ import math
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import CameraConfig, GimbalConfig
-from aerodaas.config.robot import SIMULATED_INTERVAL
+from aerodaas.config.sections.robot import SIMULATED_INTERVAL
 from aerodaas.errors import VehicleError
 from aerodaas.messages.payload import (
     GimbalAttitude,

@@ -14,11 +14,11 @@ from xml.etree import ElementTree as ET
 from numpy.typing import NDArray
 
 from aerodaas.config.extras import require_extra
-from aerodaas.config.json_text import read_text
-from aerodaas.config.printable import printable
-from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.errors import ConfigError
 from aerodaas.terrain.tile import MOST_SAMPLES, Grid, Tile
+from aerodaas.text.json_text import read_text
+from aerodaas.text.printable import printable
+from aerodaas.text.xml_text import XmlError, parse_xml
 
 if TYPE_CHECKING:
     from tifffile import TiffPage

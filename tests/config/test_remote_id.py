@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue, public_document
-from aerodaas.config.remote_id import RemoteIdConfig
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.remote_id import RemoteIdConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.errors import ConfigError
 
 EXAMPLE = "FIN87astrdge12k8-xyz"

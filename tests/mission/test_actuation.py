@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from flights import Flight, KinematicVehicle, add, flight
 
-from aerodaas.config.actuators import (
+from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.config.sections.actuators import (
     ActuatorConfig,
     GripperConfig,
     ParachuteConfig,
     RelayConfig,
     ServoConfig,
 )
-from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.errors import VehicleError
 from aerodaas.messages.actuators import MoveResult
 from aerodaas.messages.mission import MissionState

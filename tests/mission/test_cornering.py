@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.actuators import ServoConfig
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
+from aerodaas.config.sections.actuators import ServoConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.geometry.braking import braking_distance, braking_speed

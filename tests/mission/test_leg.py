@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.robot import LimitsConfig
+from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint

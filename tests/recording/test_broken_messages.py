@@ -14,7 +14,6 @@ from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 from aerodaas.config.model import RecordingConfig
-from aerodaas.config.printable import printable
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording, vehicle_states
@@ -24,6 +23,7 @@ from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
 from aerodaas.recording.tables import table_of
+from aerodaas.text.printable import printable
 
 BROKEN: dict[str, bytes] = {
     "no JSON": b"\xff\x00",

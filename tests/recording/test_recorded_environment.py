@@ -19,9 +19,9 @@ from synthetic_flight import SyntheticFlight, record
 from aerodaas.cli.lab.recorded_workload import RecordedWorkload
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
-from aerodaas.config.preflight import PreflightConfig
-from aerodaas.config.remote_id import OperatorPlaceConfig, RemoteIdConfig
-from aerodaas.config.robot import GimbalConfig
+from aerodaas.config.sections.preflight import PreflightConfig
+from aerodaas.config.sections.remote_id import OperatorPlaceConfig, RemoteIdConfig
+from aerodaas.config.sections.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
 from aerodaas.recording.recorded_environment import allowed_content, left_out

@@ -17,8 +17,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from aerodaas.config.file_lock import actor_lock, is_locked
 from aerodaas.environment.provider.logins import client_for
+from aerodaas.files.file_lock import actor_lock, is_locked
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

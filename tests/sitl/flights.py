@@ -11,8 +11,8 @@ from typing import Any
 from typing_extensions import Self
 
 from aerodaas.clock import ScaledClock
-from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink

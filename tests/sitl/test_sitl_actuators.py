@@ -12,7 +12,12 @@ from pathlib import Path
 import pytest
 from required import needs_peer
 
-from aerodaas.config.actuators import ActuatorConfig, GripperConfig, RelayConfig, ServoConfig
+from aerodaas.config.sections.actuators import (
+    ActuatorConfig,
+    GripperConfig,
+    RelayConfig,
+    ServoConfig,
+)
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.waypoints import Waypoint

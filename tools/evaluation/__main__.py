@@ -17,11 +17,11 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.cli.app import run_typer
 from aerodaas.cli.lab.sweep import write_csv
 from aerodaas.config.extras import require_extra
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import plain
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
+from aerodaas.text.printable import printable
 from tools.evaluation.errors import draw_mistakes
 from tools.evaluation.figures import LEAST_SCORE, ClassFigures, Evaluation, evaluate
 

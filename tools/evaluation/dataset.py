@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.cameras.picture_size import picture_fits, picture_size
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
 from aerodaas.geometry.frames import Box
+from aerodaas.text.printable import printable
 
 __all__ = [
     "MOST_SIDE",

@@ -8,9 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
 from aerodaas.geometry.frames import Box
+from aerodaas.text.printable import printable
 from tools.evaluation.dataset import AnnotatedPicture, read_picture
 from tools.evaluation.figures import Mistake
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.errors import ConfigError
+from aerodaas.text.xml_text import XmlError, parse_xml
 from tools.evaluation.dataset import (
     AnnotatedPicture,
     Dataset,

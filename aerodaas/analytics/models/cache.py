@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 
 from aerodaas.analytics.models.registry import REGISTRY, RegisteredModel, registered
-from aerodaas.config.user_folders import cache_folder
 from aerodaas.errors import ModelError
+from aerodaas.files.user_folders import cache_folder
 
 __all__ = ["FOLDER_VARIABLE", "fetched_path", "model_folder", "model_named", "require_fetched"]
 

@@ -23,9 +23,9 @@ import httpx
 
 from aerodaas.analytics.models.cache import fetched_path, require_fetched
 from aerodaas.analytics.models.registry import RegisteredModel, registered
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError, ModelError, SourceError
 from aerodaas.http_client import http_client, http_errors
+from aerodaas.text.printable import printable
 
 __all__ = ["fetch_model"]
 

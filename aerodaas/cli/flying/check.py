@@ -122,7 +122,7 @@ def examine_application(
 
 def _is_environment(file: Path) -> bool:
     """Whether a file is an environment's, and no application's."""
-    from aerodaas.config.json_text import read_json  # noqa: PLC0415 - only for JSON
+    from aerodaas.text.json_text import read_json  # noqa: PLC0415 - only for JSON
 
     if file.suffix != ".json":
         return False

@@ -11,8 +11,8 @@ import typer
 from aerodaas.cli.deferred import deferred_group
 from aerodaas.cli.recordings.report import Recorded
 from aerodaas.config.extensions import Command, extensions
-from aerodaas.config.printable import printable
 from aerodaas.recording.reader import Recording
+from aerodaas.text.printable import printable
 
 __all__ = ["Folder", "app", "csv", "export", "formats", "parquet", "topics"]
 

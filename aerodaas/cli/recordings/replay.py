@@ -14,8 +14,8 @@ from aerodaas.cli.flying.application import run_application, speed_option
 from aerodaas.cli.recordings.report import Recorded
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
-from aerodaas.config.printable import printable
 from aerodaas.errors import MissionError
+from aerodaas.text.printable import printable
 
 __all__ = ["replay"]
 

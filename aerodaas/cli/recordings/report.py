@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.config.printable import printable
+from aerodaas.text.printable import printable
 
 __all__ = ["compare", "report", "view"]
 

@@ -15,8 +15,8 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.clock import Clock, ScaledClock
-from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.sections.actuators import ACTUATOR_TYPES
 from aerodaas.drivers.mavlink.airspace.airspace import Airspace
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.completion import ClimbCompletion

@@ -12,10 +12,10 @@ from typing import Any, Literal, TypeAlias
 
 import httpx
 
-from aerodaas.config.printable import printable
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, UnreachableError
 from aerodaas.http_client import http_client, http_errors, read_at_most
+from aerodaas.text.printable import printable
 
 __all__ = ["Method", "ProviderConnection", "printed"]
 

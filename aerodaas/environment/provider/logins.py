@@ -8,12 +8,12 @@ import stat
 from pathlib import Path
 from typing import Any
 
-from aerodaas.config.json_text import read_json
-from aerodaas.config.private_file import write_private
-from aerodaas.config.user_folders import config_folder
 from aerodaas.environment.provider.address import INSECURE_VARIABLE, ServiceAddress
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.errors import ConfigError
+from aerodaas.files.private_file import write_private
+from aerodaas.files.user_folders import config_folder
+from aerodaas.text.json_text import read_json
 
 __all__ = ["TOKEN_VARIABLE", "URL_VARIABLE", "Logins", "client_for", "default_url"]
 

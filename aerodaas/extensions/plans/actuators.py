@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aerodaas.config.actuators import ActuatorConfig, GripperConfig, RelayConfig, ServoConfig
+from aerodaas.config.sections.actuators import (
+    ActuatorConfig,
+    GripperConfig,
+    RelayConfig,
+    ServoConfig,
+)
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.commands import (
     DO_GRIPPER,

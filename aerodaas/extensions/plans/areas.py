@@ -7,14 +7,14 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerodaas.config.json_text import parse_json, read_text
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.formats.geojson import parse_geojson
 from aerodaas.extensions.plans.formats.kml import parse_kml
 from aerodaas.extensions.plans.formats.numbers import LatLon
 from aerodaas.extensions.plans.formats.rings import AreaReader
 from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.text.json_text import parse_json, read_text
+from aerodaas.text.printable import printable
 
 __all__ = ["Area", "read_areas"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.options import ExampleGroup
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
+from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.geometry.frames import GeodeticOrigin

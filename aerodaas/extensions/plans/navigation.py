@@ -6,14 +6,14 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerodaas.config.actuators import ActuatorConfig
-from aerodaas.config.printable import printable
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.extensions.plans.plan import Notice
 from aerodaas.extensions.plans.reading import flown_plan
 from aerodaas.extensions.plans.waypoints_in import Ground
 from aerodaas.extensions.plans.writing import planned, write_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.text.printable import printable
 
 __all__ = ["read_waypoints", "write_waypoints"]
 

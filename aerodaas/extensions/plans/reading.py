@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from aerodaas.config.actuators import ActuatorConfig
-from aerodaas.config.json_text import parse_json, read_text
-from aerodaas.config.printable import printable
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.errors import ConfigError, InvalidWaypointError
 from aerodaas.extensions.plans.formats.qgroundcontrol import parse_qgroundcontrol
 from aerodaas.extensions.plans.formats.waypoint_file import HEADER, parse_waypoint_file
 from aerodaas.extensions.plans.plan import Notice, Plan
 from aerodaas.extensions.plans.waypoints_in import Ground, waypoints_of
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.text.json_text import parse_json, read_text
+from aerodaas.text.printable import printable
 
 __all__ = ["flown_plan", "read_plan"]
 

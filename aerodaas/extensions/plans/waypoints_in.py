@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.actuators import MOVES, move_of
 from aerodaas.extensions.plans.commands import (

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.config.actuators import ActuatorConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.actuators import move_item
 from aerodaas.extensions.plans.commands import (

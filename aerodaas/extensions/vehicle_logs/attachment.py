@@ -6,8 +6,8 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from aerodaas.text.printable import printable
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.printable import printable
 from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.extensions.vehicle_logs.alignment import (
     Alignment,

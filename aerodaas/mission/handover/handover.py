@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.clock import seconds
-from aerodaas.config.robot import LimitsConfig, RobotConfig
+from aerodaas.config.sections.robot import LimitsConfig, RobotConfig
 from aerodaas.errors import VehicleError
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.mission import MissionState

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from aerodaas.config.model import LimitsConfig
-from aerodaas.config.preflight import PreflightConfig, PreflightLevel
+from aerodaas.config.sections.preflight import PreflightConfig, PreflightLevel
 from aerodaas.errors import VehicleError
 from aerodaas.messages.health import (
     OWN_CHECKS,

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerodaas.clock import seconds
-from aerodaas.config.robot import LimitsConfig
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.robot import LimitsConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.geometry.frames import Vector, is_finite
 from aerodaas.messages.vehicle import Traffic, VehicleState
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
-from aerodaas.config.actuators import ACTUATOR_TYPES
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.sections.actuators import ACTUATOR_TYPES
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.messages.mission import MissionState

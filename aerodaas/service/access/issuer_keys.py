@@ -11,9 +11,9 @@ from urllib.request import getproxies, proxy_bypass
 
 import jwt
 
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.http_server.addresses import is_loopback
+from aerodaas.text.printable import printable
 
 __all__ = ["IssuerKeys", "require_secure"]
 

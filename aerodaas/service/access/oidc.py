@@ -13,11 +13,11 @@ from typing import Any
 
 import jwt
 
-from aerodaas.config.printable import printable
 from aerodaas.errors import SourceError
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.issuer_keys import IssuerKeys
 from aerodaas.service.errors import RefusedError
+from aerodaas.text.printable import printable
 
 __all__ = ["Issued", "OidcSettings", "OidcVerifier"]
 

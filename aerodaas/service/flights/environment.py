@@ -11,7 +11,6 @@ from typing import Any, TypeAlias
 
 import shapely
 
-from aerodaas.config.actuators import permitted
 from aerodaas.config.checked import checked, near
 from aerodaas.config.model import (
     EnvironmentConfig,
@@ -21,8 +20,9 @@ from aerodaas.config.model import (
     validated,
 )
 from aerodaas.config.overrides import located
-from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.redaction import calibration
+from aerodaas.config.sections.actuators import permitted
+from aerodaas.config.sections.preflight import PreflightConfig
 from aerodaas.errors import ConfigError
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.service.flights.orders import FlightOrder, TenantLimits

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from aerodaas.config.file_lock import actor_lock, exclusive, is_locked
-from aerodaas.config.private_file import write_private
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.errors import MissionError
+from aerodaas.files.file_lock import actor_lock, exclusive, is_locked
+from aerodaas.files.private_file import write_private
 from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
 
 __all__ = [

@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
-from aerodaas.config.json_text import read_json
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.messages.mission import Place, RobotStatus
@@ -24,6 +23,7 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.errors import RefusedError
+from aerodaas.text.json_text import read_json
 
 if TYPE_CHECKING:
     from aerodaas.service.fleet_registry import FleetRegistry

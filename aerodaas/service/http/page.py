@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from fastapi.responses import FileResponse
 from starlette.requests import HTTPConnection
 
-from aerodaas.config.map_tiles import MapTilesConfig
+from aerodaas.config.sections.map_tiles import MapTilesConfig
 
 __all__ = ["is_page", "page_routes"]
 

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import pytest
 from emulated import Stepped
 
-from aerodaas.config.actuators import (
+from aerodaas.config.model import MissionConfig
+from aerodaas.config.sections.actuators import (
     ActuatorConfig,
     GripperConfig,
     ParachuteConfig,
     RelayConfig,
     ServoConfig,
 )
-from aerodaas.config.model import MissionConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 from aerodaas.messages.actuators import MoveResult

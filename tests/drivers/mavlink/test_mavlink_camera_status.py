@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS, SimulatedClock
 from aerodaas.config.model import LimitsConfig, MissionConfig
-from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.sections.preflight import PreflightConfig
 from aerodaas.drivers.mavlink.payload.camera_status import (
     camera_model_told,
     capture_status,

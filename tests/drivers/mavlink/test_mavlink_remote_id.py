@@ -11,7 +11,7 @@ from autopilot import HERE
 from bench import Bench
 from emulated import FAMILIES, Stepped
 
-from aerodaas.config.remote_id import RemoteIdConfig
+from aerodaas.config.sections.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.airspace.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.health import HealthItem, Verdict

@@ -11,7 +11,7 @@ from emulated import FAMILIES, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.geometry.frames import GeodeticOrigin

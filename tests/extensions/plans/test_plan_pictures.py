@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from plan_files import item, lines, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, Waypoint
-from aerodaas.config.actuators import GripperConfig
+from aerodaas.config.sections.actuators import GripperConfig
 from aerodaas.extensions.plans.reading import flown_plan, read_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from plan_files import item, plan
 
 from aerodaas import AeroNavigation, Waypoint
-from aerodaas.config.actuators import (
+from aerodaas.config.sections.actuators import (
     ActuatorConfig,
     GripperConfig,
     ParachuteConfig,

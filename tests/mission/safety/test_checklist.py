@@ -12,7 +12,7 @@ from flights import KinematicVehicle, add, square
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
-from aerodaas.config.preflight import PreflightConfig
+from aerodaas.config.sections.preflight import PreflightConfig
 from aerodaas.errors import VehicleError
 from aerodaas.messages.health import HealthItem, HealthReadings, Verdict, gravest
 from aerodaas.messages.mission import MissionState

@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.robot import LimitsConfig
+from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.robot import GeofenceConfig, LimitsConfig
+from aerodaas.config.sections.robot import GeofenceConfig, LimitsConfig
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 from aerodaas.mission.safety.setpoint_filter import FilteredSetpoint, SetpointFilter

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import LimitsConfig
-from aerodaas.config.preflight import PreflightConfig
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.preflight import PreflightConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.health import Verdict
 from aerodaas.messages.mission import MissionState as S

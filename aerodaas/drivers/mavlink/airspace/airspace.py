@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from aerodaas.config.robot import RobotConfig
+from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.drivers.mavlink.airspace.remote_id import OperatorPlace, RemoteId
 from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
 from aerodaas.drivers.mavlink.microservices.commander import Commander, PendingCommand

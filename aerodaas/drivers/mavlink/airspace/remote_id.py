@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.config.remote_id import RemoteIdConfig
+from aerodaas.config.sections.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 

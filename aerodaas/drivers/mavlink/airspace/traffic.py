@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.geometry.frames import GeodeticOrigin, Vector, length

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import ClassVar
 
-from aerodaas.config.actuators import (
+from aerodaas.config.sections.actuators import (
     ActuatorConfig,
     GripperConfig,
     ParachuteConfig,

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from aerodaas.config.private_file import write_private
-from aerodaas.config.user_folders import state_folder
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.errors import VehicleError
+from aerodaas.files.private_file import write_private
+from aerodaas.files.user_folders import state_folder
 
 __all__ = ["Changes", "ParameterBackup", "ParameterChange"]
 

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
-from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.formats.rings import AreaReader
+from aerodaas.text.xml_text import XmlError, parse_xml
 
 __all__ = ["parse_kml"]
 

@@ -9,8 +9,8 @@ import typer
 
 from aerodaas.cli.recordings.export import Folder, export
 from aerodaas.cli.recordings.report import Recorded
-from aerodaas.config.printable import printable
 from aerodaas.errors import ConfigError
+from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.extensions.ros2.bags.bag import RosBag

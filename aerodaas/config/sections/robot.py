@@ -7,12 +7,12 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
 from typing_extensions import Self
 
-from aerodaas.config.actuators import ActuatorConfig
 from aerodaas.config.checked import Finite, NotNegative, Positive, Settings, Strict
-from aerodaas.config.preflight import PreflightConfig
-from aerodaas.config.remote_id import RemoteIdConfig
 from aerodaas.config.secrets import SecretUrl
-from aerodaas.config.traffic import TrafficConfig
+from aerodaas.config.sections.actuators import ActuatorConfig
+from aerodaas.config.sections.preflight import PreflightConfig
+from aerodaas.config.sections.remote_id import RemoteIdConfig
+from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier
 
 __all__ = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.config.xml_text import XmlError, parse_xml
+from aerodaas.text.xml_text import XmlError, parse_xml
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.config.user_folders import cache_folder, config_folder, state_folder
+from aerodaas.files.user_folders import cache_folder, config_folder, state_folder
 
 
 @pytest.mark.parametrize(

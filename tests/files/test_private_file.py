@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.config.private_file import write_private
+from aerodaas.files.private_file import write_private
 
 
 @pytest.mark.parametrize("content", ["tökens\n", b"\x00\xff"], ids=["text", "bytes"])

@@ -1,0 +1,1 @@
+"""Files of the user: locks, private ones, and folders."""
