@@ -32,7 +32,7 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler

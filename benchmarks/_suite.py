@@ -133,7 +133,7 @@ OTHERS = {
     "structure": ("python benchmarks/structure.py", "counts lines and modules"),
     "walks": ("python benchmarks/walks.py", "lists files"),
     "mutation": (
-        "python benchmarks/mutation.py aerodaas/mission/queue.py --sample 60",
+        "python benchmarks/mutation.py aerodaas/mission/navigation/queue.py --sample 60",
         "judges tests",
     ),
 }

@@ -37,7 +37,7 @@ from aerodaas.messages.waypoints import NavigationType, VelocityCommand
 from aerodaas.mission.commands import OpenStream, Start, StreamItem
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 

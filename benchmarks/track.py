@@ -34,7 +34,7 @@ from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, HandOver, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 UNITS = {

@@ -40,7 +40,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import SetpointRecord
 from aerodaas.mission.commands import OpenStream
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
 from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.controller import RobotSpec

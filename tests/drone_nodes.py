@@ -14,7 +14,7 @@ from aerodaas.messages.mission import MissionState, MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.drone import DroneNode
 from aerodaas.runtime.inline import InlineExecutor

@@ -35,7 +35,7 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot

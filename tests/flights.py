@@ -28,7 +28,7 @@ from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.mission.navigation.planner import InlinePlanner, Planner
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler

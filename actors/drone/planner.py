@@ -14,7 +14,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
 from aerodaas.clock import NANOSECONDS
-from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
+from aerodaas.mission.navigation.planner import BackgroundPlanner, Planner, solve
 from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler

@@ -26,7 +26,7 @@ from aerodaas.mission.commands import (
     Resume,
     TakeBack,
 )
-from aerodaas.mission.survey import Survey, SurveySettings, plan_survey, survey_camera
+from aerodaas.mission.payload.survey import Survey, SurveySettings, plan_survey, survey_camera
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment

@@ -22,7 +22,7 @@ from aerodaas.mission.commands import (
     TakeControls,
 )
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.navigator import Navigator
+from aerodaas.mission.navigation.navigator import Navigator
 
 __all__ = ["MANUAL_SECONDS", "CommandHandler", "ManualControl"]
 

@@ -14,7 +14,7 @@ from aerodaas.messages.mission import BatteryOutlook
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.safety.supervisor import has_position
 
 __all__ = ["BatteryForecast"]

@@ -25,7 +25,6 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
-from aerodaas.mission.actuation import Actuation
 from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
     Actuate,
@@ -49,17 +48,24 @@ from aerodaas.mission.commands import (
     TakeBack,
     TakeControls,
 )
-from aerodaas.mission.cornering import Cornering
 from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.handover.handover import HANDED_OVER, Handover
-from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable, velocity_setpoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.navigator import LiveCommand, Navigator
-from aerodaas.mission.photographer import Photographer
-from aerodaas.mission.planner import Planner
-from aerodaas.mission.planning import Planning
-from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.mission.route import Route
+from aerodaas.mission.navigation.cornering import Cornering
+from aerodaas.mission.navigation.leg import (
+    Leg,
+    LegPhase,
+    setpoint_towards,
+    unreachable,
+    velocity_setpoint,
+)
+from aerodaas.mission.navigation.navigator import LiveCommand, Navigator
+from aerodaas.mission.navigation.planner import Planner
+from aerodaas.mission.navigation.planning import Planning
+from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.navigation.route import Route
+from aerodaas.mission.payload.actuation import Actuation
+from aerodaas.mission.payload.photographer import Photographer
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance

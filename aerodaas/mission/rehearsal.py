@@ -19,7 +19,7 @@ from aerodaas.geometry.frames import Vector
 from aerodaas.messages.waypoints import HeightDatum, HeightReference, Waypoint, WaypointType
 from aerodaas.mission.commands import AddNavigation, Answer, Command
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 

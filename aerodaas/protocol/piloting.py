@@ -19,7 +19,7 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.mission.survey import MOST_CORNERS
+from aerodaas.mission.payload.survey import MOST_CORNERS
 from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.schemas import Number, Word
 

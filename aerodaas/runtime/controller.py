@@ -34,7 +34,7 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import BackgroundPlanner, Planner
+from aerodaas.mission.navigation.planner import BackgroundPlanner, Planner
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.neighbours import Neighbour

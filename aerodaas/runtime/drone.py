@@ -13,7 +13,7 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.mission.planner import Planner
+from aerodaas.mission.navigation.planner import Planner
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.runtime.controller import MakePlanner, RobotSpec, VehicleController
 from aerodaas.runtime.node import NEVER, Host, Node

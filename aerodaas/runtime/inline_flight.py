@@ -21,7 +21,7 @@ from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import read_vitals
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.mission.navigation.planner import InlinePlanner, Planner
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.camera import CameraNode

@@ -25,7 +25,7 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 __all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated", "surveying"]

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from aerodaas import OrderedScheduler, Waypoint
-from aerodaas.mission.planner import BackgroundPlanner, PlanRequest
+from aerodaas.mission.navigation.planner import BackgroundPlanner, PlanRequest
 from aerodaas.schedulers.trajectory.base import PlanningContext
 
 T = TypeVar("T")

@@ -23,10 +23,10 @@ from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.vehicle import PositionSetpoint, Setpoint
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, Pause, Resume, Start
-from aerodaas.mission.cornering import corner_speed, passing_speed
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner, Plan
+from aerodaas.mission.navigation.cornering import corner_speed, passing_speed
+from aerodaas.mission.navigation.planner import InlinePlanner, Plan
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 

@@ -19,7 +19,7 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import AddNavigation, End, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
 BEGIN = Waypoint("north", 0, 5, 2, video=True)

@@ -12,8 +12,8 @@ from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards, unreachable
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.leg import Leg, LegPhase, setpoint_towards, unreachable
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 
 
 def stop(

@@ -19,8 +19,8 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.messages.waypoints import NavigationType, VelocityCommand, Waypoint
 from aerodaas.mission.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
-from aerodaas.mission.planner import BackgroundPlanner
-from aerodaas.mission.queue import WaypointQueue
+from aerodaas.mission.navigation.planner import BackgroundPlanner
+from aerodaas.mission.navigation.queue import WaypointQueue
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler

@@ -31,7 +31,7 @@ from aerodaas.mission.commands import (
     Start,
     StreamItem,
 )
-from aerodaas.mission.planner import BackgroundPlanner
+from aerodaas.mission.navigation.planner import BackgroundPlanner
 from aerodaas.mission.state_machine import TERMINAL, TRANSITIONS, MissionStateMachine, mermaid
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler

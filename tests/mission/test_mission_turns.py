@@ -25,7 +25,7 @@ from aerodaas.mission.commands import (
     StreamItem,
 )
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 
 

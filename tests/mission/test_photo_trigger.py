@@ -20,8 +20,8 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.photo_trigger import PhotoTrigger
-from aerodaas.mission.photographer import PhotoCapture
+from aerodaas.mission.payload.photo_trigger import PhotoTrigger
+from aerodaas.mission.payload.photographer import PhotoCapture
 
 TURN = NANOSECONDS // 20
 

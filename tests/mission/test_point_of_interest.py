@@ -19,7 +19,7 @@ from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import GimbalTarget
 from aerodaas.messages.vehicle import PositionSetpoint
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.point_of_interest import PointOfInterest, direction_to
+from aerodaas.mission.payload.point_of_interest import PointOfInterest, direction_to
 
 coordinate = st.floats(-500.0, 500.0)
 place = st.tuples(coordinate, coordinate, coordinate)

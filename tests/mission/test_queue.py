@@ -9,7 +9,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.queue import WaypointQueue
+from aerodaas.mission.navigation.queue import WaypointQueue
 
 
 def waypoint(name: str, priority: int = 5, hover: float = 0.0) -> Waypoint:

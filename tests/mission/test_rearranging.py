@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import RearrangeNavigation, ReturnHome
-from aerodaas.mission.queue import WaypointQueue
+from aerodaas.mission.navigation.queue import WaypointQueue
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
 

@@ -14,7 +14,7 @@ from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.errors import SchedulerError
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.messages.mission import MissionState as S
-from aerodaas.mission.survey import MOST_CORNERS, SurveySettings, plan_survey
+from aerodaas.mission.payload.survey import MOST_CORNERS, SurveySettings, plan_survey
 
 FENCE = GeofenceConfig(polygon=[(-20, -20), (40, -20), (40, 40), (-20, 40)], ceiling=20)
 ZONE = [(8.0, 8.0), (12.0, 8.0), (12.0, 12.0), (8.0, 12.0)]

@@ -12,7 +12,7 @@ from surveyors import simulated, surveying
 
 from aerodaas.errors import ConfigError, SchedulerError
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.survey import (
+from aerodaas.mission.payload.survey import (
     SurveyPhotos,
     SurveySettings,
     plan_survey,

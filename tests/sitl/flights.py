@@ -22,7 +22,7 @@ from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, Command, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.testing.channel import Impairment
 from sitl.relay import Relay

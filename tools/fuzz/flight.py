@@ -20,7 +20,7 @@ from aerodaas.messages.waypoints import VelocityCommand, Waypoint, WaypointType
 from aerodaas.mission.commands import AddNavigation, Start, Steer, TakeControls
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from tools.fuzz.records import LONGEST_REST
 

@@ -29,7 +29,7 @@ from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import OpenStream, Start, StreamItem
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 from aerodaas.simulation.world import Thing
 from tools.tuning.perception import Perception, box_in_picture

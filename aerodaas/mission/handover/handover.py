@@ -30,8 +30,8 @@ from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, HandOver, TakeBack
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.mission.route import Route
+from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.navigation.route import Route
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.supervisor import has_position
 

@@ -12,7 +12,7 @@ import numpy as np
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.errors import MissionError
 from aerodaas.messages.mission import Place, RobotStatus
-from aerodaas.mission.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
+from aerodaas.mission.payload.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
 from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
 from aerodaas.schedulers.trajectory.coverage import footprint
 

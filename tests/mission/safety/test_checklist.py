@@ -22,7 +22,7 @@ from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 

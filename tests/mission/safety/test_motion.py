@@ -29,7 +29,7 @@ from aerodaas.mission.actions import Fly
 from aerodaas.mission.commands import ReturnHome, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import InlinePlanner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.motion import MotionWatch
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 

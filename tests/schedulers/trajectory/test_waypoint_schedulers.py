@@ -12,7 +12,7 @@ from waypoint_fields import HOME, in_a_hurry, places, scatter, waypoints
 
 from aerodaas.config.plugins import load_plugin
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.planner import PlanRequest, solve
+from aerodaas.mission.navigation.planner import PlanRequest, solve
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.deadline import DeadlineScheduler
 from aerodaas.schedulers.trajectory.exact import shortest_order

@@ -17,11 +17,11 @@ from aerodaas.geometry.braking import braking_distance, braking_speed
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.leg import Leg
-from aerodaas.mission.navigator import Navigator
-from aerodaas.mission.photographer import Photographer
-from aerodaas.mission.queue import QueuedWaypoint
-from aerodaas.mission.route import Route
+from aerodaas.mission.navigation.leg import Leg
+from aerodaas.mission.navigation.navigator import Navigator
+from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.navigation.route import Route
+from aerodaas.mission.payload.photographer import Photographer
 
 __all__ = ["Cornering", "corner_speed"]
 

@@ -13,7 +13,7 @@ from aerodaas.errors import VehicleError, failure_line
 from aerodaas.messages.payload import VideoCamera
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 
 __all__ = ["Filming"]
 

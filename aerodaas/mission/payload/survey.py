@@ -19,7 +19,7 @@ from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector
 from aerodaas.geometry.free_path import Place
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.photo_trigger import PhotoTrigger
+from aerodaas.mission.payload.photo_trigger import PhotoTrigger
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.schedulers.trajectory.coverage import cover
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera

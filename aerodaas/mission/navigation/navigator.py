@@ -9,8 +9,8 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.frames import Header
 from aerodaas.messages.waypoints import HeightDatum, VelocityCommand, Waypoint
-from aerodaas.mission.planner import Plan, Planner, PlanRequest
-from aerodaas.mission.queue import QueuedWaypoint, WaypointQueue
+from aerodaas.mission.navigation.planner import Plan, Planner, PlanRequest
+from aerodaas.mission.navigation.queue import QueuedWaypoint, WaypointQueue
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.schedulers.trajectory.base import PlanningContext

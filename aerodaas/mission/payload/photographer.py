@@ -26,11 +26,11 @@ from aerodaas.messages.payload import (
     PhotoOutcome,
 )
 from aerodaas.messages.vehicle import PayloadVehicle
-from aerodaas.mission.filming import Filming
 from aerodaas.mission.log import MissionLog, words
-from aerodaas.mission.photo_trigger import PhotoTrigger
-from aerodaas.mission.point_of_interest import PointOfInterest, fresh, near
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.payload.filming import Filming
+from aerodaas.mission.payload.photo_trigger import PhotoTrigger
+from aerodaas.mission.payload.point_of_interest import PointOfInterest, fresh, near
 
 __all__ = ["NO_CAMERA", "PhotoCapture", "PhotoRequest", "Photographer"]
 

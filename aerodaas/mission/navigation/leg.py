@@ -14,7 +14,7 @@ from aerodaas.geometry.frames import Vector, body_to_enu, length, wrap_angle
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
 from aerodaas.messages.waypoints import VelocityCommand
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 
 __all__ = ["Leg", "LegPhase", "setpoint_towards", "unreachable", "velocity_setpoint"]
 

@@ -24,7 +24,7 @@ from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 
 __all__ = ["Actuation"]
 

@@ -10,8 +10,8 @@ from aerodaas.geometry.energy import EnergyMeter
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.navigator import Navigator
-from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.navigation.navigator import Navigator
+from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.schedulers.trajectory.base import PlanningContext
 

@@ -1,0 +1,1 @@
+"""The way of one drone: queue, plans, legs, routes and corners."""

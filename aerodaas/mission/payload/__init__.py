@@ -1,0 +1,1 @@
+"""Pictures, video, gimbals and actuators in a mission."""
