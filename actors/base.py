@@ -29,8 +29,8 @@ from aerodaas.clock import host_time_ns
 from aerodaas.errors import AeroDaaSError, MissionError, as_project_error
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.vitals import read_vitals
-from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.node import Node
+from aerodaas.runtime.nodes.camera import CameraNode
 from aerodaas.runtime.reports import (
     ActorReport,
     AlertHandler,

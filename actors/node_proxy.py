@@ -21,8 +21,8 @@ from aerodaas.actors.run.actor_state import ask
 from aerodaas.clock import Clock, SimulatedClock
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.messages.envelope import Message
-from aerodaas.runtime.analysis import AnalysisSpec
 from aerodaas.runtime.node import Host, Node
+from aerodaas.runtime.nodes.analysis import AnalysisSpec
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.plan import ActorPlan, CameraSpec
 from aerodaas.runtime.session import Session

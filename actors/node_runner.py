@@ -12,10 +12,10 @@ from aerodaas.cameras.base import most_memory
 from aerodaas.clock import Clock
 from aerodaas.errors import AeroDaaSError, as_project_error
 from aerodaas.messages.envelope import Message
-from aerodaas.runtime.analysis import AnalysisNode
-from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.memory_limit import limit_memory
 from aerodaas.runtime.node import NEVER, Host, Node
+from aerodaas.runtime.nodes.analysis import AnalysisNode
+from aerodaas.runtime.nodes.camera import CameraNode
 from aerodaas.runtime.reports import AlertLog, StreamCount
 from aerodaas.runtime.session import Session
 

@@ -15,7 +15,7 @@ from aerodaas.config.options import LiveViews
 from aerodaas.messages.vitals import Vitals
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.node import Node
-from aerodaas.runtime.recorder import RecorderNode
+from aerodaas.runtime.nodes.recorder import RecorderNode
 from aerodaas.runtime.session import Session
 
 __all__ = ["RecorderActor", "RecorderSpec"]

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.actors.streams import codec, local_publisher, local_subscriber, subscriber
-from aerodaas.runtime.analysis import AnalysisNode
-from aerodaas.runtime.controller import VehicleController
+from aerodaas.runtime.nodes.analysis import AnalysisNode
+from aerodaas.runtime.nodes.controller import VehicleController
 
 __all__ = ["FOLDER", "dump", "install"]
 

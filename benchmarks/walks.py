@@ -41,11 +41,11 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import SetpointRecord
 from aerodaas.mission.commands import OpenStream
 from aerodaas.mission.navigation.planner import InlinePlanner
-from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec
-from aerodaas.runtime.camera import CameraNode
-from aerodaas.runtime.controller import RobotSpec
-from aerodaas.runtime.drone import DroneNode
 from aerodaas.runtime.node import Host, Node
+from aerodaas.runtime.nodes.analysis import AnalysisNode, AnalysisSpec
+from aerodaas.runtime.nodes.camera import CameraNode
+from aerodaas.runtime.nodes.controller import RobotSpec
+from aerodaas.runtime.nodes.drone import DroneNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import state_stream
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler

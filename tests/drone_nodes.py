@@ -15,10 +15,10 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.navigation.planner import InlinePlanner
-from aerodaas.runtime.controller import RobotSpec
-from aerodaas.runtime.drone import DroneNode
 from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.node import Outlet
+from aerodaas.runtime.nodes.controller import RobotSpec
+from aerodaas.runtime.nodes.drone import DroneNode
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 

@@ -23,9 +23,9 @@ from aerodaas.files.file_lock import actor_lock, exclusive
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.runtime.controller import RobotSpec
-from aerodaas.runtime.drone import DroneNode, failure_of
-from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.nodes.controller import RobotSpec
+from aerodaas.runtime.nodes.drone import DroneNode, failure_of
+from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 

@@ -15,7 +15,7 @@ from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
 from aerodaas.clock import NANOSECONDS
 from aerodaas.mission.navigation.planner import BackgroundPlanner, Planner, solve
-from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.nodes.controller import RobotSpec
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from aerodaas.errors import GraphError
-from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.nodes.controller import RobotSpec
 from aerodaas.runtime.plan import ActorPlan, FlightPlan
 
 __all__ = ["Growth", "growth"]

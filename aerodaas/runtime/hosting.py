@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from aerodaas.drivers.loading import link_of
 from aerodaas.errors import ConfigError
-from aerodaas.runtime.controller import RobotSpec
+from aerodaas.runtime.nodes.controller import RobotSpec
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import Session
 

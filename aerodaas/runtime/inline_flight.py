@@ -23,18 +23,18 @@ from aerodaas.messages.vitals import read_vitals
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.navigation.planner import InlinePlanner, Planner
 from aerodaas.recording.provenance import Provenance
-from aerodaas.runtime.analysis import AnalysisSpec
-from aerodaas.runtime.camera import CameraNode
-from aerodaas.runtime.controller import RobotSpec
 from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
-from aerodaas.runtime.drone import DroneNode
 from aerodaas.runtime.growth import growth
 from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.live import LiveReader
-from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.node import NEVER, Node
+from aerodaas.runtime.nodes.analysis import AnalysisSpec
+from aerodaas.runtime.nodes.camera import CameraNode
+from aerodaas.runtime.nodes.controller import RobotSpec
+from aerodaas.runtime.nodes.drone import DroneNode
+from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.nodes.recorder import RecorderNode
 from aerodaas.runtime.plan import ActorPlan, CameraSpec, FlightPlan
-from aerodaas.runtime.recorder import RecorderNode
 from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.runtime.session import Session
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler

@@ -20,10 +20,7 @@ from aerodaas.errors import GraphError
 from aerodaas.identifiers import told
 from aerodaas.messages.frames import Frame
 from aerodaas.mission.commands import TRIGGERED, initial_commands
-from aerodaas.runtime.analysis import AnalysisSpec, Wake
-from aerodaas.runtime.camera import CameraNode
 from aerodaas.runtime.checks import check_graph, check_places, check_plugins, check_tasks
-from aerodaas.runtime.controller import RobotSpec, VehicleController
 from aerodaas.runtime.dispatch.dispatcher import Managed
 from aerodaas.runtime.dispatch.offload import (
     CloudProcess,
@@ -34,6 +31,10 @@ from aerodaas.runtime.dispatch.offload import (
 )
 from aerodaas.runtime.dispatch.simulated import Executions
 from aerodaas.runtime.hosting import by_actor
+from aerodaas.runtime.nodes.analysis import AnalysisSpec, Wake
+from aerodaas.runtime.nodes.camera import CameraNode
+from aerodaas.runtime.nodes.controller import RobotSpec, VehicleController
+from aerodaas.runtime.nodes.triggers import TriggerSpec
 from aerodaas.runtime.placement import Placement
 from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.runtime.stream_names import (
@@ -45,7 +46,6 @@ from aerodaas.runtime.stream_names import (
     task_stream,
     trigger_stream,
 )
-from aerodaas.runtime.triggers import TriggerSpec
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import told_profile
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler

@@ -18,11 +18,11 @@ from aerodaas.messages.frames import Header
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
-from aerodaas.runtime.analysis import AnalysisNode, AnalysisSpec, Wake
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame
 from aerodaas.runtime.node import NEVER
+from aerodaas.runtime.nodes.analysis import AnalysisNode, AnalysisSpec, Wake
+from aerodaas.runtime.nodes.triggers import TriggerSpec
 from aerodaas.runtime.session import Session
-from aerodaas.runtime.triggers import TriggerSpec
 
 _NODE, _INPUT, _STATE, _WAKE = "drone/double", "drone/number", "drone/@state", "drone/@wake"
 _SESSION = Session(EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]}), None)

@@ -18,7 +18,7 @@ from aerodaas.messages.frames import Frame
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.mission.commands import End
-from aerodaas.runtime.camera import CameraNode
+from aerodaas.runtime.nodes.camera import CameraNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import end_stream
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from aerodaas.errors import MissionError
-from aerodaas.runtime.loop_calls import LoopCalls, LoopOverError
+from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
 
 
 def _serve_until(calls: LoopCalls, count: int) -> None:

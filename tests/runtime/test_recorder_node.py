@@ -19,7 +19,7 @@ from aerodaas.messages.vitals import read_vitals
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
-from aerodaas.runtime.recorder import RecorderNode
+from aerodaas.runtime.nodes.recorder import RecorderNode
 from aerodaas.runtime.session import Session
 from aerodaas.runtime.stream_names import alert_stream
 

@@ -21,9 +21,9 @@ from aerodaas.messages.envelope import Message
 from aerodaas.runtime.dispatch.decisions import Counts, DecisionLog
 from aerodaas.runtime.dispatch.guarded_scheduler import GuardedDispatch
 from aerodaas.runtime.node import Node
+from aerodaas.runtime.nodes.triggers import TriggerSpec, fire
 from aerodaas.runtime.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.runtime.stream_names import DECISIONS, done_stream, task_stream
-from aerodaas.runtime.triggers import TriggerSpec, fire
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Drop,

@@ -15,8 +15,8 @@ from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.navigation.planner import Planner
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
-from aerodaas.runtime.controller import MakePlanner, RobotSpec, VehicleController
 from aerodaas.runtime.node import NEVER, Host, Node
+from aerodaas.runtime.nodes.controller import MakePlanner, RobotSpec, VehicleController
 from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, Session, next_due
 from aerodaas.runtime.stream_names import whereabouts_stream
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler

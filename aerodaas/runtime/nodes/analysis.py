@@ -16,8 +16,8 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.runtime.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
 from aerodaas.runtime.node import NEVER, Host, Node
+from aerodaas.runtime.nodes.triggers import TriggerSpec, fire
 from aerodaas.runtime.session import FRAME_DEPTH, Session
-from aerodaas.runtime.triggers import TriggerSpec, fire
 
 __all__ = ["AnalysisNode", "AnalysisSpec", "Wake"]
 

@@ -1,0 +1,1 @@
+"""Nodes of a flight: drone, camera, analysis and recorder."""
