@@ -1,7 +1,7 @@
 """Items over the wire, between a provider and its users: JSON, and a picture's bytes beside it.
 
 A text, a truth value, a finite number or None is itself. Anything else is `{"is": CLASS, "of":
-CONTENT}`; the content of a message is as `aerodaas.messages.schema` has it. What arrives is
+CONTENT}`; the content of a message is as `aerodaas.messages.serialization.schema` has it. What arrives is
 another's data: it is of known classes, each field is checked, and a picture has the bounds of
 recorded ones before it is decoded. Nothing is a pickle.
 """
@@ -23,13 +23,13 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.json_types import Int64
 from aerodaas.messages.mission import MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.records import fast_pickle
-from aerodaas.messages.schema import MessageError, json_of, message_of
+from aerodaas.messages.serialization.json_types import Int64
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.records import fast_pickle
+from aerodaas.messages.serialization.schema import MessageError, json_of, message_of
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.messages.waypoints import (
     NavigationItem,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import GimbalAttitude
-from aerodaas.messages.records import valued
+from aerodaas.messages.serialization.records import valued
 
 __all__ = [
     "Camera",

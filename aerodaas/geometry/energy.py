@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.geometry.frames import Vector, is_finite, length
-from aerodaas.messages.records import valued
+from aerodaas.messages.serialization.records import valued
 from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["EnergyMeter", "EnergyModel"]

@@ -17,8 +17,8 @@ import numpy as np
 import pymap3d
 from numpy.typing import NDArray
 
-from aerodaas.messages.json_types import XYZ, Int64, Real
-from aerodaas.messages.records import shared_pickle
+from aerodaas.messages.serialization.json_types import XYZ, Int64, Real
+from aerodaas.messages.serialization.records import shared_pickle
 
 __all__ = [
     "FLU_FROM_OPTICAL",

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 from aerodaas.messages.vehicle import Vehicle
 
 __all__ = ["ActuatedVehicle", "Actuators", "MoveResult"]

@@ -13,9 +13,9 @@ from aerodaas.geometry.depth import depth_in_box, nearest_in_cells
 from aerodaas.geometry.frames import Box, CameraModel
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES, appearance_in_box
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.json_types import Int64, NestedLists, Real
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, NestedLists, Real
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["Bbox", "Detection", "Detections"]
 

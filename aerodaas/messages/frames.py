@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
-from aerodaas.messages.json_types import Int64
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64
+from aerodaas.messages.serialization.records import fast_pickle
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler

@@ -10,8 +10,8 @@ from typing import TypeAlias
 from aerodaas.geometry.frames import is_finite
 from aerodaas.messages.frames import Header
 from aerodaas.messages.health import HealthReport
-from aerodaas.messages.json_types import Int64, Real
-from aerodaas.messages.records import UNSENT, fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, Real
+from aerodaas.messages.serialization.records import UNSENT, fast_pickle
 from aerodaas.messages.vehicle import Setpoint, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 

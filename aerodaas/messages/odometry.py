@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from aerodaas.geometry.frames import Vector
-from aerodaas.messages.json_types import Int64, Real
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, Real
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["Battery", "GpsFix", "Odom", "Odometry"]
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.geometry.frames import CameraModel, angles_of_rotation, rotation_from_rpy
-from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, Real
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = [
     "CameraStatus",

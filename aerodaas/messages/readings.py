@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from aerodaas.messages.frames import Header
-from aerodaas.messages.json_types import Int64, Real
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, Real
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["Alert", "Readings"]
 

@@ -13,10 +13,10 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.clock import Clock
 from aerodaas.geometry.frames import Vector
-from aerodaas.messages.json_types import Int64, Real
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import Gimbal, GimbalAttitude, PhotoCamera
-from aerodaas.messages.records import UNSENT, fast_pickle
+from aerodaas.messages.serialization.json_types import Int64, Real
+from aerodaas.messages.serialization.records import UNSENT, fast_pickle
 
 __all__ = [
     "Capabilities",

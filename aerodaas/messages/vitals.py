@@ -10,8 +10,8 @@ from typing import Any
 import psutil
 
 from aerodaas.clock import host_time_ns
-from aerodaas.messages.json_types import Int64
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.json_types import Int64
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["GpuLoad", "Vitals", "read_gpus", "read_vitals"]
 

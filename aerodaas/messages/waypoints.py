@@ -13,9 +13,9 @@ from annotated_types import Ge, Gt, Le
 
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
-from aerodaas.messages.json_types import Int64, PairsAsObject, StrictlyTyped
 from aerodaas.messages.payload import GimbalTarget, LensTarget
-from aerodaas.messages.records import fast_pickle, shared_pickle
+from aerodaas.messages.serialization.json_types import Int64, PairsAsObject, StrictlyTyped
+from aerodaas.messages.serialization.records import fast_pickle, shared_pickle
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler

@@ -18,7 +18,7 @@ import numpy as np
 from foxglove import Schema
 
 from aerodaas.identifiers import INTERNAL, is_internal
-from aerodaas.messages.records import unsent_fields
+from aerodaas.messages.serialization.records import unsent_fields
 
 __all__ = ["Entry", "plain", "stream_of", "topic"]
 

@@ -1,6 +1,6 @@
 """The messages of a recording: one table of classes, schemas and topics, and the JSON of each.
 
-The JSON is that of `aerodaas.messages.schema`. Labels stand before it: the robot, for example, of
+The JSON is that of `aerodaas.messages.serialization.schema`. Labels stand before it: the robot, for example, of
 which a state is.
 """
 
@@ -20,13 +20,13 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.json_types import Int64
-from aerodaas.messages.mission import Decision, MissionPlan, MissionStatus, SetpointRecord
+from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
-from aerodaas.messages.records import fast_pickle
-from aerodaas.messages.schema import (
+from aerodaas.messages.serialization.json_types import Int64
+from aerodaas.messages.serialization.records import fast_pickle
+from aerodaas.messages.serialization.schema import (
     MessageError,
     json_schema_of,
     json_text,

@@ -22,7 +22,7 @@ from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 
 __all__ = ["NavigationEntry", "NavigationSink", "PlanningContext", "TrajectoryScheduler"]

@@ -26,10 +26,10 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.mission import BatteryOutlook, Decision, MissionState, MissionStatus
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
-from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.payload import GimbalAttitude
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.schema import MessageError, json_of
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError, json_of
 from aerodaas.messages.vehicle import FlightEnd, Traffic, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import (
     NavigationType,

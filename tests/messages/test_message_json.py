@@ -26,7 +26,7 @@ from aerodaas.messages.mission import (
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoFailure
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.schema import MessageError, json_of, message_of
+from aerodaas.messages.serialization.schema import MessageError, json_of, message_of
 from aerodaas.messages.vehicle import (
     PositionSetpoint,
     Traffic,

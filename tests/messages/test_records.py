@@ -30,7 +30,7 @@ from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import Decision, MissionState, MissionStatus, SetpointRecord
 from aerodaas.messages.readings import Readings
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 from aerodaas.messages.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.schedulers.trajectory.base import PlanningContext
 

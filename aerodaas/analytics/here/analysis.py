@@ -18,9 +18,9 @@ from aerodaas.analytics.here.relay import Channel, ChannelError
 from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.errors import ModelError
 from aerodaas.messages.frames import Header
-from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError
 
 __all__ = ["AnsweredCondition", "HereAnalysis", "HereConditions", "HereSite"]
 

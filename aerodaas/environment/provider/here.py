@@ -27,8 +27,8 @@ from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.errors import AeroDaaSError, SourceError, failure_line
-from aerodaas.messages.opaque_item import OpaqueItem
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.recording.encoding import plain
 

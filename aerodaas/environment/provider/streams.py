@@ -15,7 +15,7 @@ from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.live import ReceivedItem
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, failure_line
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.schema import MessageError
 
 __all__ = ["WireReader"]
 

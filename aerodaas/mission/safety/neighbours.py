@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from aerodaas.clock import seconds
 from aerodaas.geometry.frames import Vector, is_finite
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 from aerodaas.messages.vehicle import VehicleState
 
 __all__ = ["SILENT", "Neighbour", "Neighbours", "Whereabouts"]

@@ -24,7 +24,7 @@ from aerodaas.config.extensions import extensions, imported
 from aerodaas.errors import AeroDaaSError
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.mission import Decision, MissionStatus
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.recording.decoding.limits import (
     MAX_DEPTH,
     MAX_JSON,

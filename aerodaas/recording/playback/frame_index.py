@@ -14,7 +14,7 @@ from aerodaas.cameras.picture_size import picture_fits, picture_format, picture_
 from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.recording.h264 import is_key_frame
 from aerodaas.recording.messages import NavigationRecord
 from aerodaas.recording.pictures import RecordedImage, camera_of, detections, shots

@@ -12,7 +12,7 @@ from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["Codec", "CodedFrame", "decoded", "load"]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 from aerodaas.runtime.session import FRAME_DEPTH
 
 __all__ = ["FrameReference", "FrameReferences", "MissingFrame", "RecentFrames"]

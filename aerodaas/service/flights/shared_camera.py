@@ -20,7 +20,7 @@ from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.protocol.schemas import RefusalOut, Role
 from aerodaas.service.flights.link import flight_address
 from aerodaas.service.flights.orders import HostFlight

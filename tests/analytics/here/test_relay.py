@@ -23,9 +23,9 @@ from aerodaas.analytics.wire_items import item_json, pack
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import ConfigError, ModelError
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Alert, Readings
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.messages.vehicle import VehicleState
 
 READINGS = Readings(5, {"height": 2.0})

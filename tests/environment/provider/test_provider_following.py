@@ -18,8 +18,8 @@ from aerodaas.environment.provider.streams import WireReader
 from aerodaas.errors import ConfigError, MissionError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.opaque_item import OpaqueItem
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.protocol.schemas import MissionPhase
 
 SECONDS = 20.0

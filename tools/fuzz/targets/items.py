@@ -16,9 +16,9 @@ from aerodaas.analytics.wire_items import pack, unpack
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.opaque_item import OpaqueItem
 from aerodaas.messages.readings import Readings
-from aerodaas.messages.schema import MessageError
+from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.messages.serialization.schema import MessageError
 from aerodaas.messages.waypoints import VelocityCommand, Waypoint
 from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 

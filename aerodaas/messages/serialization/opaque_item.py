@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.messages.records import fast_pickle
+from aerodaas.messages.serialization.records import fast_pickle
 
 __all__ = ["OpaqueItem"]
 

@@ -15,7 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError, from_json, to_json
 
 from aerodaas.errors import AeroDaaSError
-from aerodaas.messages.records import unsent_fields
+from aerodaas.messages.serialization.records import unsent_fields
 
 __all__ = [
     "MessageError",
