@@ -19,7 +19,7 @@ from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, Strea
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.orders import HostFlight
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission import ActiveMission
 from aerodaas.service.settings import ServiceSettings
 

@@ -22,7 +22,7 @@ from aerodaas.service.errors import without_folders
 from aerodaas.service.flights.folder import FlightFolder, start_process
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.orders import FlightOrder, Outcome
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.store import Lease, Mission, Usage
 
 __all__ = ["CANCELLED_BY", "FOLLOWING", "ActiveMission", "LostFlightError", "shown", "usage_of"]

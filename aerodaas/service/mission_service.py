@@ -34,14 +34,14 @@ from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.attachments import Attachments
 from aerodaas.service.backend import PilotCommand
 from aerodaas.service.errors import RefusedError, RepeatedErrorLog, StoreError
-from aerodaas.service.fleet_registry import OUT_OF_SERVICE, FleetRegistry
+from aerodaas.service.fleet.fleet_registry import OUT_OF_SERVICE, FleetRegistry
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.orders import FlightOrder, FlightOrders
 from aerodaas.service.idempotency import fingerprint
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown, usage_of
-from aerodaas.service.model_store import ModelStore, require_room
+from aerodaas.service.models.model_store import ModelStore, require_room
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings

@@ -16,14 +16,14 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.app import build_app
 from aerodaas.service.edge import EdgeArbiter
-from aerodaas.service.fleet_registry import FleetRegistry
-from aerodaas.service.fleet_view import FleetView
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
+from aerodaas.service.fleet.fleet_view import FleetView
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.live.playback import Player, Players
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.model_store import ModelStore
-from aerodaas.service.model_trial import try_model
+from aerodaas.service.models.model_store import ModelStore
+from aerodaas.service.models.model_trial import try_model
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.fleet import FleetRoutes

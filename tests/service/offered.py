@@ -30,12 +30,12 @@ from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.fleet_registry import FleetRegistry
-from aerodaas.service.fleet_view import FleetView
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
+from aerodaas.service.fleet.fleet_view import FleetView
 from aerodaas.service.flights.orders import FlightOrder, Outcome
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.monitor.reports import VehicleReport
 from aerodaas.service.settings import ServiceSettings

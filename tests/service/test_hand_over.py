@@ -18,7 +18,7 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.mission import ActiveMission
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.monitor.reports import VehicleReport
 

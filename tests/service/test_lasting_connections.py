@@ -28,7 +28,7 @@ from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, S
 from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.fleet_view import FleetView
+from aerodaas.service.fleet.fleet_view import FleetView
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
@@ -38,7 +38,7 @@ from aerodaas.service.http.server import web_server
 from aerodaas.service.live import controls as hand
 from aerodaas.service.live import session
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.provider import build_service
 from aerodaas.service.routes import here
 from aerodaas.service.settings import ServiceSettings

@@ -31,12 +31,12 @@ from aerodaas.service import model_store as models
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.fleet_registry import FleetRegistry
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import Outcome, Progress
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 

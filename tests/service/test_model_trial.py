@@ -13,8 +13,8 @@ from synthetic_models import constant_model
 
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.errors import ConfigError
-from aerodaas.service.model_store import ModelStore
-from aerodaas.service.model_trial import try_model
+from aerodaas.service.models.model_store import ModelStore
+from aerodaas.service.models.model_trial import try_model
 
 
 def greedy_model(path: Path, *axes: int, from_input: bool = False) -> Path:

@@ -18,7 +18,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.service import model_store as models
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 
 DAY = 86400.0
 

@@ -18,7 +18,7 @@ from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.store import Store
 
 HOUR = 3600.0

@@ -26,8 +26,8 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.text.json_text import read_json
 
 if TYPE_CHECKING:
-    from aerodaas.service.fleet_registry import FleetRegistry
-    from aerodaas.service.lease_service import LeaseService
+    from aerodaas.service.fleet.fleet_registry import FleetRegistry
+    from aerodaas.service.leases.lease_service import LeaseService
     from aerodaas.service.settings import ServiceSettings
     from aerodaas.service.store import Lease, Mission, Store
 

@@ -11,8 +11,8 @@ from aerodaas.protocol.schemas import LeaseIn, LeaseOut, Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.lease_book import lease_out
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.leases.lease_service import LeaseService
+from aerodaas.service.leases.lease_table import lease_out
 
 __all__ = ["LeaseRoutes"]
 

@@ -11,11 +11,11 @@ from pydantic import BaseModel, ConfigDict
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.fleet_registry import FleetRegistry
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import RequestLimits
-from aerodaas.service.model_store import ModelStore
+from aerodaas.service.models.model_store import ModelStore
 
 __all__ = ["ProvisionRoutes"]
 

@@ -11,7 +11,7 @@ import pytest
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.lease_book import Candidate, LeaseBook, lease_out
+from aerodaas.service.leases.lease_table import Candidate, LeaseBook, lease_out
 from aerodaas.service.store import Account, Lease, LeaseEnd, Store, Tenant
 
 FLEET = {

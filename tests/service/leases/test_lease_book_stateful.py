@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role, Scope
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.lease_book import Candidate, LeaseBook, LeaseTable
+from aerodaas.service.leases.lease_table import Candidate, LeaseBook, LeaseTable
 from aerodaas.service.store import Account, Lease, Store, Tenant
 
 ROBOTS = ("a", "b", "c", "d")

@@ -13,8 +13,8 @@ from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal, sees
-from aerodaas.service.fleet_registry import FleetRegistry
-from aerodaas.service.lease_service import LeaseService
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
+from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
 from aerodaas.service.store import RobotState
 

@@ -1,6 +1,6 @@
 """Trial of a model that a user has brought: run once, in a process of bounded memory and time.
 
-`python -m aerodaas.service.model_trial FILE`. A file of a kilobyte may ask for gigabytes, and what
+`python -m aerodaas.service.models.model_trial FILE`. A file of a kilobyte may ask for gigabytes, and what
 runs it later is a flight. Whether it is a detector at all is for its mission to find out.
 """
 
@@ -36,7 +36,7 @@ _turn = threading.Semaphore(1)
 
 def try_model(path: Path) -> None:
     """Raise ConfigError for a model that takes too much memory or time."""
-    command = [sys.executable, "-m", "aerodaas.service.model_trial", str(path)]
+    command = [sys.executable, "-m", "aerodaas.service.models.model_trial", str(path)]
     with _turn:
         try:
             done = subprocess.run(  # noqa: S603 - our own module

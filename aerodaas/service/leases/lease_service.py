@@ -17,8 +17,8 @@ from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.fleet_registry import FleetRegistry
-from aerodaas.service.lease_book import Candidate, Fleet, LeaseBook
+from aerodaas.service.fleet.fleet_registry import FleetRegistry
+from aerodaas.service.leases.lease_table import Candidate, Fleet, LeaseBook
 from aerodaas.service.store import Lease, Mission, Store
 
 __all__ = ["LeaseService"]

@@ -1,0 +1,1 @@
+"""The provider's fleet: its drones, and its view for the page."""
