@@ -1,9 +1,9 @@
 """Items over the wire, between a provider and its users: JSON, and a picture's bytes beside it.
 
 A text, a truth value, a finite number or None is itself. Anything else is `{"is": CLASS, "of":
-CONTENT}`; the content of a message is as `aerodaas.messages.serialization.schema` has it. What arrives is
-another's data: it is of known classes, each field is checked, and a picture has the bounds of
-recorded ones before it is decoded. Nothing is a pickle.
+CONTENT}`; the content of a message is as `aerodaas.messages.serialization.schema` has it. What
+arrives is another's data: it is of known classes, each field is checked, and a picture has the
+bounds of recorded ones before it is decoded. Nothing is a pickle.
 """
 
 from __future__ import annotations

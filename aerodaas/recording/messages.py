@@ -1,7 +1,7 @@
 """The messages of a recording: one table of classes, schemas and topics, and the JSON of each.
 
-The JSON is that of `aerodaas.messages.serialization.schema`. Labels stand before it: the robot, for example, of
-which a state is.
+The JSON is that of `aerodaas.messages.serialization.schema`. Labels stand before it, such as the
+robot of a state.
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ from aerodaas.geometry.frames import CameraModel, angles_of_rotation
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
+from aerodaas.recording.converters.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
-from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.messages import FrameInfo
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.reference_frames import OPTICAL, Rotation, compose

@@ -28,10 +28,10 @@ from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame
 from aerodaas.recording.converters import Session, convert
+from aerodaas.recording.converters.h264 import require_encoder
 from aerodaas.recording.converters.mission import log_entry
 from aerodaas.recording.converters.plan import fence_entries
 from aerodaas.recording.encoding import Entry
-from aerodaas.recording.h264 import require_encoder
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.messages import FORMAT, Drops, Latency, json_entry
 from aerodaas.recording.output import Output, RecordingSummary, keep_chunk_indexes_on_disk

@@ -16,7 +16,7 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.protocol.schemas import PictureForm
-from aerodaas.recording.h264 import H264Encoder
+from aerodaas.recording.converters.h264 import H264Encoder
 from aerodaas.service.live import packed_reader
 from aerodaas.service.live.hub import StreamHub, Watcher
 from aerodaas.service.live.packed_reader import PackedReader

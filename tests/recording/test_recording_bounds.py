@@ -24,6 +24,7 @@ from mcap_files import Said, write_file
 from aerodaas.cameras.images import check_picture, decode_image
 from aerodaas.cameras.picture_size import MAX_PIXELS, picture_format, picture_size
 from aerodaas.errors import RecordingError
+from aerodaas.recording.converters.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.decoding.limits import (
     MAX_ATTACHMENT,
     MAX_CHANNELS,
@@ -31,7 +32,6 @@ from aerodaas.recording.decoding.limits import (
     MAX_METADATA,
 )
 from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
-from aerodaas.recording.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
 from aerodaas.recording.tables import table_of

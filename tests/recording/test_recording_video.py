@@ -20,7 +20,7 @@ from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConf
 from aerodaas.errors import SourceError
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.recording.h264 import H264Encoder, is_key_frame
+from aerodaas.recording.converters.h264 import H264Encoder, is_key_frame
 from aerodaas.recording.pictures import frames, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder

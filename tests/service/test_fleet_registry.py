@@ -21,6 +21,7 @@ from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service import fleet_registry as garages
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.fleet import fleet_registry as garages
 
 T0 = 1_800_000_000.0
 """Unix seconds."""

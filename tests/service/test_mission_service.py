@@ -27,7 +27,6 @@ from aerodaas.protocol.schemas import (
     VerdictOut,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service import model_store as models
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError, StoreError
@@ -36,6 +35,7 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import Outcome, Progress
 from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
+from aerodaas.service.models import model_store as models
 from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant

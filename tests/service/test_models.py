@@ -16,8 +16,8 @@ from aerodaas.analytics.models import DETECTOR
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionPhase
-from aerodaas.service import model_store as models
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.models import model_store as models
 from aerodaas.service.models.model_store import ModelStore
 
 DAY = 86400.0

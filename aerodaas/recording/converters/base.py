@@ -14,8 +14,8 @@ from aerodaas.config.model import RecordingConfig
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.serialization.opaque_item import OpaqueItem
+from aerodaas.recording.converters.h264 import H264Encoder
 from aerodaas.recording.encoding import Entry, plain
-from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.messages import ItemRecord, channel_of, json_entry
 from aerodaas.recording.reference_frames import Rotation
 

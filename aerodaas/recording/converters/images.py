@@ -30,9 +30,9 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
+from aerodaas.recording.converters.h264 import H264Encoder
 from aerodaas.recording.converters.vehicle import body_frame
 from aerodaas.recording.encoding import Entry, topic
-from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.messages import FrameInfo, json_entry
 from aerodaas.recording.reference_frames import OPTICAL, compose, from_rpy
 from aerodaas.recording.report.overlay import VISIBLE, label_colour, rgb

@@ -15,7 +15,7 @@ from aerodaas.errors import SourceError
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.serialization.schema import MessageError
-from aerodaas.recording.h264 import is_key_frame
+from aerodaas.recording.converters.h264 import is_key_frame
 from aerodaas.recording.messages import NavigationRecord
 from aerodaas.recording.pictures import RecordedImage, camera_of, detections, shots
 from aerodaas.recording.playback.page_items import (

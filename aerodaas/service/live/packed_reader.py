@@ -17,7 +17,7 @@ from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.protocol.schemas import PictureForm, StreamKind
-from aerodaas.recording.h264 import H264Encoder, is_key_frame
+from aerodaas.recording.converters.h264 import H264Encoder, is_key_frame
 from aerodaas.recording.playback.page_items import (
     packed_depth,
     packed_picture,

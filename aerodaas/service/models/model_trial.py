@@ -1,7 +1,7 @@
 """Trial of a model that a user has brought: run once, in a process of bounded memory and time.
 
-`python -m aerodaas.service.models.model_trial FILE`. A file of a kilobyte may ask for gigabytes, and what
-runs it later is a flight. Whether it is a detector at all is for its mission to find out.
+`python -m aerodaas.service.models.model_trial FILE`. A file of a kilobyte may ask for gigabytes,
+and what runs it later is a flight. Whether it is a detector at all is for its mission to find out.
 """
 
 from __future__ import annotations
