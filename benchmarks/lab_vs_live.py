@@ -24,7 +24,11 @@ from rich.progress import track
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cli.lab.recorded_workload import RecordedWorkload, flown_trace, flown_workload
+from aerodaas.cli.lab.recorded_workload import (
+    RecordedWorkload,
+    flown_trace,
+    flown_workload,
+)
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace

@@ -56,7 +56,9 @@ _CORE = (
         "there.",
     ),
     Command(
-        "schema", "aerodaas.cli.document:schema", "Print the JSON schema of environment files."
+        "schema",
+        "aerodaas.cli.flying.document:schema",
+        "Print the JSON schema of environment files.",
     ),
     Command("doctor", "aerodaas.cli.doctor:doctor", "Say what this machine can do."),
     Command(
@@ -139,7 +141,11 @@ _CORE = (
         panel=_PROVIDER,
         words=True,
     ),
-    Command("remote", "aerodaas.cli.provider.remote:app", "Take part in a mission that is flying."),
+    Command(
+        "remote",
+        "aerodaas.cli.provider.remote:app",
+        "Take part in a mission that is flying.",
+    ),
     Command(
         "lab",
         "aerodaas.cli.lab.command_line:app",

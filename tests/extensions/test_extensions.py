@@ -120,6 +120,17 @@ drone.start_mission()
 """
 
 
+IMPORTS = """
+import importlib, pkgutil
+import aerodaas
+
+programs = ("__main__", "templates", "apps")
+for module in pkgutil.walk_packages(aerodaas.__path__, "aerodaas."):
+    if not set(module.name.split(".")) & set(programs):
+        importlib.import_module(module.name)
+"""
+
+
 def _without(tmp_path: Path, left_out: list[str]) -> dict[str, str]:
     """A copy of the package without some extensions; the variables that have it imported."""
     copy = tmp_path / "copy"
@@ -150,6 +161,7 @@ def _core_works(tmp_path: Path, left_out: list[str]) -> None:
 
     names = run("-c", "from aerodaas.config.extensions import extensions; print(*extensions())")
     assert not set(left_out) & set(names.split())
+    run("-c", IMPORTS)
     assert "run" in run("-m", "aerodaas", "--help")
     run("-m", "aerodaas", "init", "--vehicle", "simulated")
     (tmp_path / "app.py").write_text(FLIGHT)

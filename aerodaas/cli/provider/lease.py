@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.options import ExampleGroup
-from aerodaas.cli.provider.provider import At, Json, client_at, moment, print_json, print_table
+from aerodaas.cli.provider.provider import (
+    At,
+    Json,
+    client_at,
+    moment,
+    print_json,
+    print_table,
+)
 from aerodaas.errors import ConfigError, MissionError
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from aerodaas.text.printable import printable
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import AeroDaaSError, RecordingError
 from aerodaas.extensions.vehicle_logs.alignment import (
@@ -20,6 +19,7 @@ from aerodaas.extensions.vehicle_logs.log import VehicleLog
 from aerodaas.extensions.vehicle_logs.reading import MAX_LOG, read_vehicle_log
 from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
+from aerodaas.text.printable import printable
 
 __all__ = ["AttachedLog", "attach_log", "attached_logs", "flight_of"]
 

@@ -13,9 +13,8 @@ import typer
 
 from aerodaas.cli.flying.preflight import connected_robot
 from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
-from aerodaas.cli.preflight import connected_robot
-from aerodaas.config.printable import printable
 from aerodaas.errors import VehicleError
+from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.extensions.vehicle_logs.log_service import LogEntry, LogService

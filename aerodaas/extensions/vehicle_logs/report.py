@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerodaas.config.printable import printable
 from aerodaas.extensions.vehicle_logs.attachment import AttachedLog, attached_logs
 from aerodaas.extensions.vehicle_logs.plots import log_drawings
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.section import ReportSection
+from aerodaas.text.printable import printable
 
 __all__ = ["log_sections"]
 

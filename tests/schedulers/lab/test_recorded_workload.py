@@ -12,7 +12,11 @@ from typer.testing import CliRunner
 from aerodaas import Environment
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.cli.lab.command_line import app
-from aerodaas.cli.lab.recorded_workload import RecordedWorkload, flown_trace, flown_workload
+from aerodaas.cli.lab.recorded_workload import (
+    RecordedWorkload,
+    flown_trace,
+    flown_workload,
+)
 from aerodaas.config.model import TaskConfig
 from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording

@@ -22,7 +22,11 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from aerodaas.cli.lab.recorded_workload import RecordedWorkload, flown_trace, flown_workload
+from aerodaas.cli.lab.recorded_workload import (
+    RecordedWorkload,
+    flown_trace,
+    flown_workload,
+)
 from aerodaas.config.model import RecordingConfig, SensorConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import AeroDaaSError
