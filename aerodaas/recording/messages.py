@@ -20,7 +20,7 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
-from aerodaas.messages.mission import Decision, MissionStatus, SetpointRecord
+from aerodaas.messages.mission import Decision, MissionPlan, MissionStatus, SetpointRecord
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert

@@ -9,7 +9,7 @@ import pytest
 
 from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.messages.odometry import Battery, Odometry
-from aerodaas.messages.schema import json_of
+from aerodaas.messages.serialization.schema import json_of
 from aerodaas.messages.vehicle import Traffic, VehicleMode, VehicleState
 from aerodaas.recording.playback.track import Room, TrackBuilder
 

@@ -19,7 +19,6 @@ from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
-from aerodaas.service import fleet_registry as garages
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet import fleet_registry as garages
 

@@ -152,7 +152,7 @@ def status(
         aerodaas remote status
         aerodaas remote status --follow --json | jq .vehicle.odometry.position
     """
-    from aerodaas.messages.schema import json_text  # noqa: PLC0415 - slow to load
+    from aerodaas.messages.serialization.schema import json_text  # noqa: PLC0415 - slow to load
 
     client = _client(context)
     for one in client.stream(rate) if follow else [client.status()]:
