@@ -51,7 +51,20 @@ def test_the_wheel_holds_nothing_else(built: Path) -> None:
     package = [path for path in paths if path.parts[0] == "aerodaas"]
     kinds = {path.suffix for path in package if path.name != "py.typed"}
     assert kinds <= {
-        *(".py", ".pyi", ".json", ".csv", ".onnx", ".css", ".js", ".html", ".md", ".svg", ".txt")
+        *(
+            ".py",
+            ".pyi",
+            ".json",
+            ".csv",
+            ".onnx",
+            ".css",
+            ".js",
+            ".html",
+            ".md",
+            ".svg",
+            ".toml",
+            ".txt",
+        )
     }
     assert not [path for path in package if path.name.startswith((".", "test_", "conftest"))]
 

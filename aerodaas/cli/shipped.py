@@ -133,7 +133,7 @@ def new(
             "--template",
             "-t",
             help="`survey`: visit places; `follow`: follow a person; a class of your own: "
-            "`detector`, `scheduler`, `camera` or `driver`.",
+            "`detector`, `scheduler`, `camera`, `driver` or `extension`.",
         ),
     ] = "survey",
 ) -> None:

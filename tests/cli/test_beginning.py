@@ -80,7 +80,7 @@ def test_only_templates_are_named(aerodaas: Command, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("aerodaas.cli.shipped.TEMPLATES", Path("templates"))
     code, _, said = aerodaas("new", "patrol", "--template", "__pycache__")
     assert code == 2
-    assert "known: camera, detector, driver, follow, scheduler, survey" in said
+    assert "known: camera, detector, driver, extension, follow, scheduler, survey" in said
 
 
 def test_help_names_what_is_flown(aerodaas: Command) -> None:

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import Command, Extension, extensions
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.errors import ConfigError, UnknownIdError
+from aerodaas.testing.extension_kit import check_extension
 
 _ROOT = Path(__file__).resolve().parents[2]
 _FOLDERS = sorted(
@@ -49,13 +50,25 @@ def test_every_folder_is_an_extension_of_its_name() -> None:
     for name in _FOLDERS:
         extension = found[name]
         assert extension.name == name
-        assert extension.summary.endswith(".")
-        places = [place for plugins in extension.plugins.values() for place in plugins.values()]
-        places += [command.place for command in extension.commands]
-        places += extension.report_sections
-        places += [kind.find for kind in extension.vehicles if kind.find]
-        for place in places:
-            assert imported(place) is not None
+        check_extension(extension)
+
+
+@pytest.mark.parametrize(
+    ("extension", "message"),
+    [
+        (Extension("mine", "No sentence"), "full stop"),
+        (Extension("not a name", "Some."), "identifier"),
+        (Extension("mine", "Some.", {"drivers": {"a": "nothing_there:A"}}), "nothing_there"),
+        (Extension("mine", "Some.", {"drivers": {"a": "json:A"}}), "cannot be imported"),
+        (Extension("mine", "Some.", {"drivers": {"mavlink": "json:loads"}}), "project's own"),
+        (Extension("mine", "Some.", commands=(Command("run", "json:loads", "Run."),)), "'run'"),
+        (Extension("mine", "Some.", exports=(Command("csv", "json:loads", "C."),)), "'csv'"),
+    ],
+)
+def test_an_extension_that_breaks_a_rule_is_told(extension: Extension, message: str) -> None:
+    """By the kit for its author's tests."""
+    with pytest.raises(ConfigError, match=message):
+        check_extension(extension)
 
 
 def test_a_packages_extension_adds_its_plug_ins(site: Path) -> None:
