@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import threading
 import time
@@ -133,6 +134,14 @@ def test_nobody_else_sees_it(page: str) -> None:
         assert text(ask(page, path))[0] == 404
     assert ask(page, "/v1/missions/own/commands")[0] == 404
     assert ask(page, "/", "")[0] == 200
+
+
+def test_a_flight_is_compressed_for_those_who_can_read_it(page: str) -> None:
+    """A fraction of its bytes, and the same content; others get it as it is."""
+    whole = ask(page, PLAYBACK)[1]
+    packed = ask(page, PLAYBACK, **{"Accept-Encoding": "br, gzip"})[1]
+    assert gzip.decompress(packed) == whole
+    assert len(packed) < 0.3 * len(whole)
 
 
 def test_two_are_served_side_by_side(path: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable
 from typing import Annotated, Any, TypeAlias
 
@@ -15,6 +16,8 @@ from aerodaas.service.live.playback import Player
 
 __all__ = ["PlaybackRoutes"]
 
+_LONG = 10_000
+"""Bytes of an answer from which on it is compressed."""
 _Moment: TypeAlias = Annotated[int, Query(ge=0, le=10**18)]
 """Mission nanoseconds."""
 _Stream: TypeAlias = Annotated[str, Query(max_length=4096)]
@@ -39,7 +42,13 @@ class PlaybackRoutes:
 
     def playback(self, mission: str, request: Request) -> Response:
         """The recorded flight as a page plays it, once it is over; how far it has been read."""
-        return Response(self._of(mission, request).text, media_type="application/json")
+        text = self._of(mission, request).text
+        headers = {"Vary": "Accept-Encoding"}
+        # A flight of minutes takes megabytes, of which nine tenths repeat one another.
+        if len(text) > _LONG and "gzip" in request.headers.get("Accept-Encoding", ""):
+            text = gzip.compress(text, compresslevel=1)
+            headers["Content-Encoding"] = "gzip"
+        return Response(text, media_type="application/json", headers=headers)
 
     def picture(
         self,
