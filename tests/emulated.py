@@ -14,6 +14,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -46,6 +47,7 @@ __all__ = [
     "Flight",
     "FlownMission",
     "Stepped",
+    "flight",
     "fly_pictures",
     "free_port",
     "inject",
@@ -283,6 +285,12 @@ class Stepped:
 
 Flight: TypeAlias = Callable[..., Stepped]
 """Makes one; takes the arguments of `Stepped` but the first."""
+
+
+@pytest.fixture
+def flight(monkeypatch: pytest.MonkeyPatch) -> Flight:
+    """Makes flights of an emulated autopilot on a clock that the test moves."""
+    return partial(Stepped, monkeypatch)
 
 
 class FlownMission:

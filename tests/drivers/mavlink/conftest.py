@@ -1,14 +1,5 @@
 """Shared by the MAVLink tests."""
 
-from __future__ import annotations
+from emulated import flight
 
-from functools import partial
-
-import pytest
-from emulated import Flight, Stepped
-
-
-@pytest.fixture
-def flight(monkeypatch: pytest.MonkeyPatch) -> Flight:
-    """Makes flights of an emulated autopilot on a clock that the test moves."""
-    return partial(Stepped, monkeypatch)
+__all__ = ["flight"]

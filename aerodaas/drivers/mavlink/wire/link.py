@@ -13,10 +13,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
+from aerodaas.config.extensions import service
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.wire.corrections import Corrections
 from aerodaas.drivers.mavlink.wire.dialect import EventMessage, decoded, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
@@ -102,6 +102,17 @@ class LinkCounts:
     sent: int = 0
 
 
+class CorrectionsSource(Protocol):
+    """Source of corrections for RTK, which reads them in a thread of its own."""
+
+    def reports(self, now: float) -> list[str]:
+        """Reports for the operator, one sentence each; `now` is the monotonic clock, seconds."""
+        ...
+
+    def close(self) -> None:
+        """End the thread and close the source."""
+
+
 class MavlinkLink:
     """Link to one vehicle; `send` may be called from any thread.
 
@@ -149,8 +160,8 @@ class MavlinkLink:
         self._thread: threading.Thread | None = None
         self._forwarder: Forwarder | None = None
         self._share: WireShare | None = None
-        self.corrections: Corrections | None = None
-        """Of a base station, passed on while it is open."""
+        self.corrections: CorrectionsSource | None = None
+        """Source of a base station's corrections, passed on while it is open."""
 
     def open(self) -> None:
         """Open the wire and start the thread; raises ConfigError and VehicleError."""
@@ -162,8 +173,10 @@ class MavlinkLink:
                 self._forwarder = Forwarder(settings.forward, self._name, self._stands)
                 opened.callback(self._forwarder.close)
             if settings.corrections is not None and not settings.observe:
-                self.corrections = Corrections(settings.corrections, self._name, self._correct)
-                opened.callback(self.corrections.close)
+                opens = service("corrections.open")
+                source: CorrectionsSource = opens(settings.corrections, self._name, self._correct)
+                opened.callback(source.close)
+                self.corrections = source
             self._bell, self._rope = map(opened.enter_context, socket.socketpair())
             self._resources = opened.pop_all()
         self._warn_if_exposed()

@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.drivers.mavlink.wire.rtcm import LARGEST, RtcmFramer, fragments
 from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
 from aerodaas.errors import ConfigError, VehicleError
+from aerodaas.extensions.corrections.rtcm import LARGEST, RtcmFramer, fragments
 
 __all__ = ["Corrections"]
 

@@ -8,12 +8,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from emulated import wait_for
+from emulated import Flight, wait_for
+from routed import routed
 from rtcm_station import BaseStation, rtcm
 
-from aerodaas.drivers.mavlink.wire import corrections as module
-from aerodaas.drivers.mavlink.wire.corrections import Corrections
 from aerodaas.errors import ConfigError
+from aerodaas.extensions.corrections import corrections as module
+from aerodaas.extensions.corrections.corrections import Corrections
 
 MESSAGE = rtcm(bytes(range(200)))
 
@@ -107,3 +108,21 @@ def test_a_station_on_the_network_is_warned_of(
     with BaseStation() as station, caplog.at_level(logging.WARNING):
         Corrections(station.url, "d", lambda _: None).close()
     assert "nothing signs them" in caplog.text
+
+
+def test_corrections_reach_each_vehicle_behind_a_router_once(flight: Flight) -> None:
+    """All that the router carries was sent to each, and each has taken its own."""
+    message = rtcm(bytes(range(200)))
+    with BaseStation() as base, routed(flight, 1, 2, corrections=base.url) as (ends, _):
+        left, right = ends
+        base.say(message)
+        left.wait(
+            lambda: (
+                right.vehicle.read(),
+                all(len(one.heard("GPS_RTCM_DATA")) >= 2 for one in ends),
+            )[1],
+            60.0,
+        )
+        for one in ends:
+            parts = one.heard("GPS_RTCM_DATA")
+            assert b"".join(bytes(part.data[: part.len]) for part in parts) == message
