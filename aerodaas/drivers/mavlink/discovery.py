@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import select
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
 from aerodaas.drivers.mavlink.wire.transport import Transport, open_transport
 from aerodaas.drivers.pin import Peer
+from aerodaas.drivers.waiting import wait_readable
 from aerodaas.errors import VehicleError
 
 __all__ = ["LISTENED", "HeardVehicle", "MavlinkDiscovery", "hear_vehicles"]
@@ -86,9 +86,7 @@ def hear_vehicles(seconds: float, urls: Sequence[str] = LISTENED) -> MavlinkDisc
             ears.append(_Ear(url, wire))
         until = time.monotonic() + seconds
         while ears and (left := until - time.monotonic()) > 0:
-            # A wire that was cut has no descriptor to wait for.
-            wires = [number for ear in ears if (number := ear.wire.fileno()) >= 0]
-            select.select(wires, [], [], min(left, _TICK))
+            wait_readable([ear.wire.fileno() for ear in ears], min(left, _TICK))
             for ear in ears:
                 ear.receive()
     vehicles = dict.fromkeys(vehicle for ear in ears for vehicle in ear.vehicles())

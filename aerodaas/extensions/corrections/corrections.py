@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
-import select
 import threading
 import time
 from collections.abc import Callable
 from typing import Any
 
 from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
+from aerodaas.drivers.waiting import wait_readable
 from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.extensions.corrections.rtcm import LARGEST, RtcmFramer, fragments
 
@@ -87,9 +86,7 @@ class Corrections:
                 self._closing.wait(_RETRY)
                 self._wire = self._opened()
                 continue
-            wires = [number for number in (self._wire.fileno(),) if number >= 0]
-            with contextlib.suppress(OSError, ValueError):
-                select.select(wires, [], [], _TICK)
+            wait_readable([self._wire.fileno()], _TICK)
             for content, _ in self._wire.receive():
                 for message in self._framer.feed(content):
                     self._pass(message, time.monotonic())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import select
 import socket
 import threading
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from aerodaas.cameras.settings import camera_model
 from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.drivers.pin import Pin
+from aerodaas.drivers.waiting import wait_readable
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.extensions.tello.settings import (
     TelloCameraSettings,
@@ -152,7 +152,7 @@ class TelloCamera:
     def _run(self) -> None:
         quiet_since, told = host_time_ns(), False
         while not self._closing.is_set():
-            select.select([self._socket], [], [], _LISTEN)
+            wait_readable([self._socket.fileno()], _LISTEN)
             now = host_time_ns()
             arrived = self._from_tello(self._socket)
             if arrived:

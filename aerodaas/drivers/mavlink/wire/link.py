@@ -6,7 +6,6 @@ import contextlib
 import logging
 import math
 import queue
-import select
 import socket
 import threading
 import time
@@ -25,6 +24,7 @@ from aerodaas.drivers.mavlink.wire.sharing import WireMember, WireShare, share_w
 from aerodaas.drivers.mavlink.wire.signing import SignedCodec, load_key, sign_with
 from aerodaas.drivers.mavlink.wire.transport import Transport, is_exposed, open_transport
 from aerodaas.drivers.pin import Peer
+from aerodaas.drivers.waiting import wait_readable
 
 __all__ = ["LinkCounts", "MavlinkLink", "Message"]
 
@@ -320,8 +320,7 @@ class MavlinkLink:
         wires = [self._wire.fileno(), self._bell.fileno()]
         if self._forwarder is not None:
             wires.append(self._forwarder.fileno())
-        with contextlib.suppress(OSError, ValueError):
-            select.select([wire for wire in wires if wire >= 0], [], [], duration)
+        wait_readable(wires, duration)
 
     def _receive(self, now: float) -> None:
         for content, peer in self._wire.receive():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import select
 import socket
 import threading
 from collections import deque
@@ -14,6 +13,7 @@ from aerodaas.drivers.mavlink.wire.framing import senders
 from aerodaas.drivers.mavlink.wire.senders import SenderPins
 from aerodaas.drivers.mavlink.wire.transport import Transport
 from aerodaas.drivers.pin import Peer
+from aerodaas.drivers.waiting import wait_readable
 from aerodaas.errors import VehicleError
 
 __all__ = ["WireMember", "WireShare", "share_wire"]
@@ -173,9 +173,7 @@ class _SharedWire:
 
     def _run(self) -> None:
         while not self._closing:
-            wires = [number for number in (self._wire.fileno(),) if number >= 0]
-            with contextlib.suppress(OSError, ValueError):
-                select.select(wires, [], [], _TICK)
+            wait_readable([self._wire.fileno()], _TICK)
             for content, peer in self._wire.receive():
                 self._distribute(content, peer)
 
