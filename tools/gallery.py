@@ -13,7 +13,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from aerodaas.notebook import Pictures, recorded_pictures
+from aerodaas.extensions.notebook import Pictures, recorded_pictures
 from aerodaas.schedulers.lab import run_sweep
 from aerodaas.schedulers.lab.sweep_plots import plot_sweep
 

@@ -18,7 +18,7 @@ from aerodaas.config.options import RunOptions
 from aerodaas.environment.run import Run
 from aerodaas.errors import ConfigError, MissionError
 
-NOTEBOOKS = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
+NOTEBOOKS = Path(__file__).resolve().parents[3] / "docs" / "notebooks"
 NAMES = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
 
 
@@ -62,7 +62,8 @@ def test_the_first_flight(tmp_path: Path) -> None:
     assert "MonitoringAnalytics" in graph
     assert re.search(r'<iframe src="http://127\.0\.0\.1:\d+/#token=', shown(
         cells["env.console()"], "text/html"))  # fmt: skip
-    assert shown(cells["from aerodaas import notebook"], "text/html").count("data:image/jpeg") == 1
+    pictures = shown(cells["from aerodaas.extensions import notebook"], "text/html")
+    assert pictures.count("data:image/jpeg") == 1
     table = shown(cells["where = notebook.live_table(odometry, seconds=2)"], "text/plain")
     count = re.findall(r"count\s+([\d.]+)", table)
     assert float(count[0]) > 10
@@ -79,7 +80,7 @@ def test_the_first_flight(tmp_path: Path) -> None:
 def test_boxes_and_tables(tmp_path: Path) -> None:
     """A class of a cell flies; vests are boxed in the pictures and rows of the table."""
     cells = run("boxes_and_tables.ipynb", tmp_path)
-    pictures = shown(cells["from aerodaas import notebook"], "text/html")
+    pictures = shown(cells["from aerodaas.extensions import notebook"], "text/html")
     assert pictures.count("data:image/jpeg") == 6
     assert len(re.findall(r"vest 0\.\d\d", pictures)) >= 5
     covered = "covered = notebook.recorded_table(env.run.recording, share)"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from aerodaas.notebook import Pictures
-from aerodaas.notebook.pictures import Picture
+from aerodaas.extensions.notebook import Pictures
+from aerodaas.extensions.notebook.pictures import Picture
 from tools.gallery import sheet
 
 

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
-from aerodaas import notebook
 from aerodaas.config import extras
 from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.graph import AeroStreamData, Graph
 from aerodaas.errors import ConfigError, GraphError, MissionError, RecordingError
+from aerodaas.extensions import notebook
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.mission import MissionState, MissionStatus
