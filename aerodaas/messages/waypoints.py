@@ -416,9 +416,13 @@ _DEFAULTS = [(field.name, field.default) for field in fields(Waypoint)]
 
 
 def _given(waypoint: Waypoint) -> dict[str, Any]:
-    """The fields of a waypoint that are not at their default value."""
+    """The fields of a waypoint that are not at their default value; its numbers are floats."""
     values = ((name, getattr(waypoint, name), default) for name, default in _DEFAULTS)
-    given = {name: value for name, value, default in values if value != default}
+    given = {
+        name: float(value) if name in _NUMBERS else value
+        for name, value, default in values
+        if value != default
+    }
     return {**given, "actuate": waypoint.moves} if waypoint.actuate else given
 
 

@@ -307,10 +307,9 @@ def _schema(name: str, labels: tuple[str, ...]) -> Schema:
     properties: dict[str, Any] = {label: {} for label in labels}
     for field, part in known["properties"].items():
         if channel.elsewhere.get(field) is not True:
-            # Of a field that may be null, the other type.
-            known_as = part.get("anyOf", [part])[0]
-            reference = known_as.get("$ref", "").rpartition("/")[2]
-            meant = definitions[reference] if reference else known_as
-            properties[field] = {"type": meant["type"]} if "type" in meant else {}
+            meant = definitions[part["$ref"].rpartition("/")[2]] if "$ref" in part else part
+            # A number that may be NaN is null then, and a number to who draws it.
+            types = [meant["type"]] if isinstance(meant.get("type"), str) else meant.get("type")
+            properties[field] = {"type": types[0]} if types else {}
     body = {"type": "object", "properties": properties}
     return Schema(name=f"aerodaas.{name}", encoding="jsonschema", data=json.dumps(body).encode())

@@ -29,8 +29,8 @@ pytestmark = pytest.mark.wall_clock
 
 MAGIC = 8
 """Bytes by which an MCAP file is known."""
-HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
+HERE = Path(__file__).resolve().parents[1]
+ROOT = HERE.parent
 
 PROGRAM = """
 import sys, time

@@ -69,7 +69,7 @@ class NanIsNull:
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """JSON schema of the number."""
-        return {"anyOf": [handler(core), {"type": "null"}]}
+        return {**handler(core), "type": ["number", "null"]}
 
 
 Real: TypeAlias = Annotated[float, NanIsNull()]
