@@ -272,7 +272,8 @@ class Track {
 
   at(time: number): RobotStatus | undefined {
     const { states, statuses, ahead } = this.track;
-    const row = lastBefore(statuses, time, secondsOf);
+    // A drone is recorded before its first status, which stands for that moment, too.
+    const row = Math.max(0, lastBefore(statuses, time, secondsOf));
     const mission = statuses[row];
     if (!mission) return undefined;
     const plan = this.planAt(time);

@@ -127,7 +127,7 @@ def test_missions_are_watched_and_commanded_by_role(provider: Served, mission: s
             page.run("document.querySelector('.banner button').click()")
             page.until("document.querySelector('.timeline')", 60)
             page.key("Home")
-            page.until("document.querySelector('[data-testid=state]')?.innerText === 'idle'")
+            page.until("document.querySelector('[data-testid=state]')?.innerText === 'taking off'")
             page.key("End")
             page.until("document.querySelector('[data-testid=state]').innerText === 'landed'")
             assert page.complaints() == []
