@@ -14,11 +14,11 @@ from pydantic import TypeAdapter, create_model
 from pydantic.json_schema import JsonSchemaMode
 
 from aerodaas.config.sections.robot import CameraConfig, RobotConfig
+from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.live import EndMessage, ItemMessage, LeftOutMessage, StateMessage
 from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
@@ -42,7 +42,7 @@ _OUT: tuple[type, ...] = (
     LeftOutMessage,
     MissionOut,
     PlaybackOut,
-    PreflightOut,
+    HealthReport,
     RefusalOut,
     SceneryOut,
     StateMessage,

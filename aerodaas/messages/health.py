@@ -105,11 +105,17 @@ class HealthItem:
 
 @dataclass(frozen=True, slots=True)
 class HealthReport:
-    """The whole list, and when it was gone through."""
+    """A robot's list before take-off, as it was examined last."""
 
-    stamp: int
-    """Mission clock, nanoseconds."""
-    items: tuple[HealthItem, ...]
+    items: tuple[HealthItem, ...] = ()
+    """Empty where it was never examined."""
+    age: float | None = None
+    """Seconds since then: of the mission's clock while a mission flies the robot."""
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Gravest verdict of the items; None where the list was never examined."""
+        return gravest(self.items) if self.items else None
 
 
 def gravest(items: Iterable[HealthItem]) -> Verdict:

@@ -149,8 +149,8 @@ class RobotStatus:
     mission: MissionStatus
     vehicle: VehicleState | None = None
     """None before the vehicle's first state."""
-    health: HealthReport | None = field(default=None, metadata=UNSENT)
-    """The list before take-off as it was gone through last."""
+    health: HealthReport = field(default=HealthReport(), metadata=UNSENT)
+    """The list before take-off."""
     latencies: tuple[float, ...] = field(default=(), metadata=UNSENT)
     """Milliseconds from capture to command, newest last."""
 

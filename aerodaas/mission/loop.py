@@ -63,8 +63,9 @@ class SetpointLoop:
         )
         self.state: VehicleState | None = None
         """The newest vehicle state read."""
-        self.health: HealthReport | None = None
-        """The list before take-off as it was gone through last; None before the first turn."""
+        self._items: tuple[HealthItem, ...] = ()
+        self._examined_at: int | None = None
+        """When the list before take-off was examined last."""
         self._before: int | None = None
         self._last_action: type[Action] | None = None
         self._asked_at = 0
@@ -99,13 +100,20 @@ class SetpointLoop:
         self.mission.command_sent(action, record.sent)
         return record
 
+    @property
+    def health(self) -> HealthReport:
+        """The list before take-off as it was examined last, with its age at the newest turn."""
+        if self._examined_at is None or self._before is None:
+            return HealthReport()
+        return HealthReport(self._items, seconds(max(0, self._before - self._examined_at)))
+
     def _examined(self, state: VehicleState, now: int) -> tuple[HealthItem, ...]:
-        """The list as it counts for this turn: in preflight alone, and gone through anew then."""
-        before = self.mission.state
-        known = self.health is not None and now - self.health.stamp < _EXAMINED_ANEW
+        """The list as it counts for this turn: in preflight alone, and examined anew then."""
+        before, at = self.mission.state, self._examined_at
+        known = at is not None and now - at < _EXAMINED_ANEW
         if before is MissionState.PREFLIGHT or (before is MissionState.IDLE and not known):
-            self.health = HealthReport(now, tuple(self._checklist.examine(state)))
-            return self.health.items if before is MissionState.PREFLIGHT else ()
+            self._items, self._examined_at = tuple(self._checklist.examine(state)), now
+            return self._items if before is MissionState.PREFLIGHT else ()
         return ()
 
     def _read(self) -> VehicleState:

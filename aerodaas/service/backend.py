@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Any, Protocol, TypeAlias
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
@@ -144,6 +144,6 @@ class Fleet(Protocol):
         """Ground below the fleet on the map."""
         ...
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """A robot's health before take-off; raises RefusedError for an unknown robot."""
         ...

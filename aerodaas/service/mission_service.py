@@ -15,10 +15,10 @@ from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.messages.health import HealthReport
 from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     LeaseState,
@@ -399,7 +399,7 @@ class MissionService:
         active = self._missions.get(mission)
         return active.flight if active is not None and active.phase is MissionPhase.FLYING else None
 
-    def preflight(self, robot: str) -> PreflightOut | None:
+    def preflight(self, robot: str) -> HealthReport | None:
         """The list before take-off that the flight of a robot has; None without a flight."""
         active = next((active for active in self._flying() if robot in active.row.robots), None)
         if active is None or active.link is None:

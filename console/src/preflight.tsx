@@ -4,7 +4,7 @@ import "./preflight.css";
 import { ask, messageOf, usePolled } from "./connection";
 import { Badge } from "./widgets";
 import { lasting, wordsOf } from "./words";
-import type { HealthItem, PreflightOut, Verdict } from "./wire";
+import type { HealthItem, HealthReport, Verdict } from "./wire";
 
 /** Milliseconds between two requests of the list. */
 const PAUSE = 2000;
@@ -31,19 +31,20 @@ export function PreflightPanel({ robot, live, open }: PreflightProps) {
   const path = robot && `v1/robots/${encodeURIComponent(robot)}/preflight`;
   const { answer, at, error } = usePolled(
     path,
-    (signal) => ask<PreflightOut>(path, undefined, signal),
+    (signal) => ask<HealthReport>(path, undefined, signal),
     () => (live ? PAUSE : null),
   );
   const items = [...(answer?.items ?? [])].sort(
     (one, other) => ORDER.indexOf(one.verdict) - ORDER.indexOf(other.verdict),
   );
   const age = answer?.age == null ? null : answer.age + (Date.now() - at) / 1000;
-  const worst = items.filter((one) => one.verdict === answer?.verdict).length;
+  const gravest = items[0]?.verdict ?? null;
+  const worst = items.filter((one) => one.verdict === gravest).length;
   return (
     <details class="card preflight" open={open} aria-label="Before take-off">
       <summary>
         <h2>Before take-off</h2>
-        <PreflightBadge verdict={answer?.verdict ?? null} count={worst} />
+        <PreflightBadge verdict={gravest} count={worst} />
         {age !== null && <span class="hint">{lasting(age)} ago</span>}
       </summary>
       {error !== null && <p class="hint">{messageOf(error)}</p>}

@@ -81,12 +81,12 @@ export interface Wire {
   ControlsOut: ControlsOut;
   EndMessage: EndMessage;
   FleetOut: FleetOut;
+  HealthReport: HealthReport;
   ItemMessage: ItemMessage;
   LeftOutMessage: LeftOutMessage;
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
   PlaybackOut: PlaybackOut;
-  PreflightOut: PreflightOut;
   RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
   RobotConfig: RobotConfig;
@@ -206,6 +206,23 @@ export interface RobotOut {
   shared: string[];
   since: number | null;
   tenant: string | null;
+}
+/**
+ * A robot's list before take-off, as it was examined last.
+ */
+export interface HealthReport {
+  age: number | null;
+  items: HealthItem[];
+}
+/**
+ * One item of the list before take-off.
+ */
+export interface HealthItem {
+  bound: string;
+  name: string;
+  remedy: string;
+  value: string;
+  verdict: Verdict;
 }
 /**
  * An item of one of the flight's streams.
@@ -681,25 +698,6 @@ export interface TrackOut {
 export interface MissionPlan {
   stamp: number;
   waypoints: Waypoint[];
-}
-/**
- * The list before take-off of one robot, as it was when it was gone through last.
- */
-export interface PreflightOut {
-  age: number | null;
-  items: HealthItem[];
-  robot: string;
-  verdict: Verdict | null;
-}
-/**
- * One item of the list before take-off.
- */
-export interface HealthItem {
-  bound: string;
-  name: string;
-  remedy: string;
-  value: string;
-  verdict: Verdict;
 }
 /**
  * Change of the coming waypoints of one robot: one command, carried out whole.

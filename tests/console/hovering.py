@@ -42,7 +42,7 @@ class Run:
         self.commands: list[Command] = []
         self.notes: list[str] = []
         self.alerts: list[Alert] = []
-        self.health: HealthReport | None = None
+        self.health = HealthReport()
         self.traffic: tuple[Traffic, ...] = ()
         self.time = 1.0
         """Mission seconds."""

@@ -13,7 +13,6 @@ from hovering import console
 from pages import button, click_map, passed, until_done, until_state
 from required import needs_peer
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.messages.frames import Header
 from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.readings import Alert
@@ -153,7 +152,7 @@ def test_what_refuses_a_take_off_stands_first(browser: Browser) -> None:
         page.until("document.querySelector('.preflight:not([open]) .empty')")
         # In the air it is folded; whoever looks unfolds it.
         page.run("document.querySelector('.preflight summary').click()")
-        run.health = HealthReport(NANOSECONDS // 2, (good, bad))
+        run.health = HealthReport((good, bad), 0.5)
         page.until("document.querySelectorAll('.preflight li').length === 2")
         assert "refused: 1" in page.text("[data-testid=preflight]")
         said = page.text(".preflight ul").split("\n")
@@ -164,7 +163,7 @@ def test_what_refuses_a_take_off_stands_first(browser: Browser) -> None:
             "refuses",
         ]
         assert said[4:] == ["✓", "GPS 12 satellites", "ok"]
-        run.health = HealthReport(-60 * NANOSECONDS, (good,))
+        run.health = HealthReport((good,), 61.0)
         page.until("document.querySelector('.preflight ul.old')")
         assert "s ago" in page.text(".preflight summary")
         assert "ready" in page.text("[data-testid=preflight]")

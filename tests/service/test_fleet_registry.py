@@ -14,10 +14,9 @@ from offered import PILOT, Provider
 from robot_statuses import robot_status
 
 from aerodaas.errors import MissionError
-from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut, Role
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet import fleet_registry as garages
@@ -159,16 +158,11 @@ WINDY = HealthItem("wind", "12.0 m/s", "at most 10", Verdict.REFUSED, "wait for 
 
 def test_the_list_before_take_off_is_told_with_its_age(provider: Provider, clock: Clock) -> None:
     """In one word with the fleet, while somebody is connected with the drone on the ground."""
-    assert provider.registry.preflight("one").model_dump() == {
-        "robot": "one",
-        "verdict": None,
-        "age": None,
-        "items": [],
-    }
+    assert provider.registry.preflight("one") == HealthReport()
     provider.monitor.see("one", health=(WINDY,), examined=T0)
     clock.now = T0 + 2.0
     told = provider.registry.preflight("one")
-    assert (told.verdict, told.age, told.items) == (Verdict.REFUSED, 2.0, [WINDY])
+    assert (told.verdict, told.age, told.items) == (Verdict.REFUSED, 2.0, (WINDY,))
     assert seen(provider).preflight is Verdict.REFUSED
     provider.monitor.see("one", health=(WINDY,), examined=T0, link=LinkState.LOST, since=T0)
     clock.now = T0 + 60.0
@@ -187,13 +181,13 @@ def test_a_missions_drone_has_the_list_that_its_flight_went_through(
     provider.registry.set_link(["one"], LinkState.MISSION)
     link = provider.missions._missions[mission.id].link
     well = HealthItem("wind", "2.0 m/s", "at most 10", Verdict.GOOD)
-    told = PreflightOut.of("one", [well], 4.0)
+    told = HealthReport((well,), 4.0)
     monkeypatch.setattr(link, "preflight", lambda _: told, raising=False)
     assert provider.fleet.preflight("one") == told
     assert seen(provider).preflight is None
 
-    def silent(_: str) -> PreflightOut:
+    def silent(_: str) -> HealthReport:
         raise MissionError("it does not answer")
 
     monkeypatch.setattr(link, "preflight", silent)
-    assert provider.fleet.preflight("one").items == []
+    assert provider.fleet.preflight("one") == HealthReport()

@@ -22,11 +22,11 @@ from aerodaas.clock import host_time_ns
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import ConfigError, MissionError, SourceError
 from aerodaas.messages.frames import Frame, Header
-from aerodaas.messages.health import HealthItem, Verdict
+from aerodaas.messages.health import HealthItem, HealthReport, Verdict
+from aerodaas.messages.mission import MissionState, MissionStatus, RobotStatus
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import CommandIn, PictureForm
 from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
@@ -151,8 +151,9 @@ def test_a_live_views_pictures_are_made_in_the_form_that_it_asks_for(
 
 def test_the_list_before_take_off_goes_to_the_service(flight: Flight) -> None:
     """Whole, with its age."""
-    told = PreflightOut.of("one", [WINDY], 3.0)
-    flight.flight.meter.preflight = {"one": told}
+    told = HealthReport((WINDY,), 3.0)
+    status = MissionStatus(0, MissionState.IDLE)
+    flight.flight.meter.status = {"one": RobotStatus(status, health=told)}
     assert flight.link.preflight("one") == told
 
 

@@ -19,9 +19,9 @@ from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -101,9 +101,9 @@ class ProviderClient:
         """The drones, and the environment that applications are built against."""
         return self._ask(FleetOut, "GET", "/v1/fleet")
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """A drone's health before take-off, as it was when it was looked at last."""
-        return self._ask(PreflightOut, "GET", f"/v1/robots/{_part(robot)}/preflight")
+        return self._ask(HealthReport, "GET", f"/v1/robots/{_part(robot)}/preflight")
 
     def request_lease(self, wanted: LeaseIn) -> LeaseOut:
         """Request drones for a time; the lease is queued until they are free."""

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.messages.health import HealthReport
 from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.monitor.reports import VehicleReport
@@ -67,14 +67,14 @@ class FleetRegistry:
         with self._lock:
             return self._reports[robot]
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """The list before take-off of a robot; raises RefusedError if there is none such."""
         if robot not in self._reports:
             raise RefusedError(404, f"there is no robot {robot}")
         with self._lock:
             report, made = self._reports[robot], self._examined_at.get(robot)
         age = None if report.examined is None or made is None else time.monotonic() - made
-        return PreflightOut.of(robot, report.health, age)
+        return HealthReport(report.health, age)
 
     def record_status(
         self,

@@ -8,7 +8,7 @@ from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.sections.actuators import permitted
-from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.messages.health import HealthReport
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut
 from aerodaas.service.access.accounts import Accounts
@@ -47,7 +47,7 @@ class FleetView:
         """The account that asks."""
         return self._accounts.get(principal.account)
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """A robot's health before take-off; raises RefusedError for an unknown robot."""
         known = self._registry.preflight(robot)
         return self._missions.preflight(robot) or known

@@ -17,10 +17,10 @@ from websockets.sync.client import unix_connect
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.errors import MissionError, SilentError
 from aerodaas.http_client import http_client, http_errors
+from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.schemas import (
     CommandIn,
     GrantIn,
@@ -165,11 +165,11 @@ class FlightLink:
         """Have the flight share nothing with a mission any more."""
         return self._answered("DELETE", f"shares/{mission}")
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """The list before take-off of one of its robots."""
         path = f"/v1/robots/{robot}/preflight"
         with self._place():
-            return self._asked(PreflightOut, "GET", path, None, Role.VIEWER)
+            return self._asked(HealthReport, "GET", path, None, Role.VIEWER)
 
     def record_presence(self) -> None:
         """Have the flight told that its user is there; nobody waits for that, as it may hang."""

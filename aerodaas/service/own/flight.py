@@ -16,11 +16,11 @@ from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.clock import host_time_ns, seconds
 from aerodaas.config.redaction import catalogue
 from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
+from aerodaas.messages.health import HealthReport
 from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus, Place, RobotStatus
 from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
 from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, told_of_controls
-from aerodaas.protocol.preflight import PreflightOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
     AccountOut,
@@ -62,8 +62,6 @@ class FlightMeter:
         """By robot; replaced and never changed, because other threads read it."""
         self.told: dict[str, float] = {}
         """Host time in seconds when each robot's newest status came; replaced as that is."""
-        self.preflight: dict[str, PreflightOut] = {}
-        """The list before take-off by robot; replaced as the status is."""
         self.alerts: list[str] = []
         self.analytics: AnalyticsOut | None = None
         """Figures of the analytics scheduler; None before its first outcome."""
@@ -100,10 +98,6 @@ class FlightMeter:
             self._remember(name, report.mission)
         self.told = told
         self.status = {name: report.public for name, report in state.robots.items()}
-        self.preflight = {
-            name: PreflightOut.of_flight(name, report.health, report.mission.stamp)
-            for name, report in state.robots.items()
-        }
         for name, status in self.status.items():
             if (charge := status.charge) is not None:
                 first, _ = self._charges.get(name, (charge, charge))
@@ -281,12 +275,13 @@ class OwnFlight:
     def _scenery(self) -> SceneryOut:
         return SceneryOut.of(self.config)
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         """A robot's list before take-off; raises RefusedError for an unknown robot."""
         if robot not in {one.id for one in self.config.robots}:
             raise RefusedError(404, f"there is no robot {robot}")
         self._refresh()
-        return self.meter.preflight.get(robot, PreflightOut(robot=robot))
+        status = self.meter.status.get(robot)
+        return HealthReport() if status is None else status.health
 
     def missions(self, principal: Principal) -> list[MissionOut]:
         """The one mission."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from fastapi import FastAPI
 
 from aerodaas.clock import seconds
-from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.messages.health import HealthReport
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, MissionOut, MissionPhase
 from aerodaas.recording.reader import Recording
@@ -102,7 +102,7 @@ class _RecordedFlights:
     def fleet_scenery(self) -> SceneryOut:
         return SceneryOut()
 
-    def preflight(self, robot: str) -> PreflightOut:
+    def preflight(self, robot: str) -> HealthReport:
         raise RefusedError(404, f"there is no robot {robot}")
 
     def missions(self, principal: Principal) -> list[MissionOut]:

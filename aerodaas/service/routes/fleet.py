@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from aerodaas.protocol.preflight import PreflightOut
+from aerodaas.messages.health import HealthReport
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, Role
 from aerodaas.service.backend import Fleet
@@ -44,7 +44,7 @@ class FleetRoutes:
         self._admission.require(request, Role.VIEWER)
         return self._fleet.fleet_scenery()
 
-    def preflight(self, robot: str, request: Request) -> PreflightOut:
+    def preflight(self, robot: str, request: Request) -> HealthReport:
         """A drone's health before take-off, to whoever sees its charge and place."""
         self._admission.require(request, Role.VIEWER)
         return self._fleet.preflight(robot)
