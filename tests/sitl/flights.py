@@ -187,7 +187,7 @@ class SitlFlight:
         return self.vehicle.connection.autopilot.name == "PX4"
 
     def tell_outcome(self, what: str) -> None:
-        """Print what docs/mavlink.md tells of the flight: the truth, and what people were told."""
+        """Print what docs/benchmarks.md has of the flight: the truth, and the alerts."""
         witness = self.relay.witness
         up = math.nan if witness.place is None else witness.place[2]
         told = self._told()

@@ -1,6 +1,6 @@
 """Flights on real PX4 and ArduCopter in which something breaks: what it does, what people hear.
 
-Each prints the simulator's own truth and every alert; docs/mavlink.md keeps the table of them.
+Each prints the simulator's own truth and every alert; docs/benchmarks.md keeps the table of them.
 """
 
 from __future__ import annotations
