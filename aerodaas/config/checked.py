@@ -7,12 +7,13 @@ import re
 import types
 import typing
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     PlainSerializer,
     Secret,
     SecretBytes,
@@ -22,17 +23,20 @@ from pydantic import (
     ValidationError,
     model_serializer,
 )
-from pydantic_core import ErrorDetails
+from pydantic_core import CoreSchema, ErrorDetails
 
+from aerodaas.config.extensions import SettingsSection, section_models
 from aerodaas.config.secrets import HIDDEN, SecretUrl, cleaned, is_secret_name, shown, shown_text
 from aerodaas.errors import ConfigError
 
 __all__ = [
+    "Extensible",
     "Finite",
     "NotNegative",
     "Positive",
     "Settings",
     "Strict",
+    "added_settings",
     "checked",
     "explained",
     "is_subclass",
@@ -99,6 +103,29 @@ class Strict(BaseModel):
             yield name, _without_logins(hidden)
 
 
+class Extensible(Strict):
+    """A section of an environment file to which extensions add settings (`Extension.settings`).
+
+    They are added when the first such section is validated, once every module can be imported.
+    """
+
+    model_config = ConfigDict(defer_build=True)
+    section: ClassVar[SettingsSection]
+
+    @classmethod
+    def __get_pydantic_core_schema__(
+        cls, source: type[BaseModel], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        for extension, model in section_models(cls.section).items():
+            for name, field in model.model_fields.items():
+                if cls.model_fields.setdefault(name, field) is not field:
+                    raise ConfigError(
+                        f"the extension {extension!r} adds {name!r} to the settings of "
+                        f"{cls.section}, which have it already: uninstall the extension"
+                    )
+        return handler(source)
+
+
 M = TypeVar("M", bound=BaseModel)
 _WORD = re.compile(r"[\w .\-]{0,40}")
 
@@ -119,6 +146,16 @@ def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
         return model.model_validate(content)
     except ValidationError as error:
         raise ConfigError(f"{place}: {explained(error, model, content)}{hint}") from None
+
+
+def added_settings(section: Extensible, model: type[M]) -> M:
+    """The settings that an extension has added to a section.
+
+    Args:
+        section: A section of an environment file.
+        model: The extension's model for it.
+    """
+    return model.model_construct(**{name: getattr(section, name) for name in model.model_fields})
 
 
 def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
@@ -164,8 +201,11 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
     text = ".".join(str(part) for part in place) or "file"
     whose = _whose(content, place)
     if problem["type"] == "extra_forbidden":
-        known = _settings_at(model, place[:-1])
-        return f"{text}: there is no such setting{whose}{near(str(place[-1]), known)}"
+        models = _models_at(model, place[:-1])
+        known = {field.alias or name for one in models for name, field in one.model_fields.items()}
+        others = any(issubclass(one, Extensible) for one in models)
+        remedy = "; if an extension adds it, install that extension" if others else ""
+        return f"{text}: there is no such setting{whose}{near(str(place[-1]), known)}{remedy}"
     value = problem["input"]
     number = value is None or isinstance(value, bool | int | float)
     # A word may be printed, but no address, which may hold a password, and no secret.
@@ -219,15 +259,12 @@ def _whose(content: object, place: Sequence[int | str]) -> str:
     return f" (of {', '.join(found)})" if found else ""
 
 
-def _settings_at(model: type[BaseModel], place: Sequence[int | str]) -> list[str]:
-    """Names of the settings that the part of `model` at `place` has."""
+def _models_at(model: type[BaseModel], place: Sequence[int | str]) -> list[type[BaseModel]]:
+    """Models of the settings at `place`."""
     kinds: list[Any] = [model]
     for part in place:
         kinds = [inner for kind in kinds for inner in _inside(kind, part)]
-    models = (kind for kind in kinds if is_subclass(kind, BaseModel))
-    return sorted(
-        {field.alias or name for kind in models for name, field in kind.model_fields.items()}
-    )
+    return [kind for kind in kinds if is_subclass(kind, BaseModel)]
 
 
 def _inside(kind: Any, part: int | str) -> list[Any]:  # noqa: ANN401 - an annotation

@@ -23,11 +23,13 @@ __all__ = [
     "Extension",
     "LiveView",
     "PluginKind",
+    "SettingsSection",
     "VehicleDiscovery",
     "VehicleKind",
     "extensions",
     "imported",
     "live_views",
+    "section_models",
     "service",
 ]
 
@@ -37,6 +39,9 @@ _log = logging.getLogger(__name__)
 PluginKind = Literal[
     "drivers", "cameras", "analytics", "trajectory_schedulers", "analytics_schedulers"
 ]
+SettingsSection = Literal["environment", "robot", "limits", "mission", "preflight"]
+"""A part of an environment file to which extensions add: the whole file, a robot, or a part of a
+robot."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +122,13 @@ class Extension:
     """One sentence for a list of extensions."""
     plugins: Mapping[PluginKind, Mapping[str, str]] = field(default_factory=dict)
     """`module:attribute` of each plug-in by its registered name."""
+    settings: Mapping[SettingsSection, str] = field(default_factory=dict)
+    """`module:Model` by section of the environment file: the fields of this pydantic model become
+    settings of the section. Code of the extension reads them by `config.checked.added_settings`."""
+    recorded_settings: tuple[str, ...] = ()
+    """Dotted names of those settings that a replay reads of a recording, a stranger's data: numbers
+    and words that describe the flight. `[]` follows the name of a list, `*` is any key:
+    `robots[].limits.traffic.distance`."""
     commands: tuple[Command, ...] = ()
     exports: tuple[Command, ...] = ()
     """Formats of `aerodaas export`."""
@@ -165,6 +177,15 @@ def extensions() -> Mapping[str, Extension]:
 def live_views() -> dict[str, LiveView]:
     """Live views that extensions add, by name."""
     return {view.name: view for extension in extensions().values() for view in extension.views}
+
+
+def section_models(section: SettingsSection) -> dict[str, Any]:
+    """Models of the settings that extensions add to a section, by the extension's name."""
+    return {
+        name: imported(extension.settings[section])
+        for name, extension in extensions().items()
+        if section in extension.settings
+    }
 
 
 def service(name: str) -> Callable[..., Any]:

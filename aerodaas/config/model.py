@@ -8,12 +8,20 @@ rates Hz, times seconds.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, SecretStr, field_serializer, model_validator
 from typing_extensions import Self
 
-from aerodaas.config.checked import Finite, NotNegative, Positive, Strict, checked
+from aerodaas.config.checked import (
+    Extensible,
+    Finite,
+    NotNegative,
+    Positive,
+    Strict,
+    checked,
+)
+from aerodaas.config.extensions import SettingsSection
 from aerodaas.config.sections.actuators import (
     GripperConfig,
     ParachuteConfig,
@@ -181,10 +189,11 @@ class SimulationConfig(Strict):
     """Seconds over which a network spreads that names no times of its own."""
 
 
-class EnvironmentConfig(Strict):
+class EnvironmentConfig(Extensible):
     """A whole environment file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, title="AeroDaaS environment")
+    model_config = ConfigDict(title="AeroDaaS environment")
+    section: ClassVar[SettingsSection] = "environment"
 
     schema_url: str | None = Field(default=None, alias="$schema")
     name: str = "environment"

@@ -5,9 +5,12 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import sys
 from typing import Any
 
 from aerodaas.config import model
+from aerodaas.config.checked import Extensible
+from aerodaas.config.extensions import section_models
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.sections import compute, home, preflight, robot, terrain
 
@@ -31,14 +34,19 @@ def _docstrings() -> dict[str, dict[str, str]]:
     of the time that its imports of the project take.
     """
     found: dict[str, dict[str, str]] = {}
-    modules = (home, terrain, preflight, robot, compute, model)
-    sources = map(inspect.getsource, modules)
+    sections = Extensible.__subclasses__()
+    added = [(one, it) for one in sections for it in section_models(one.section).values()]
+    modules = [home, terrain, preflight, robot, compute, model]
+    modules += [sys.modules[it.__module__] for _, it in added]
+    sources = map(inspect.getsource, dict.fromkeys(modules))
     for node in (node for source in sources for node in ast.parse(source).body):
         if isinstance(node, ast.ClassDef):
             inherited: dict[str, Any] = {}
             for base in node.bases:
                 inherited |= found.get(ast.unparse(base), {})
             found[node.name] = inherited | _of_class(node)
+    for section, it in added:
+        found[section.__name__] |= found[it.__name__]
     return found
 
 

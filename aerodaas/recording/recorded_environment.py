@@ -2,16 +2,19 @@
 
 A recording is a stranger's data. Geometry, ids, rates and calibration describe the flight;
 code, packages, containers, plug-ins, addresses, paths and environment variables would act on the
-reader's machine. `_ALLOWED` names each field that is read; any other is left out.
+reader's machine. `_ALLOWED` and extensions name each field that is read; any other is left out.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator, Mapping
 from fnmatch import fnmatchcase
+from functools import cache
 from typing import Any, TypeAlias
 
 from aerodaas.config.checked import checked
+from aerodaas.config.extensions import extensions
 from aerodaas.config.model import EnvironmentConfig, HomeConfig
 from aerodaas.config.plugins import PluginKind, is_built_in
 from aerodaas.errors import RecordingError
@@ -140,7 +143,8 @@ _ALLOWED: dict[str, Rule] = {
     },
     "simulation": _fields("seed", "wind", "gust", "sensor_noise"),
 }
-"""Every field that is read from a recording. A field that is not here is left out."""
+"""The core's fields that are read from a recording. A field that is not here is left out, unless an
+extension names it (`Extension.recorded_settings`)."""
 
 _NOT_MISSED = (
     "$schema",
@@ -190,11 +194,27 @@ def recorded_home(recording: Recording) -> HomeConfig | None:
 
 def allowed_content(content: object) -> dict[str, Any]:
     """The fields of a recorded environment that may be read, as far as they are there."""
-    kept = _kept(content, _ALLOWED)
+    kept = _kept(content, _allowed())
     found: dict[str, Any] = kept if isinstance(kept, dict) else {}
     if isinstance(content, dict) and content.get("compute") == "auto":
         found["compute"] = "auto"
     return found
+
+
+@cache
+def _allowed() -> dict[str, Rule]:
+    """Every field that is read from a recording, those of extensions included."""
+    rules = copy.deepcopy(_ALLOWED)
+    for extension in extensions().values():
+        for name in extension.recorded_settings:
+            place: Any = rules
+            *parts, last = name.split(".")
+            for part in parts:
+                inner: Rule = [{}] if part.endswith("[]") else {}
+                place = place.setdefault(part.removesuffix("[]"), inner)
+                place = place[0] if isinstance(place, list) else place
+            place[last] = _plain
+    return rules
 
 
 def left_out(content: object) -> list[str]:

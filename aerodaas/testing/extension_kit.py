@@ -58,6 +58,7 @@ def _places(extension: Extension) -> Iterator[str]:
         yield from [kind.find] if kind.find else []
     for view in extension.views:
         yield from (view.prepare, view.open)
+    yield from extension.settings.values()
     yield from extension.report_sections
     yield from extension.services.values()
     yield from extension.decoders.values()

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from aerodaas.config.extensions import Command, Extension, extensions
+from aerodaas.config.model import validated
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.errors import ConfigError, UnknownIdError
 from aerodaas.testing.extension_kit import check_extension
@@ -60,6 +61,7 @@ def test_every_folder_is_an_extension_of_its_name() -> None:
         (Extension("not a name", "Some."), "identifier"),
         (Extension("mine", "Some.", {"drivers": {"a": "nothing_there:A"}}), "nothing_there"),
         (Extension("mine", "Some.", {"drivers": {"a": "json:A"}}), "cannot be imported"),
+        (Extension("mine", "Some.", settings={"limits": "json:A"}), "cannot be imported"),
         (Extension("mine", "Some.", {"drivers": {"mavlink": "json:loads"}}), "project's own"),
         (Extension("mine", "Some.", commands=(Command("run", "json:loads", "Run."),)), "'run'"),
         (Extension("mine", "Some.", exports=(Command("csv", "json:loads", "C."),)), "'csv'"),
@@ -108,6 +110,91 @@ def test_two_extensions_that_add_one_plug_in_are_refused(site: Path) -> None:
     _install(site, "second_one", "second", source)
     with pytest.raises(ConfigError, match=r"'first' and 'second' both add 'glider'.*uninstall"):
         extensions()
+
+
+SETTINGS = """
+from aerodaas.config.extensions import Extension
+from pydantic import BaseModel
+
+class Towing(BaseModel):
+    rope: float = 20.0
+    \"\"\"Metres.\"\"\"
+
+class TowedLimits(BaseModel):
+    towing: Towing | None = None
+    \"\"\"What is towed.\"\"\"
+
+EXTENSION = Extension(
+    "tow",
+    "Towing.",
+    settings={"limits": "towing:TowedLimits"},
+    recorded_settings=("robots[].limits.towing.rope",),
+)
+"""
+
+READS = """
+import json, pickle
+from aerodaas.config.checked import added_settings
+from aerodaas.config.model import EnvironmentConfig, LimitsConfig, validated
+from aerodaas.config.overrides import overridden
+from aerodaas.config.schema import environment_schema
+from aerodaas.errors import ConfigError
+from aerodaas.recording.recorded_environment import allowed_content
+from towing import TowedLimits, Towing
+
+def environment(**limits):
+    return validated({"robots": [{"id": "drone", "limits": limits}]}, "here")
+
+def towing(config):
+    return added_settings(config.robots[0].limits, TowedLimits).towing
+
+config = environment(towing={"rope": 5})
+assert towing(config) == Towing(rope=5.0) and towing(environment()) is None
+assert config != environment() and config == pickle.loads(pickle.dumps(config))
+assert validated(json.loads(config.model_dump_json(by_alias=True)), "again") == config
+assert towing(overridden(config, {"drone.limits.towing": {"rope": 7}})) == Towing(rope=7.0)
+limits = json.loads(environment_schema())["$defs"]["LimitsConfig"]["properties"]
+assert limits["towing"]["description"] == "What is towed."
+recorded = {"robots": [{"limits": {"towing": {"rope": 5, "secret": 1}}}]}
+assert allowed_content(recorded) == {"robots": [{"limits": {"towing": {"rope": 5}}}]}
+try:
+    environment(twoing={})
+except ConfigError as error:
+    assert "did you mean towing?" in str(error), error
+else:
+    raise AssertionError("an unknown setting is taken")
+"""
+
+
+def test_a_packages_extension_adds_settings(site: Path) -> None:
+    """Of an environment file's section: checked, described, written again and read of recordings.
+
+    A file that uses them without the package is refused with the remedy.
+    """
+    with pytest.raises(ConfigError, match=r"limits\.towing: .*install that extension"):
+        validated({"robots": [{"id": "drone", "limits": {"towing": {}}}]}, "here")
+    _install(site, "towing", "tow", SETTINGS)
+    variables = {**os.environ, "PYTHONPATH": f"{site}{os.pathsep}{_ROOT}"}
+    done = subprocess.run(
+        [sys.executable, "-c", READS], env=variables, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["max_speed", "geofence"])
+def test_a_setting_of_the_core_is_no_extensions(site: Path, name: str) -> None:
+    """Whoever reads the file is told which package to uninstall."""
+    source = SETTINGS.replace("towing: Towing", f"{name}: Towing")
+    _install(site, "towing", "tow", source)
+    variables = {**os.environ, "PYTHONPATH": f"{site}{os.pathsep}{_ROOT}"}
+    done = subprocess.run(
+        [sys.executable, "-c", "from aerodaas.config.model import LimitsConfig; LimitsConfig()"],
+        env=variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert f"the extension 'tow' adds {name!r} to the settings of limits" in done.stderr
 
 
 def test_no_test_of_the_core_imports_an_extension() -> None:

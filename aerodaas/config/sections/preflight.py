@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from aerodaas.config.checked import Finite, Positive, Strict
+from aerodaas.config.checked import Extensible, Finite, Positive
+from aerodaas.config.extensions import SettingsSection
 
 __all__ = ["PreflightConfig", "PreflightLevel"]
 
@@ -14,13 +15,15 @@ PreflightLevel: TypeAlias = Literal["ignore", "warn", "refuse", "require"]
 """What a finding means: nothing, a warning, no take-off, or none unless it is known to be good."""
 
 
-class PreflightConfig(Strict):
+class PreflightConfig(Extensible):
     """The health of the vehicle and its surroundings before take-off.
 
     Each item is at one of the levels `ignore`, `warn`, `refuse` (no take-off) and `require` (nor if
     it is not known). Whether the battery, the geofence and the vehicle's own checks allow a
     take-off is no matter of policy.
     """
+
+    section: ClassVar[SettingsSection] = "preflight"
 
     cells: PreflightLevel = "warn"
     """Voltage of each cell of the battery."""

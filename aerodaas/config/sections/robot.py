@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
 from typing_extensions import Self
 
-from aerodaas.config.checked import Finite, NotNegative, Positive, Settings, Strict
+from aerodaas.config.checked import Extensible, Finite, NotNegative, Positive, Settings, Strict
+from aerodaas.config.extensions import SettingsSection
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.config.sections.preflight import PreflightConfig
@@ -58,8 +59,10 @@ class GeofenceConfig(Strict):
         return self
 
 
-class LimitsConfig(Strict):
+class LimitsConfig(Extensible):
     """Limits that the drone's node enforces, and the delays of its watchdogs."""
+
+    section: ClassVar[SettingsSection] = "limits"
 
     cruise_speed: Positive = 1.0
     max_speed: Positive = 5.0
@@ -124,8 +127,10 @@ class LimitsConfig(Strict):
         return self
 
 
-class MissionConfig(Strict):
+class MissionConfig(Extensible):
     """How a mission behaves where the application does not say."""
+
+    section: ClassVar[SettingsSection] = "mission"
 
     on_complete: Literal["return", "land", "hold"] = "return"
     """What follows the last waypoint when no live stream feeds navigation."""
@@ -219,8 +224,10 @@ class CameraConfig(Strict):
     loop: bool = False
 
 
-class RobotConfig(Strict):
+class RobotConfig(Extensible):
     """One drone: its driver, its sensors and its limits."""
+
+    section: ClassVar[SettingsSection] = "robot"
 
     id: Identifier
     driver: str = "simulated"
@@ -229,9 +236,9 @@ class RobotConfig(Strict):
     sensors: list[SensorConfig] = Field(default_factory=list)
     actuators: list[ActuatorConfig] = Field(default_factory=list)
     """What it carries to act with."""
-    limits: LimitsConfig = LimitsConfig()
-    preflight: PreflightConfig = PreflightConfig()
-    mission: MissionConfig = MissionConfig()
+    limits: LimitsConfig = Field(default_factory=LimitsConfig)
+    preflight: PreflightConfig = Field(default_factory=PreflightConfig)
+    mission: MissionConfig = Field(default_factory=MissionConfig)
     remote_id: Personal[RemoteIdConfig | None] = None
     edge: Identifier | None = None
     """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
