@@ -18,7 +18,7 @@ test: lint
 # Tests that go by the wall clock come last; one that met a busy machine runs once more and is counted.
 CLOCK := slow and wall_clock
 test-all: training lint mypy
-	CI=true $(PYTEST) -m "not ($(CLOCK)) and not sitl"
+	CI=true $(PYTEST) --hypothesis-profile full -m "not ($(CLOCK)) and not sitl"
 	$(BIN)/python -m tools.golden
 	CI=true $(PYTEST) -m "$(CLOCK) and not sitl"
 

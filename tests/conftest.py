@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-# A busy machine is no failure: how long an example takes is asserted nowhere.
-hypothesis.settings.register_profile("patient", deadline=None)
-hypothesis.settings.load_profile("patient")
+# A busy machine is no failure: how long an example takes is asserted nowhere. The gate tries fewer
+# examples than `make test-all`, which names the second profile.
+hypothesis.settings.register_profile("gate", deadline=None, max_examples=40)
+hypothesis.settings.register_profile("full", deadline=None, max_examples=200)
+hypothesis.settings.load_profile("gate")
 
 _CI = bool(os.environ.get("CI"))
 

@@ -45,7 +45,13 @@ def without(*kinds: str) -> Callable[[Messages], Messages]:
 
 @pytest.mark.parametrize(
     "missing",
-    [("state", "camera"), ("mission",), ("setpoints", "detector"), ("follow", "dispatcher")],
+    [
+        ("state", "camera"),
+        *(
+            pytest.param(streams, marks=pytest.mark.slow)
+            for streams in (("mission",), ("setpoints", "detector"), ("follow", "dispatcher"))
+        ),
+    ],
     ids="-".join,
 )
 def test_missing_channels_cost_what_they_held(tmp_path: Path, missing: tuple[str, ...]) -> None:
