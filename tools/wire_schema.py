@@ -14,10 +14,11 @@ from pydantic import TypeAdapter, create_model
 from pydantic.json_schema import JsonSchemaMode
 
 from aerodaas.config.sections.robot import CameraConfig, RobotConfig
+from aerodaas.extensions.surveys.messages import SurveyIn, SurveyOut
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.live import EndMessage, ItemMessage, LeftOutMessage, StateMessage
-from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
+from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (

@@ -140,6 +140,9 @@ class Extension:
     """By an encoding of recorded messages: `module:function` that gets the name of a schema and
     returns the function that decodes its messages, or None for a schema that it does not know."""
     vehicles: tuple[VehicleKind, ...] = ()
+    routes: tuple[str, ...] = ()
+    """`module:function` of what is added to a service's API: each gets the missions, of the class
+    `Missions`, and the access to them, an `Admission`, and returns a FastAPI router."""
     report_sections: tuple[str, ...] = ()
     """`module:function` of what is added to the report of a recording: each gets an open
     `Recording`, and returns a list of `ReportSection`."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from aerodaas.config.model import RobotConfig
 from aerodaas.config.options import Speed
@@ -26,7 +24,6 @@ from aerodaas.mission.commands import (
     Resume,
     TakeBack,
 )
-from aerodaas.mission.payload.survey import Survey, SurveySettings, plan_survey, survey_camera
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
@@ -38,7 +35,7 @@ class Robot(PaperNames, IRobot):
     """One drone of an environment."""
 
     def __init__(self, environment: Environment, config: RobotConfig) -> None:
-        self._environment = environment
+        self.environment = environment
         self.config = config
         self.robot_id = config.id
         self.start_hooks: list[Callable[[], None]] = []
@@ -50,67 +47,20 @@ class Robot(PaperNames, IRobot):
 
     def get_sensors(self) -> list[ISensor[Any]]:
         """Return all the sensors on board."""
-        return [self._environment.sensor(sensor) for sensor in self.config.sensors]
+        return [self.environment.sensor(sensor) for sensor in self.config.sensors]
 
     def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
         """Return the requested sensor; raises UnknownIdError."""
         for sensor in self.config.sensors:
             if sensor_id in {sensor.id, sensor.full_id}:
-                return self._environment.sensor(sensor)
+                return self.environment.sensor(sensor)
         known = [sensor.id for sensor in self.config.sensors]
         raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
 
     def is_navigable(self) -> bool:
         """Return True if the robot is navigable: its driver takes setpoints."""
-        capabilities = load_vehicle(self.config, self._environment.config).capabilities
+        capabilities = load_vehicle(self.config, self.environment.config).capabilities
         return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
-
-    def plan_survey(
-        self,
-        area: Sequence[tuple[float, float]],
-        *,
-        height: float | None = None,
-        ground_resolution: float | None = None,
-        camera: str | None = None,
-        front_overlap: float = 0.75,
-        side_overlap: float = 0.65,
-        angle: float | None = None,
-        speed: float | None = None,
-        around: bool = False,
-    ) -> Survey:
-        """Plan the survey of an area by one of this robot's cameras; nothing is flown.
-
-        Its `waypoints` are flown by `navigate`, and its `photos` say what is taken where.
-
-        Args:
-            area: 3 to 30 corners, metres east and north of the environment's home.
-            height: Metres above home; or else `ground_resolution`.
-            ground_resolution: Metres of ground in one pixel, from which the height follows.
-            camera: Id of a camera that looks straight down or hangs from a gimbal; None for the
-                first one.
-            front_overlap: Share of a picture, 0 to less than 1, in common with the next one.
-            side_overlap: The same with the one beside it on the next line.
-            angle: Direction of the lines, radians counter-clockwise from east; None for the
-                shortest path.
-            speed: m/s; None for the robot's cruise speed.
-            around: Whether no-fly zones within the area are flown around, and not refused.
-
-        Raises:
-            SchedulerError: If the camera cannot survey, or the area cannot be flown over.
-        """
-        lens = survey_camera(
-            self.config, camera, front_overlap=front_overlap, side_overlap=side_overlap
-        )
-        settings = SurveySettings.by_camera(
-            lens,
-            height=height,
-            ground_resolution=ground_resolution,
-            angle=angle,
-            speed=speed,
-            around=around,
-        )
-        wind = np.array(self._environment.config.simulation.wind)
-        return plan_survey(self.config, area, settings, wind=wind)
 
     def navigate(self, data: IAeroData[Any]) -> None:
         """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
@@ -125,16 +75,16 @@ class Robot(PaperNames, IRobot):
                 f"stream of navigation, not by {type(data).__name__}"
             )
         if not isinstance(navigation, AeroNavigation):
-            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
+            navigation = self.environment.trajectory_scheduler().generate_navigation(data)
         stream = navigation.stream
         if stream is not None and not issubclass(stream.item, AeroNavigation):
             raise GraphError(
                 f"{self.robot_id} cannot navigate by {stream.name}, which carries "
                 f"{stream.item.__name__}; put a follow analysis between"
             )
-        if stream is not None and stream.graph is not self._environment.graph:
+        if stream is not None and stream.graph is not self.environment.graph:
             raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
-        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
+        self.environment.fly_by(NavigationEdge(self.robot_id, navigation))
 
     def start_mission(
         self,
@@ -157,19 +107,19 @@ class Robot(PaperNames, IRobot):
             AeroDaaSError: What the mission ended with; the drone is landed and the recording is
                 closed first.
         """
-        self._environment.start_mission(hook, wait=wait, speed=speed)
+        self.environment.start_mission(hook, wait=wait, speed=speed)
 
     def end_mission(self) -> None:
         """End the mission: land here; the hooks of `on_end` run once it is over."""
-        self._environment.command(self.robot_id, End())
+        self.environment.command(self.robot_id, End())
 
     def pause_mission(self) -> None:
         """Pause the ongoing mission by putting the drone in hover mode."""
-        self._environment.command(self.robot_id, Pause())
+        self.environment.command(self.robot_id, Pause())
 
     def resume_mission(self) -> None:
         """Resume the ongoing mission."""
-        self._environment.command(self.robot_id, Resume())
+        self.environment.command(self.robot_id, Resume())
 
     def hand_over(self) -> None:
         """Have the autopilot fly the waypoints ahead by its own mission mode, while we watch.
@@ -178,14 +128,14 @@ class Robot(PaperNames, IRobot):
         it. Pausing, coming home and new navigation take them back, as a failsafe does. Raises
         MissionError, with the reason, for what the autopilot cannot fly.
         """
-        self._environment.command(self.robot_id, HandOver())
+        self.environment.command(self.robot_id, HandOver())
 
     def take_back(self) -> None:
         """Fly the waypoints that the autopilot has not reached ourselves again.
 
         Raises MissionError if it flies none.
         """
-        self._environment.command(self.robot_id, TakeBack())
+        self.environment.command(self.robot_id, TakeBack())
 
     def actuate(self, actuator: str, position: str) -> None:
         """Have an actuator of the environment file take a position now, wherever the drone is.
@@ -204,7 +154,7 @@ class Robot(PaperNames, IRobot):
         wanted = {actuator: position}
         if text := actuator_objection(self.config.actuators, wanted, by_waypoint=False):
             raise refusal(f"{self.robot_id}: {text}")
-        self._environment.command(self.robot_id, Actuate(actuator, position))
+        self.environment.command(self.robot_id, Actuate(actuator, position))
 
     def release_parachute(self, parachute: str) -> None:
         """Fire a parachute: the mission is over, and the drone comes down where it is.
@@ -214,11 +164,11 @@ class Robot(PaperNames, IRobot):
         """
         if text := parachute_objection(self.config.actuators, parachute):
             raise refusal(f"{self.robot_id}: {text}")
-        self._environment.command(self.robot_id, ReleaseParachute(parachute))
+        self.environment.command(self.robot_id, ReleaseParachute(parachute))
 
     def wait(self) -> None:
         """Return when the mission has ended; raises the error that it ended with."""
-        self._environment.wait()
+        self.environment.wait()
 
     def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
         """Register a hook to run before take-off; usable as a decorator.

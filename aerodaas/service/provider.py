@@ -30,7 +30,7 @@ from aerodaas.service.routes.fleet import FleetRoutes
 from aerodaas.service.routes.here import HereRoutes
 from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
-from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes
+from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes, extension_routers
 from aerodaas.service.routes.playback import PlaybackRoutes
 from aerodaas.service.routes.provisions import ProvisionRoutes
 from aerodaas.service.routes.submissions import SubmissionRoutes
@@ -103,7 +103,7 @@ def build_service(
     )
     return build_app(
         admission,
-        [one.router() for one in routes],
+        [*extension_routers(missions, admission), *(one.router() for one in routes)],
         tiles=settings.config.map_tiles,
         running=running,
     )

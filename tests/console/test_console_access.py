@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import asdict
 from typing import Any
 
 import pytest
-from hovering import Run, console
+from hovering import Run, ask, console, token_of
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
@@ -34,31 +32,6 @@ def flying() -> Iterator[tuple[FlightServer, Run]]:
     """One for all tests here."""
     with console() as both:
         yield both
-
-
-def token_of(address: str) -> str:
-    """The token in an address."""
-    return address.partition("#token=")[2]
-
-
-def ask(
-    address: str, path: str, body: object = None, token: str | None = None, **headers: str
-) -> tuple[int, dict[str, str], Any]:
-    """Send a request; returns status, headers and the answer."""
-    data = None if body is None else json.dumps(body).encode()
-    more = {"Authorization": f"Bearer {token_of(address) if token is None else token}"}
-    request = urllib.request.Request(  # noqa: S310 - loopback
-        address.partition("/#")[0] + path,
-        data,
-        {**more, "Content-Type": "application/json", **headers},
-    )
-    try:
-        with urllib.request.urlopen(request, timeout=20) as response:  # noqa: S310 - loopback
-            status, known, content = response.status, response.headers, response.read()
-    except urllib.error.HTTPError as error:
-        status, known, content = error.code, error.headers, error.read()
-    found = json.loads(content) if known.get_content_type() == "application/json" else content
-    return status, {key.lower(): value for key, value in known.items()}, found
 
 
 def test_a_host_that_looks_like_the_page_opens_nothing() -> None:

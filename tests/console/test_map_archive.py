@@ -6,11 +6,10 @@ import struct
 from pathlib import Path
 
 import pytest
-from hovering import console
+from hovering import ask, console
 from hypothesis import given
 from hypothesis import strategies as st
 from map_archives import archive_bytes, tiles_around, write_archive
-from test_console_access import ask
 
 from aerodaas.errors import ConfigError
 from aerodaas.service.http.map_archive import require_pictures

@@ -11,9 +11,8 @@ import pytest
 from flying import FLAT, robot
 from pydantic import BaseModel
 
-from aerodaas import AeroNavigation, Environment, NearestNeighborScheduler
-from aerodaas.errors import ConfigError, SchedulerError, UnknownIdError
-from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas import Environment, NearestNeighborScheduler
+from aerodaas.errors import ConfigError, UnknownIdError
 
 CAMERA = {"id": "cam", "rate": 5, "settings": {"width": 64}}
 COMPUTE = [
@@ -112,34 +111,6 @@ def test_a_resource_without_a_node(env: Environment) -> None:
     told = env.get_compute_resource_by_id("lambda").get_compute_properties()
     assert told["endpoint"]["url"] == "https://example.com/detect"
     assert not {"cores", "memory", "accelerators"} & set(told)
-
-
-def test_a_robot_plans_a_survey_by_its_camera(tmp_path: Path) -> None:
-    """Flown from the height of the resolution; its plan has the triggers for a ground station."""
-    lens = {"gimbal": {}, "horizontal_fov": 90, "width": 1000, "height": 500}
-    drone = robot(sensors=[{"id": "cam", "settings": lens}])
-    path = tmp_path / "environment.json"
-    path.write_text(json.dumps({**FLAT, "robots": [drone]}))
-    env = Environment(path)
-    field = [(0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0)]
-    survey = env.get_robot_by_id("drone").plan_survey(
-        field, ground_resolution=0.02, camera="cam", front_overlap=0.8, side_overlap=0.5, speed=2.0
-    )
-    assert survey.photos is not None
-    assert [one.z for one in survey.waypoints] == pytest.approx([10.0] * 6)
-    assert {one.speed for one in survey.waypoints} == {2.0}
-    assert survey.photos.spacing == pytest.approx(2.0)
-    assert survey.sweeps == 3
-    assert len(survey.photos.places) == 3 * 31
-    plan = tmp_path / "field.plan"
-    AeroNavigation(data=survey.waypoints).to_plan(plan, GeodeticOrigin(47.0, 8.0, 500.0))
-    with pytest.warns(UserWarning, match="NAV_TAKEOFF"):
-        came = AeroNavigation.from_plan(plan).waypoints
-    assert [one.trigger_distance for one in came] == [
-        one.trigger_distance for one in survey.waypoints
-    ]
-    with pytest.raises(SchedulerError, match="a height or a ground resolution"):
-        env.get_robot_by_id("drone").plan_survey(field)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -256,15 +256,6 @@ class ProviderClient:
             The robot's own answer.
         """
         return self._ask(Answer, "POST", f"/v1/missions/{_part(mission)}/actuators", wanted)
-
-    def plan_survey(self, mission: str, wanted: SurveyIn) -> SurveyOut:
-        """Plan the survey of an area; `add_navigation` with its waypoints flies it.
-
-        Args:
-            mission: Id of the mission.
-            wanted: The area in metres east and north, and how to fly it.
-        """
-        return self._ask(SurveyOut, "POST", f"/v1/missions/{_part(mission)}/survey", wanted)
 
     def recording(
         self,

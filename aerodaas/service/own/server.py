@@ -20,7 +20,7 @@ from aerodaas.service.own.access import REMOTE, FlightTokens, new_tokens, princi
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.routes.fleet import FleetRoutes
 from aerodaas.service.routes.live import LiveRoutes
-from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes
+from aerodaas.service.routes.missions import MissionRoutes, PilotingRoutes, extension_routers
 
 __all__ = ["ApiServer", "FlightServer", "flight_app"]
 
@@ -136,7 +136,11 @@ def flight_app(
     )
     return build_app(
         admission,
-        [*further, *(one.router() for one in routes)],
+        [
+            *further,
+            *extension_routers(flight, admission),
+            *(one.router() for one in routes),
+        ],
         limits=limits,
         tiles=flight.config.map_tiles,
         framed=framed,

@@ -1,4 +1,4 @@
-"""Missions, and what a pilot does with a flying one: commands, waypoints, surveys, their order."""
+"""Missions, and what a pilot does with a flying one: commands, waypoints and their order."""
 
 from __future__ import annotations
 
@@ -6,16 +6,30 @@ from typing import Any
 
 from fastapi import APIRouter, BackgroundTasks, Request
 
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.piloting import ActuateIn, RearrangeIn, SurveyIn, SurveyOut
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import CommandIn, MissionOut, NavigationIn, Role, Scope
 from aerodaas.service.backend import Missions, PilotCommand, ShownMissions
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.live.surveys import SurveyPlanner
 
-__all__ = ["MissionRoutes", "PilotingRoutes"]
+__all__ = ["MissionRoutes", "PilotingRoutes", "extension_routers"]
+
+
+def extension_routers(missions: Missions, admission: Admission) -> list[APIRouter]:
+    """Make the routes that extensions add.
+
+    Args:
+        missions: Missions that they are about.
+        admission: Access to them.
+    """
+    return [
+        imported(place)(missions, admission)
+        for extension in extensions().values()
+        for place in extension.routes
+    ]
 
 
 class MissionRoutes:
@@ -48,13 +62,12 @@ class MissionRoutes:
 
 
 class PilotingRoutes:
-    """Routes `/v1/missions/{id}/commands`, `navigation`, `plan`, `actuators` and `survey`."""
+    """Routes `/v1/missions/{id}/commands`, `navigation`, `plan` and `actuators`."""
 
     def __init__(self, missions: Missions, admission: Admission) -> None:
         """Command `missions`."""
         self._missions = missions
         self._admission = admission
-        self._surveys = SurveyPlanner()
 
     def router(self) -> APIRouter:
         """The routes."""
@@ -64,7 +77,6 @@ class PilotingRoutes:
         router.add_api_route("/{mission}/navigation", self.navigation, **posted)
         router.add_api_route("/{mission}/plan", self.rearrange, **posted)
         router.add_api_route("/{mission}/actuators", self.actuate, **posted)
-        router.add_api_route("/{mission}/survey", self.survey, **posted)
         return router
 
     def command(
@@ -90,13 +102,6 @@ class PilotingRoutes:
     ) -> Answer:
         """Move an actuator that the account may move."""
         return self._fly(mission, body, "actuate", request, later, f"/{body.actuator}")
-
-    def survey(self, mission: str, body: SurveyIn, request: Request) -> SurveyOut:
-        """Plan the survey of an area by one of the mission's robots; nothing is flown."""
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        config = self._missions.environment(principal, mission)
-        status = self._missions.mission(principal, mission).status.get(body.robot)
-        return self._surveys.plan(body, config, status)
 
     def _fly(
         self,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
@@ -22,7 +25,7 @@ from aerodaas.mission.commands import Answer, Command
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.own.server import FlightServer
 
-__all__ = ["Run", "console"]
+__all__ = ["Run", "ask", "console", "token_of"]
 
 ENVIRONMENT = {
     "name": "field",
@@ -96,3 +99,28 @@ def console(*, framed: bool = False, **environment: object) -> Iterator[tuple[Fl
     finally:
         flight.close()
         server.close()
+
+
+def token_of(address: str) -> str:
+    """The token in an address."""
+    return address.partition("#token=")[2]
+
+
+def ask(
+    address: str, path: str, body: object = None, token: str | None = None, **headers: str
+) -> tuple[int, dict[str, str], Any]:
+    """Send a request; returns status, headers and the answer."""
+    data = None if body is None else json.dumps(body).encode()
+    more = {"Authorization": f"Bearer {token_of(address) if token is None else token}"}
+    request = urllib.request.Request(  # noqa: S310 - loopback
+        address.partition("/#")[0] + path,
+        data,
+        {**more, "Content-Type": "application/json", **headers},
+    )
+    try:
+        with urllib.request.urlopen(request, timeout=20) as response:  # noqa: S310 - loopback
+            status, known, content = response.status, response.headers, response.read()
+    except urllib.error.HTTPError as error:
+        status, known, content = error.code, error.headers, error.read()
+    found = json.loads(content) if known.get_content_type() == "application/json" else content
+    return status, {key.lower(): value for key, value in known.items()}, found

@@ -11,14 +11,14 @@ import pytest
 from surveyors import simulated, surveying
 
 from aerodaas.errors import ConfigError, SchedulerError
-from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.payload.survey import (
+from aerodaas.extensions.surveys.planning import (
     SurveyPhotos,
     SurveySettings,
-    plan_survey,
     planned_photos,
+    planned_survey,
     survey_camera,
 )
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
 
 FIELD = [(0.0, 0.0), (50.0, 0.0), (60.0, 30.0), (0.0, 30.0)]
@@ -27,7 +27,7 @@ DOWN = {"pitch": 90, "horizontal_fov": 60, "width": 4000, "height": 3000}
 
 def photos_of(settings: SurveySettings) -> SurveyPhotos:
     """Pictures of a survey of the field."""
-    photos = plan_survey(surveying(), FIELD, settings).photos
+    photos = planned_survey(surveying(), FIELD, settings).photos
     assert photos is not None
     return photos
 
@@ -36,7 +36,7 @@ def photos_of(settings: SurveySettings) -> SurveyPhotos:
 def test_pictures_are_taken_where_they_were_planned(wind: float, speed: float) -> None:
     """Within half a metre, and overlap as asked, along and across, by the simulator's truth."""
     camera = survey_camera(surveying(), front_overlap=0.7, side_overlap=0.6)
-    survey = plan_survey(surveying(), FIELD, SurveySettings(8.0, speed=speed, camera=camera))
+    survey = planned_survey(surveying(), FIELD, SurveySettings(8.0, speed=speed, camera=camera))
     assert survey.photos is not None
     assert survey.photos.warning == ""
     flown = simulated(*survey.waypoints, noise=0.0, wind=wind)
@@ -70,7 +70,7 @@ def test_a_lens_that_zooms_is_set_to_what_was_planned_with() -> None:
     """Whatever it was left at; without a zoom nothing is set."""
     for settings, zoom in (({**DOWN, "zoom": 4}, 0.0), (DOWN, None)):
         camera = survey_camera(surveying("simulated", settings))
-        survey = plan_survey(surveying(), FIELD, SurveySettings(10.0, camera=camera))
+        survey = planned_survey(surveying(), FIELD, SurveySettings(10.0, camera=camera))
         assert {one.zoom for one in survey.waypoints} == {zoom}
 
 
@@ -120,8 +120,8 @@ def test_a_robot_without_a_camera_surveys_by_width_alone() -> None:
         survey_camera(surveying("simulated", {**DOWN, "width": 1}))
     for settings in (SurveySettings(9.0), SurveySettings(9.0, 4.0, camera=SurveyCamera(1.0))):
         with pytest.raises(SchedulerError, match="a width or a camera"):
-            plan_survey(surveying(), FIELD, settings)
-    assert plan_survey(surveying(), FIELD, SurveySettings(9.0, 8.0)).photos is None
+            planned_survey(surveying(), FIELD, settings)
+    assert planned_survey(surveying(), FIELD, SurveySettings(9.0, 8.0)).photos is None
 
 
 def test_figures_of_pictures() -> None:

@@ -12,9 +12,9 @@ from flights import add, flight, length
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
 from aerodaas.errors import SchedulerError
+from aerodaas.extensions.surveys.planning import MOST_CORNERS, SurveySettings, planned_survey
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.messages.mission import MissionState as S
-from aerodaas.mission.payload.survey import MOST_CORNERS, SurveySettings, plan_survey
 
 FENCE = GeofenceConfig(polygon=[(-20, -20), (40, -20), (40, 40), (-20, 40)], ceiling=20)
 ZONE = [(8.0, 8.0), (12.0, 8.0), (12.0, 12.0), (8.0, 12.0)]
@@ -30,7 +30,7 @@ def robot(**limits: object) -> RobotConfig:
 
 def test_a_flight_takes_as_long_and_as_much_as_was_said() -> None:
     """Length and time of the preview are those of the simulated flight, and so is the charge."""
-    survey = plan_survey(robot(), FIELD, HOW, start=np.array([0.0, 0.0, 1.5]))
+    survey = planned_survey(robot(), FIELD, HOW, start=np.array([0.0, 0.0, 1.5]))
     flown = flight(add(*survey.waypoints), limits=LIMITS)
     flown.run_to(S.ENROUTE)
     began, until = flown.seconds, len(flown.track)
@@ -65,7 +65,7 @@ def test_areas_that_must_not_be_flown_over_are_refused(
     """With the place, and before anything is planned; margins count, too."""
     fence = FENCE.model_copy(update={"no_fly": [ZONE]})
     with pytest.raises(SchedulerError, match=said):
-        plan_survey(robot(geofence=fence), area, HOW)
+        planned_survey(robot(geofence=fence), area, HOW)
 
 
 def test_an_area_that_cuts_a_corner_of_the_fence_is_refused() -> None:
@@ -73,7 +73,7 @@ def test_an_area_that_cuts_a_corner_of_the_fence_is_refused() -> None:
     bent = [(-20.0, -20.0), (40.0, -20.0), (40.0, 0.0), (0.0, 0.0), (0.0, 40.0), (-20.0, 40.0)]
     fence = GeofenceConfig(polygon=bent, ceiling=20)
     with pytest.raises(SchedulerError, match="between two of its corners"):
-        plan_survey(robot(geofence=fence), [(-10, 30), (30, -10), (-10, -10)], HOW)
+        planned_survey(robot(geofence=fence), [(-10, 30), (30, -10), (-10, -10)], HOW)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_settings_without_a_survey_are_refused(changes: dict[str, Any], said: st
     """Before they cost time."""
     how = SurveySettings(**{"height": 4.0, "width": 5.0, **changes})
     with pytest.raises(SchedulerError, match=said):
-        plan_survey(robot(), FIELD, how)
+        planned_survey(robot(), FIELD, how)
 
 
 def test_a_survey_may_be_too_long() -> None:
@@ -98,14 +98,14 @@ def test_a_survey_may_be_too_long() -> None:
     teeth = [(3.0 * x + dx, y) for x in range(7) for dx, y in ((0, 0.0), (1, 18.0), (2, 0.0))]
     comb = [*teeth, (20.0, -1.0), (0.0, -1.0)]
     with pytest.raises(SchedulerError, match="at most 500 are flown"):
-        plan_survey(robot(), comb, SurveySettings(4.0, 0.4, 0.0, 0.0))
+        planned_survey(robot(), comb, SurveySettings(4.0, 0.4, 0.0, 0.0))
 
 
 def test_no_fly_zones_are_flown_around_where_that_is_asked_for() -> None:
     """The path keeps the fence's margin, and the drone's own fence takes all of it."""
     fence = FENCE.model_copy(update={"no_fly": [ZONE]})
     how = SurveySettings(height=4.0, width=5.0, around=True)
-    survey = plan_survey(robot(geofence=fence), [(0, 0), (20, 0), (20, 20), (0, 20)], how)
+    survey = planned_survey(robot(geofence=fence), [(0, 0), (20, 0), (20, 20), (0, 20)], how)
     path = shapely.LineString([(one.x, one.y) for one in survey.waypoints])
     assert path.distance(shapely.Polygon(ZONE)) >= 0.5
     held = flight(add(*survey.waypoints), limits=robot(geofence=fence).limits)
@@ -115,7 +115,7 @@ def test_no_fly_zones_are_flown_around_where_that_is_asked_for() -> None:
 def test_direction_and_speed_are_the_operators() -> None:
     """The sweeps' direction as asked; a speed above the robot's highest one is that."""
     how = SurveySettings(4.0, 5.0, angle=math.pi / 2, speed=50.0)
-    survey = plan_survey(robot(max_speed=3.0), FIELD, how)
+    survey = planned_survey(robot(max_speed=3.0), FIELD, how)
     first, second = survey.waypoints[:2]
     assert abs(first.x - second.x) < 1e-6 < abs(first.y - second.y)
     assert survey.angle == math.pi / 2

@@ -1,4 +1,7 @@
-"""Planner of surveys that are drawn on the map: one at a time, for each takes a core a while."""
+"""Route of a service that plans the surveys drawn on its map.
+
+It plans one at a time, for each takes a core a while.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,25 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+from fastapi import APIRouter, Request
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.errors import MissionError
+from aerodaas.extensions.surveys.messages import SurveyIn, SurveyOut, SurveyPhotosOut
+from aerodaas.extensions.surveys.planning import (
+    SurveyPhotos,
+    SurveySettings,
+    planned_survey,
+    survey_camera,
+)
 from aerodaas.messages.mission import Place, RobotStatus
-from aerodaas.mission.payload.survey import SurveyPhotos, SurveySettings, plan_survey, survey_camera
-from aerodaas.protocol.piloting import SurveyIn, SurveyOut, SurveyPhotosOut
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.schedulers.trajectory.coverage import footprint
+from aerodaas.service.backend import Missions
+from aerodaas.service.http.bodies import api_router
+from aerodaas.service.http.gate import Admission
 
-__all__ = ["SurveyPlanner"]
+__all__ = ["survey_router"]
 
 _PATIENCE = 10.0
 """Wall seconds for which a request waits for the one before it."""
@@ -26,7 +39,28 @@ _MOST_ASKED = 3
 _BUSY = "other surveys are being planned: ask again in a moment"
 
 
-class SurveyPlanner:
+def survey_router(missions: Missions, admission: Admission) -> APIRouter:
+    """Make the route `/v1/missions/{id}/survey`.
+
+    Args:
+        missions: Missions whose drones survey.
+        admission: Access to them.
+    """
+    router = api_router("/v1/missions", "missions")
+    planner = _SurveyPlanner()
+
+    @router.post("/{mission}/survey")
+    def survey(mission: str, body: SurveyIn, request: Request) -> SurveyOut:
+        """Plan the survey of an area by one of the mission's robots; nothing is flown."""
+        principal = admission.require(request, Role.PILOT, Scope.FLY)
+        config = missions.environment(principal, mission)
+        status = missions.mission(principal, mission).status.get(body.robot)
+        return planner.plan(body, config, status)
+
+    return router
+
+
+class _SurveyPlanner:
     """Plans surveys for drones in flight; safe in any thread."""
 
     def __init__(self) -> None:
@@ -53,7 +87,7 @@ class SurveyPlanner:
         settings = _settings(robot, wanted)
         start, wind = _start(status, robot.start), np.array(config.simulation.wind)
         with self._waiting():
-            survey = plan_survey(
+            survey = planned_survey(
                 robot, wanted.area, settings, start=np.array(start, dtype=np.float64), wind=wind
             )
         named = (replace(one, id=f"{wanted.name}-{n}") for n, one in enumerate(survey.waypoints, 1))

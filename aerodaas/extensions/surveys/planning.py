@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -24,6 +25,9 @@ from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.schedulers.trajectory.coverage import cover
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera
 
+if TYPE_CHECKING:
+    from aerodaas.environment.robot import Robot
+
 __all__ = [
     "MOST_CORNERS",
     "MOST_PHOTOS",
@@ -33,6 +37,7 @@ __all__ = [
     "SurveySettings",
     "plan_survey",
     "planned_photos",
+    "planned_survey",
     "survey_camera",
 ]
 
@@ -245,7 +250,7 @@ class SurveySettings:
     """Fly around no-fly zones within the area, which stay unseen; otherwise they are refused."""
     camera: SurveyCamera | None = None
     """Who takes pictures on the strips, in the place of `width` and `overlap`, which it knows; see
-    `survey_photos.survey_camera`."""
+    `survey_camera`."""
 
     @classmethod
     def by_camera(
@@ -313,6 +318,55 @@ class Survey:
 
 
 def plan_survey(
+    robot: Robot,
+    area: Sequence[tuple[float, float]],
+    *,
+    height: float | None = None,
+    ground_resolution: float | None = None,
+    camera: str | None = None,
+    front_overlap: float = 0.75,
+    side_overlap: float = 0.65,
+    angle: float | None = None,
+    speed: float | None = None,
+    around: bool = False,
+) -> Survey:
+    """Plan the survey of an area by one of a robot's cameras; nothing is flown.
+
+    `robot.navigate` flies the survey's `waypoints`; its `photos` are the pictures by place.
+
+    Args:
+        robot: The robot that flies it.
+        area: 3 to 30 corners, metres east and north of the environment's home.
+        height: Metres above home; or else `ground_resolution`.
+        ground_resolution: Metres of ground in one pixel, from which the height follows.
+        camera: Id of a camera that looks straight down or hangs from a gimbal; None for the
+            first one.
+        front_overlap: Share of a picture, 0 to less than 1, in common with the next one.
+        side_overlap: The same with the one beside it on the next line.
+        angle: Direction of the lines, radians counter-clockwise from east; None for the
+            shortest path.
+        speed: m/s; None for the robot's cruise speed.
+        around: Whether no-fly zones within the area are flown around, and not refused.
+
+    Raises:
+        SchedulerError: If the camera cannot survey, or the area cannot be flown over.
+    """
+    lens = survey_camera(
+        robot.config, camera, front_overlap=front_overlap, side_overlap=side_overlap
+    )
+    settings = SurveySettings.by_camera(
+        lens,
+        height=height,
+        ground_resolution=ground_resolution,
+        angle=angle,
+        speed=speed,
+        around=around,
+    )
+    wind = np.array(robot.environment.config.simulation.wind)
+    return planned_survey(robot.config, area, settings, wind=wind)
+
+
+def planned_survey(
     robot: RobotConfig,
     outline: Sequence[Place],
     settings: SurveySettings,
