@@ -140,6 +140,9 @@ class Extension:
     """By an encoding of recorded messages: `module:function` that gets the name of a schema and
     returns the function that decodes its messages, or None for a schema that it does not know."""
     vehicles: tuple[VehicleKind, ...] = ()
+    elevation_formats: Mapping[str, str] = field(default_factory=dict)
+    """By the suffix of an elevation file, such as `.hgt`: `module:function` that gets its path and
+    returns a `terrain.tile.Tile`."""
     routes: tuple[str, ...] = ()
     """`module:function` of what is added to a service's API: each gets the missions, of the class
     `Missions`, and the access to them, an `Admission`, and returns a FastAPI router."""

@@ -10,18 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.errors import ConfigError
-from aerodaas.terrain.geotiff import geotiff_tile
-from aerodaas.terrain.hgt import hgt_tile
 from aerodaas.terrain.tile import MOST_SAMPLES, Grid, Tile
 
 __all__ = ["Patch", "Terrain"]
-
-_FORMATS: dict[str, Callable[[Path], Tile]] = {
-    ".hgt": hgt_tile,
-    ".tif": geotiff_tile,
-    ".tiff": geotiff_tile,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +80,7 @@ class Terrain:
 
     @classmethod
     def open(cls, files: Sequence[str | Path]) -> Terrain:
-        """Open SRTM's `.hgt` (1 and 3 arc seconds) and GeoTIFF files in EPSG:4326.
+        """Open elevation files of the formats that extensions read.
 
         Only their headers are read.
 
@@ -179,13 +172,18 @@ def _copy(tile: Tile, grid: Grid, samples: NDArray[np.float32]) -> None:
 
 def _opened(path: Path) -> Tile:
     try:
-        make = _FORMATS.get(path.suffix.lower())
-        if make is None:
-            raise ConfigError(
-                f"{path}: a terrain is read from {', '.join(_FORMATS)} files, unpacked"
-            )
+        formats = {
+            suffix: place
+            for extension in extensions().values()
+            for suffix, place in extension.elevation_formats.items()
+        }
+        place = formats.get(path.suffix.lower())
+        if place is None:
+            known = ", ".join(formats) or "no"
+            raise ConfigError(f"{path}: a terrain is read from {known} files, unpacked")
         if not path.is_file():
             raise ConfigError(f"no terrain file lies at {path}; see `terrain.files`")
-        return make(path)
+        read: Callable[[Path], Tile] = imported(place)
+        return read(path)
     except OSError as error:
         raise ConfigError(f"cannot read the terrain file {path}: {error.strerror}") from None

@@ -59,6 +59,7 @@ def _places(extension: Extension) -> Iterator[str]:
     for view in extension.views:
         yield from (view.prepare, view.open)
     yield from extension.settings.values()
+    yield from extension.elevation_formats.values()
     yield from extension.routes
     yield from extension.report_sections
     yield from extension.services.values()

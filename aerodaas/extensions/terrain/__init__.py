@@ -1,0 +1,1 @@
+"""Elevation files, of which the ground around home is read."""
