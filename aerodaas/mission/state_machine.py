@@ -7,7 +7,7 @@ from types import MappingProxyType
 from aerodaas.errors import MissionError
 from aerodaas.messages.mission import MissionState
 
-__all__ = ["FLYING", "TERMINAL", "TRANSITIONS", "MissionStateMachine", "mermaid"]
+__all__ = ["FLYING", "TERMINAL", "TRANSITIONS", "MissionStateMachine"]
 
 S = MissionState
 
@@ -72,14 +72,3 @@ class MissionStateMachine:
             raise MissionError(message)
         self.state, self.reason, self.since = state, reason, now
         return True
-
-
-def mermaid() -> str:
-    """The transitions as a Mermaid state diagram, for the documentation."""
-    lines = ["stateDiagram-v2", f"    [*] --> {MissionState.IDLE.value}"]
-    for state in MissionState:
-        following = sorted(TRANSITIONS[state], key=list(MissionState).index)
-        lines += [f"    {state.value} --> {target.value}" for target in following]
-        if not following:
-            lines.append(f"    {state.value} --> [*]")
-    return "\n".join(lines)

@@ -32,7 +32,7 @@ from aerodaas.mission.commands import (
     StreamItem,
 )
 from aerodaas.mission.navigation.planner import BackgroundPlanner
-from aerodaas.mission.state_machine import TERMINAL, TRANSITIONS, MissionStateMachine, mermaid
+from aerodaas.mission.state_machine import TERMINAL, TRANSITIONS, MissionStateMachine
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
@@ -487,8 +487,8 @@ def test_illegal_transitions_are_refused(states: list[S]) -> None:
             assert machine.state is before
 
 
-def test_every_state_is_reachable_and_drawn() -> None:
-    """Thirteen states, each reached from IDLE, each in the diagram."""
+def test_every_state_is_reachable() -> None:
+    """Thirteen states, each reached from IDLE."""
     reached, waiting = set[S](), [S.IDLE]
     while waiting:
         state = waiting.pop()
@@ -498,7 +498,6 @@ def test_every_state_is_reachable_and_drawn() -> None:
     assert reached == set(S)
     assert len(reached) == 13
     assert {S.LANDED, S.ABORTED} == TERMINAL
-    assert all(state.value in mermaid() for state in S)
 
 
 def test_same_flight_twice_is_the_same_to_the_last_digit() -> None:

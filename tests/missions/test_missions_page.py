@@ -14,7 +14,7 @@ from aerodaas.config.model import LimitsConfig
 from aerodaas.config.plugins import plugin_names
 from aerodaas.environment.run import Run
 from aerodaas.messages.mission import MissionState
-from aerodaas.mission.state_machine import mermaid
+from aerodaas.mission.state_machine import FLYING, TRANSITIONS
 from aerodaas.protocol.commands import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,9 +26,21 @@ def blocks(kind: str) -> list[str]:
     return re.findall(rf"```{kind}\n(.*?)```", PAGE, re.DOTALL)
 
 
-def test_diagram_is_the_codes() -> None:
-    """The page's diagram is the one that the state machine draws."""
-    assert blocks("mermaid") == [mermaid() + "\n"]
+def test_the_table_of_states_has_every_transition() -> None:
+    """The last column names the transitions that not all flying states have."""
+    interrupt = frozenset.intersection(*(TRANSITIONS[state] for state in FLYING))
+    rows = re.findall(
+        r"^\| `(\w+)` \| .* \| (.*) \|$", PAGE.split("## Trajectory")[0], re.MULTILINE
+    )
+    found = {
+        MissionState(name): {MissionState(one) for one in re.findall(r"`(\w+)`", targets)}
+        for name, targets in rows
+        if name in list(MissionState)
+    }
+    assert found == {
+        state: targets - interrupt if state in FLYING else targets
+        for state, targets in TRANSITIONS.items()
+    }
 
 
 def test_every_state_limit_scheduler_and_command_is_explained() -> None:
