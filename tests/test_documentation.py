@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from core_settings import check_table, core_fields, documented
 from flying import Flyer
 from pydantic import BaseModel
 
 from aerodaas.config import model as module
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.config.schema import environment_schema
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
@@ -110,30 +110,10 @@ def models() -> dict[str, type[BaseModel]]:
     return {name: thing for name, thing in found.items() if isinstance(thing, type)}
 
 
-def documented() -> dict[str, dict[str, str]]:
-    """Settings and defaults on the page of the environment file, by the section's class."""
-    text = (DOCS / "environment-file.md").read_text(encoding="utf-8")
-    sections = re.split(r"<!-- (\w+) -->", text)[1:]
-    return {
-        name: dict(re.findall(r"^\| `([\w$]+)` \| (.*?) \|", body, re.MULTILINE))
-        for name, body in zip(sections[::2], sections[1::2], strict=True)
-    }
-
-
 @pytest.mark.parametrize("name", sorted(models()))
 def test_every_setting_is_documented_with_its_default(name: str) -> None:
-    """No setting is missing, none is invented, and the defaults are those of the code."""
-    told = documented()[name]
-    fields = {field.alias or key: field for key, field in models()[name].model_fields.items()}
-    assert set(told) == set(fields)
-    for key, default in told.items():
-        if default == "required":
-            assert fields[key].is_required()
-        elif default.startswith("`"):
-            value = fields[key].get_default(call_default_factory=True)
-            assert json.loads(default.strip("`")) == json.loads(json.dumps(value))
-        else:
-            assert isinstance(fields[key].get_default(call_default_factory=True), BaseModel)
+    """No setting of the core is missing, none is invented."""
+    check_table(documented()[name], core_fields(models()[name]))
 
 
 def test_the_example_environment_is_valid() -> None:
@@ -141,12 +121,6 @@ def test_the_example_environment_is_valid() -> None:
     (example,) = blocks("environment-file.md", "json")
     config = EnvironmentConfig.model_validate(json.loads(example))
     assert [robot.id for robot in config.robots] == ["tello"]
-
-
-def test_the_published_schema_is_current() -> None:
-    """`aerodaas schema > docs/environment.schema.json` would change nothing."""
-    published: Any = json.loads((DOCS / "environment.schema.json").read_text(encoding="utf-8"))
-    assert published == json.loads(environment_schema())
 
 
 def test_links_between_pages_lead_somewhere() -> None:

@@ -129,6 +129,12 @@ class Extension:
     """Dotted names of those settings that a replay reads of a recording, a stranger's data: numbers
     and words that describe the flight. `[]` follows the name of a list, `*` is any key:
     `robots[].limits.traffic.distance`."""
+    mavlink_components: tuple[str, ...] = ()
+    """`module:Class` of each `drivers.mavlink.component.MavlinkComponent` of every MAVLink
+    vehicle: equipment beside its autopilot, by its own messages."""
+    preflight_checks: tuple[str, ...] = ()
+    """`module:function` of items of the list before take-off: each gets a robot's limits and its
+    preflight settings, and returns a `mission.safety.checklist.PreflightCheck`."""
     commands: tuple[Command, ...] = ()
     exports: tuple[Command, ...] = ()
     """Formats of `aerodaas export`."""

@@ -32,7 +32,6 @@ from aerodaas.config.sections.compute import ComputeConfig, EndpointConfig, Runt
 from aerodaas.config.sections.home import HomeConfig
 from aerodaas.config.sections.map_tiles import MapTilesConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.config.sections.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.sections.robot import (
     CameraConfig,
     GeofenceConfig,
@@ -58,13 +57,11 @@ __all__ = [
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",
-    "OperatorPlaceConfig",
     "ParachuteConfig",
     "PreflightConfig",
     "RecordingConfig",
     "RelayConfig",
     "RemoteConfig",
-    "RemoteIdConfig",
     "RobotConfig",
     "RuntimeEnvConfig",
     "SchedulersConfig",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from aerodaas.messages.payload import CameraStatus
@@ -53,10 +53,11 @@ class HealthReadings:
     """Seconds since the Unix epoch where the vehicle is; a simulation has no date."""
     stranded: tuple[str, ...] | None = None
     """Why it would not come home by itself once this process is gone; empty if it would."""
-    remote_id: str | None = None
-    """What a Remote ID transmitter objects to; empty if it is ready."""
     cameras: tuple[CameraStatus, ...] | None = None
     """What its cameras say that they are and do; empty for none that has answered."""
+    objections: Mapping[str, str] = field(default_factory=dict)
+    """What other equipment objects to, by its item in the list before take-off; empty text if it is
+    ready."""
 
 
 @runtime_checkable

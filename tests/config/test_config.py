@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from core_settings import core_fields
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -91,7 +92,7 @@ def test_settings_that_are_none(text: str) -> None:
         parse_setting(text)
 
 
-@pytest.mark.parametrize("name", sorted(LimitsConfig.model_fields))
+@pytest.mark.parametrize("name", sorted(core_fields(LimitsConfig)))
 def test_limits_are_never_negative_or_nan(name: str) -> None:
     """No limit of any name takes a number that would unbind it."""
     if name == "geofence":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import json
 import os
 import shutil
 import subprocess
@@ -12,10 +13,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from core_settings import check_table, documented
 
-from aerodaas.config.extensions import Command, Extension, extensions
+from aerodaas.config.extensions import Command, Extension, extensions, imported
 from aerodaas.config.model import validated
 from aerodaas.config.plugins import load_plugin, plugin_names
+from aerodaas.config.schema import environment_schema
 from aerodaas.errors import ConfigError, UnknownIdError
 from aerodaas.testing.extension_kit import check_extension
 
@@ -52,6 +55,29 @@ def test_every_folder_is_an_extension_of_its_name() -> None:
         extension = found[name]
         assert extension.name == name
         check_extension(extension)
+
+
+def test_every_setting_of_an_extension_is_documented_with_its_default() -> None:
+    """Those that it adds to a section in one table of all extensions, and its own models."""
+    tables = documented()
+    told, known = tables["extensions"], set[str]()
+    for name in _FOLDERS:
+        for section, place in extensions()[name].settings.items():
+            model = imported(place)
+            fields = {f"{section}.{field}": it for field, it in model.model_fields.items()}
+            check_table({key: told[key] for key in fields}, fields)
+            known |= set(fields)
+            for inner in sys.modules[model.__module__].__all__:
+                if inner in tables:
+                    fields = getattr(sys.modules[model.__module__], inner).model_fields
+                    check_table(tables[inner], fields)
+    assert set(told) == known
+
+
+def test_the_published_schema_is_current() -> None:
+    """`aerodaas schema > docs/environment.schema.json` would change nothing."""
+    published = (_ROOT / "docs/environment.schema.json").read_text(encoding="utf-8")
+    assert json.loads(published) == json.loads(environment_schema())
 
 
 @pytest.mark.parametrize(

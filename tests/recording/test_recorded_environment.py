@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from core_settings import core_fields
 from pydantic import BaseModel
 from rewritten import rewritten
 from synthetic_flight import SyntheticFlight, record
@@ -20,7 +21,6 @@ from aerodaas.cli.lab.recorded_workload import RecordedWorkload
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.config.sections.remote_id import OperatorPlaceConfig, RemoteIdConfig
 from aerodaas.config.sections.robot import GimbalConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.errors import AeroDaaSError, ConfigError, RecordingError
@@ -93,13 +93,11 @@ LOCAL_ALONE = {
     "simulation.execution_times",
     "simulation.network",
     "simulation.network_period",
-    # Who operates it and from where is personal; recorded traffic has no echo of its own.
-    *(f"robots.remote_id.{name}" for name in RemoteIdConfig.model_fields if name != "operator"),
-    *(f"robots.remote_id.operator.{name}" for name in OperatorPlaceConfig.model_fields),
+    # Recorded traffic has no echo of the drone's own.
     "robots.limits.traffic.own_address",
     # Policies of who flies: whether a parachute may be fired, what a take-off is refused for.
     "robots.actuators.may_release",
-    *(f"robots.preflight.{name}" for name in PreflightConfig.model_fields),
+    *(f"robots.preflight.{name}" for name in core_fields(PreflightConfig)),
 }
 """Fields that no recording brings. A new field of the model belongs here, or into the allow-list
 if it describes where and how the drone flew, and can do nothing on the reader's machine."""
@@ -125,7 +123,7 @@ def with_robot(**fields: Any) -> dict[str, Any]:  # noqa: ANN401
 
 def fields_of(model: type[BaseModel], place: str = "") -> Iterator[str]:
     """Dotted names of all fields of a model, and of those inside."""
-    for name, field in model.model_fields.items():
+    for name, field in core_fields(model).items():
         full = f"{place}{field.alias or name}"
         inner = list(_models(field.annotation))
         if full.endswith("sensors.settings"):

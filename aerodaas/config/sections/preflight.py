@@ -47,8 +47,6 @@ class PreflightConfig(Extensible):
     """Age of the vehicle's last word."""
     fallback: PreflightLevel = "warn"
     """Whether it comes home by itself once this process is gone."""
-    remote_id: PreflightLevel = "warn"
-    """Whether a Remote ID transmitter says that it is ready."""
     camera: PreflightLevel = "warn"
     """Whether each camera that tells of its card has room on it."""
     cell_voltage: Positive = 3.5

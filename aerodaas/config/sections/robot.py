@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field, PlainSerializer, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.checked import Extensible, Finite, NotNegative, Positive, Settings, Strict
@@ -12,7 +12,6 @@ from aerodaas.config.extensions import SettingsSection
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.config.sections.remote_id import RemoteIdConfig
 from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier
 
@@ -29,9 +28,6 @@ __all__ = [
 
 SIMULATED_INTERVAL = 0.5
 """Seconds from one picture to the next of a simulated camera whose settings say nothing of it."""
-T = TypeVar("T")
-Personal = Annotated[T, PlainSerializer(lambda _: None, return_type=None, when_used="json")]
-"""A setting about a person, which no recording and no other JSON has."""
 
 
 class GeofenceConfig(Strict):
@@ -239,7 +235,6 @@ class RobotConfig(Extensible):
     limits: LimitsConfig = Field(default_factory=LimitsConfig)
     preflight: PreflightConfig = Field(default_factory=PreflightConfig)
     mission: MissionConfig = Field(default_factory=MissionConfig)
-    remote_id: Personal[RemoteIdConfig | None] = None
     edge: Identifier | None = None
     """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)

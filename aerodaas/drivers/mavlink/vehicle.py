@@ -18,6 +18,11 @@ from aerodaas.clock import Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.sections.actuators import ACTUATOR_TYPES
 from aerodaas.drivers.mavlink.airspace.airspace import Airspace
+from aerodaas.drivers.mavlink.component import (
+    ComponentContext,
+    MessageHandler,
+    mavlink_components,
+)
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.completion import ClimbCompletion
 from aerodaas.drivers.mavlink.control.departure import Departure
@@ -90,8 +95,11 @@ class MavlinkVehicle:
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
-        self._airspace = Airspace(self._robot, self._telemetry, observes=self._settings.observe)
-        self._report = VehicleReport(self._telemetry, self._phase, self._touchdown, self._airspace)
+        context = ComponentContext(self._robot, self._settings, self._telemetry)
+        self._components = [Airspace(context), *mavlink_components(context)]
+        self._report = VehicleReport(
+            self._telemetry, self._phase, self._touchdown, self._components
+        )
         self._steering = Steering(self._robot, self._settings)
         self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
@@ -108,6 +116,23 @@ class MavlinkVehicle:
         self._completion = ClimbCompletion(self._telemetry, self._phase)
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
+        self._component_handlers: dict[str, MessageHandler] = {}
+        """Handlers of messages that are no word of the autopilot, by their name."""
+        for component in self._components:
+            self._component_handlers |= component.handlers
+        self._handlers: dict[str, MessageHandler] = {
+            "COMMAND_ACK": self._on_command_ack,
+            "HEARTBEAT": self._on_heartbeat,
+            "LOCAL_POSITION_NED": self._on_local_position,
+            "GLOBAL_POSITION_INT": self._on_global_position,
+            "EXTENDED_SYS_STATE": self._on_landed_state,
+            **dict.fromkeys(MavlinkMissionMode.messages, self._on_mission_message),
+            **dict.fromkeys(
+                MavlinkActuators.messages, lambda message, _: self._actuators.on_message(message)
+            ),
+            **dict.fromkeys(Payload.messages, self.payload.on_message),
+        }
+        """Handlers of the autopilot's messages by their name, after the telemetry."""
 
     @property
     def capabilities(self) -> Capabilities:
@@ -189,7 +214,8 @@ class MavlinkVehicle:
             self._report.alignment = self._connection.alignment
             self._connection.alignment.require_same_boot()
             self.payload.search(commander)
-            self._airspace.begin(link, commander, self._connection.alignment)
+            for component in self._components:
+                component.connection = self._connection
             self.mission_mode = MavlinkMissionMode(
                 self._robot,
                 self._settings,
@@ -489,25 +515,15 @@ class MavlinkVehicle:
                 if kind == "HEARTBEAT":
                     self._finder.on_heartbeat(message, peer)
                 return
-            if kind in Airspace.messages:
-                self._airspace.on_message(message, now)
+            if kind in self._component_handlers:
+                self._component_handlers[kind](message, now)
                 return
             reboots = self._telemetry.reboots
             self._telemetry.on_message(message, now)
             if self._telemetry.reboots != reboots:
                 self._restarted()
-            if kind == "COMMAND_ACK":
-                self._commander.on_ack(message, now)
-            elif kind == "HEARTBEAT":
-                self._observe(now)
-            elif kind in Payload.messages:
-                self.payload.on_message(message, now)
-            elif kind in MavlinkActuators.messages:
-                self._actuators.on_message(message)
-            elif self.mission_mode is not None and kind in MavlinkMissionMode.messages:
-                self.mission_mode.on_message(message, now)
-            else:
-                self._moved(kind, now)
+            if kind in self._handlers:
+                self._handlers[kind](message, now)
 
     def _restarted(self) -> None:
         """Handle a restart of the autopilot; its first messages may have been processed."""
@@ -518,20 +534,33 @@ class MavlinkVehicle:
             self._connection.alignment.restart(stands=not flew)
             self._connection.departure.restart()
 
-    def _moved(self, kind: str, now: float) -> None:
-        telemetry, connection = self._telemetry, self._connection
-        if kind == "LOCAL_POSITION_NED" and telemetry.position_at == now:
-            assert telemetry.position is not None  # noqa: S101 - it has just come
-            up, rise = -float(telemetry.position[2]), -float(telemetry.velocity[2])
-            self._touchdown.move(up, rise, float(np.linalg.norm(telemetry.velocity)), now)
-            if connection is not None:
-                connection.alignment.move()
-        elif kind == "GLOBAL_POSITION_INT" and connection is not None:
-            connection.alignment.place(now, sure=telemetry.health.sure_of_position)
-        elif kind == "EXTENDED_SYS_STATE":
-            self._touchdown.report(now, on_ground=telemetry.on_ground)
+    def _on_command_ack(self, message: Message, now: float) -> None:
+        assert self._commander is not None  # noqa: S101 - it is found
+        self._commander.on_ack(message, now)
 
-    def _observe(self, now: float) -> None:
+    def _on_local_position(self, _: Message, now: float) -> None:
+        telemetry = self._telemetry
+        if telemetry.position_at != now:
+            return
+        assert telemetry.position is not None  # noqa: S101 - it has just come
+        up, rise = -float(telemetry.position[2]), -float(telemetry.velocity[2])
+        self._touchdown.move(up, rise, float(np.linalg.norm(telemetry.velocity)), now)
+        if self._connection is not None:
+            self._connection.alignment.move()
+
+    def _on_global_position(self, _: Message, now: float) -> None:
+        if self._connection is not None:
+            sure = self._telemetry.health.sure_of_position
+            self._connection.alignment.place(now, sure=sure)
+
+    def _on_landed_state(self, _: Message, now: float) -> None:
+        self._touchdown.report(now, on_ground=self._telemetry.on_ground)
+
+    def _on_mission_message(self, message: Message, now: float) -> None:
+        if self.mission_mode is not None:
+            self.mission_mode.on_message(message, now)
+
+    def _on_heartbeat(self, _: Message, now: float) -> None:
         found, telemetry, phase = self._finder.found, self._telemetry, self._phase
         assert found is not None  # noqa: S101 - it speaks
         shown = found.autopilot.mode(telemetry.custom_mode)
@@ -565,7 +594,8 @@ class MavlinkVehicle:
             self._rates.step(self._telemetry, now)
             self._touchdown.update(now)
             self.payload.step(now)
-            self._airspace.step(now)
+            for component in self._components:
+                component.step(now)
             self._actuators.step(now)
             if self.mission_mode is not None:
                 self.mission_mode.step(now)

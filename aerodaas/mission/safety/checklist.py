@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.sections.preflight import PreflightConfig, PreflightLevel
 from aerodaas.errors import VehicleError
@@ -23,7 +24,7 @@ from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
 from aerodaas.mission.safety.traffic import DEMANDS, encounters
 
-__all__ = ["Checklist", "concerns", "refusals", "sun_elevation"]
+__all__ = ["Checklist", "PreflightCheck", "concerns", "refusals", "sun_elevation"]
 
 _DAY = 86400.0
 _J2000 = 946_728_000.0
@@ -58,7 +59,6 @@ def sun_elevation(latitude: float, longitude: float, clock: float) -> float:
 _NOT_KNOWN = "not known"
 _SUBJECTS = {
     "GPS": "gps",
-    "Remote ID": "remote_id",
     "battery": "cells",
     "compass": "compass",
     "compasses": "compass",
@@ -84,10 +84,24 @@ _REMEDIES = {
     "fence": "move the drone, or mend limits.geofence",
     "fallback": '"fallback": "set" in the settings of the robot (docs/mavlink.md)',
     "link": "look at antennas, cables and the address",
-    "remote_id": "switch the transmitter on, wait for its GPS, and fill in the robot's remote_id",
     "traffic": "wait until it is gone",
     OWN_CHECKS: "do what it says",
 }
+
+
+@dataclass(frozen=True)
+class PreflightCheck:
+    """An item that an extension adds to the list (`Extension.preflight_checks`)."""
+
+    name: str
+    remedy: str
+    """What to do about a warning or a refusal."""
+    examine: Callable[[VehicleState, HealthReadings], HealthItem | None]
+    """Returns the item by the newest state and readings; None if there is nothing to say."""
+    level: PreflightLevel | None = None
+    """What a finding means; None: the verdict of `examine` stands."""
+    subject: str = ""
+    """First words, up to a colon, of the vehicle's faults that belong to the item."""
 
 
 class Checklist:
@@ -101,6 +115,13 @@ class Checklist:
         self._limits = limits
         self._policy = policy
         self._fence = Geofence(limits.geofence)
+        self._checks: list[PreflightCheck] = [
+            imported(place)(limits, policy)
+            for extension in extensions().values()
+            for place in extension.preflight_checks
+        ]
+        self._subjects = _SUBJECTS | {one.subject: one.name for one in self._checks}
+        self._remedies = _REMEDIES | {one.name: one.remedy for one in self._checks}
 
     def examine(self, state: VehicleState) -> list[HealthItem]:
         """Every item that the policy does not ignore; `state` is the newest."""
@@ -112,16 +133,21 @@ class Checklist:
             self._place(state),
         ]
         cameras = [one.name for one in told.cameras or ()]
-        faults = _faults(state.faults, {**_SUBJECTS, **dict.fromkeys(cameras, "camera")})
+        faults = _faults(state.faults, {**self._subjects, **dict.fromkeys(cameras, "camera")})
         for item in self._health(state, told):
             level: PreflightLevel = getattr(self._policy, item.name)
             if level != "ignore":
                 items.append(_judged(item, level, faults.get(item.name, [])))
+        for check in self._checks:
+            found = check.examine(state, told)
+            if found is not None and check.level != "ignore":
+                texts = faults.get(check.name, [])
+                items.append(_judged(found, check.level, texts) if check.level else found)
         items += self._traffic(state)
         others = [text for text in faults.get("", []) if text not in objections]
         if others:
             items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
-        return [_remedied(one) for one in items]
+        return [_remedied(one, self._remedies) for one in items]
 
     def _told(self) -> HealthReadings:
         if self._measured is not None:
@@ -173,7 +199,6 @@ class Checklist:
         yield _most("link", told.silence, policy.silence, "last word {:.1f} s ago")
         yield _texts("fallback", told.stranded, "able to come home without us")
         yield _camera(told.cameras or ())
-        yield _texts("remote_id", None if told.remote_id is None else [told.remote_id], "ready")
 
     def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
         least, spread = self._policy.cell_voltage, self._policy.cell_spread
@@ -288,10 +313,10 @@ def _judged(item: HealthItem, level: PreflightLevel, faults: Sequence[str]) -> H
     return item
 
 
-def _remedied(item: HealthItem) -> HealthItem:
+def _remedied(item: HealthItem, remedies: Mapping[str, str]) -> HealthItem:
     if item.verdict in {Verdict.GOOD, Verdict.UNKNOWN}:
         return item
-    return replace(item, remedy=_REMEDIES.get(item.name, ""))
+    return replace(item, remedy=remedies.get(item.name, ""))
 
 
 def _faults(texts: Sequence[str], subjects: Mapping[str, str]) -> dict[str, list[str]]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from core_settings import core_fields
 from flights import KinematicVehicle, add, square
 
 from aerodaas.clock import NANOSECONDS
@@ -38,13 +39,12 @@ WELL = HealthReadings(
     silence=0.1,
     clock=1_800_000_000.0,
     stranded=(),
-    remote_id="",
     cameras=(CameraStatus("camera", free=900.0),),
 )
 FIX = GpsFix(47.4, 8.5, 500.0, 0.8, 1.2, 12)
 POLICIES = {
     name: field
-    for name, field in PreflightConfig.model_fields.items()
+    for name, field in core_fields(PreflightConfig).items()
     if isinstance(field.default, str)
 }
 
@@ -71,15 +71,17 @@ def listed(
     policy: dict[str, str] | None = None,
     limits: LimitsConfig | None = None,
 ) -> dict[str, HealthItem]:
-    """The items by name."""
+    """The core's items by name."""
     judged = PreflightConfig.model_validate(policy or {})
     checklist = Checklist(vehicle, limits or LimitsConfig(), judged)
-    return {item.name: item for item in checklist.examine(vehicle.read())}
+    core = {"vehicle", "battery", "fence", "faults", *POLICIES}
+    items = checklist.examine(vehicle.read())
+    return {item.name: item for item in items if item.name in core}
 
 
 def test_a_vehicle_that_is_well() -> None:
     """Every item that is looked at is good, and has no remedy."""
-    items = listed(Measured(), {"remote_id": "warn"})
+    items = listed(Measured())
     assert set(items) == {"vehicle", "battery", "fence", *POLICIES}
     assert {item.verdict for item in items.values()} == {Verdict.GOOD}
     assert not any(item.remedy for item in items.values())
@@ -104,7 +106,6 @@ ILL: list[tuple[str, dict[str, Any], str]] = [
         {"cameras": (CameraStatus("camera", trouble="it has no card"), CameraStatus("other"))},
         "camera: tells nothing of itself; it has no card; other: tells nothing",
     ),
-    ("remote_id", {"remote_id": "no position"}, "no position, should be ready"),
 ]
 
 
@@ -117,7 +118,7 @@ def test_each_item_alone(name: str, change: dict[str, Any], word: str) -> None:
         ("refuse", Verdict.REFUSED),
         ("require", Verdict.REFUSED),
     ):
-        items = listed(vehicle, {"remote_id": "warn", name: level})
+        items = listed(vehicle, {name: level})
         assert items[name].verdict is verdict
         assert word in items[name].text
         assert items[name].remedy

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.drivers.mavlink.airspace.airspace import Airspace
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.component import MavlinkComponent
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
@@ -48,9 +48,9 @@ class VehicleReport:
         telemetry: Telemetry,
         phase: FlightPhase,
         touchdown: Touchdown,
-        airspace: Airspace | None = None,
+        components: Sequence[MavlinkComponent] = (),
     ) -> None:
-        """Report by what these know; without an `airspace`, nothing of Remote ID and traffic."""
+        """Report by what these know; `components` add what they know at the end."""
         measures = telemetry.rangefinder is not None
         self.rates = {mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: RATE} if measures else {}
         """What must be sent beside what every vehicle sends, Hz by message."""
@@ -65,7 +65,7 @@ class VehicleReport:
         self._telemetry = telemetry
         self._phase = phase
         self._touchdown = touchdown
-        self._airspace = airspace
+        self._components = components
 
     def state(
         self, stamp: int, now: float, counts: LinkCounts, reports: Sequence[str] = ()
@@ -86,11 +86,9 @@ class VehicleReport:
         known = heard or (lost and math.isfinite(age))
         age = age if known else 0.0
         frame = self.alignment.frame if self.alignment is not None else None
-        odometry, airspace = self.odometry(frame, known=known), self._airspace
-        traffic = () if airspace is None else airspace.traffic(odometry.position, now - age)
-        return VehicleState(
+        state = VehicleState(
             max(0, stamp - int(age * NANOSECONDS)),
-            odometry,
+            self.odometry(frame, known=known),
             telemetry.battery,
             VehicleMode.LOST if lost else self.mode,
             telemetry.armed,
@@ -106,12 +104,13 @@ class VehicleReport:
                 "silence": telemetry.silence(now),
                 "gps_fix_type": float(telemetry.health.gps_fix_type),
                 **self._mission(),
-                **({} if airspace is None else airspace.figures),
             },
             ended=self._touchdown.ended,
-            traffic=traffic,
             below=self._below(now),
         )
+        for component in self._components:
+            state = component.complete(state, now, now - age)
+        return state
 
     def objections(self, now: float) -> list[str]:
         """Why it must not take off, as far as its own state says so."""
@@ -171,7 +170,7 @@ class VehicleReport:
         logs = mavlink.MAV_SYS_STATUS_LOGGING
         sensors = telemetry.sensors
         has_log = sensors is not None and sensors.present & sensors.enabled & logs
-        return HealthReadings(
+        readings = HealthReadings(
             cells=health.cells,
             cycles=health.cycles,
             vibration=health.vibration,
@@ -183,8 +182,10 @@ class VehicleReport:
             silence=telemetry.silence(now),
             clock=telemetry.clock if telemetry.clock > _DATED else None,
             stranded=stranded,
-            remote_id=None if self._airspace is None else self._airspace.objection(now),
         )
+        for component in self._components:
+            readings = component.complete_health(readings, now)
+        return readings
 
     @property
     def mode(self) -> VehicleMode:
@@ -227,6 +228,5 @@ class VehicleReport:
         if off := telemetry.home_off:
             faults.append(f"home: its own return leads {off:.0f} m from where it took off")
         faults += [*telemetry.health.faults(now), *self.objections(now)]
-        faults += [] if self._airspace is None else self._airspace.faults(now)
         faults += telemetry.texts.recent(now, REASONS, _GRAVE)
         return list(dict.fromkeys(fault for fault in faults if fault))

@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.config.sections.remote_id import RemoteIdConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.extensions.remote_id.settings import RemoteIdConfig
 
 __all__ = ["OperatorPlace", "RemoteId"]
 

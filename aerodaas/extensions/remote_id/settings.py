@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal
 
-from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic import Field, PlainSerializer, SecretStr, field_validator, model_validator
 from typing_extensions import Self
 
 from aerodaas.config.checked import Finite, Strict
+from aerodaas.config.sections.preflight import PreflightLevel
 
-__all__ = ["OperatorPlaceConfig", "RemoteIdConfig"]
+__all__ = ["OperatorPlaceConfig", "RemoteIdConfig", "RemoteIdLevel", "RobotRemoteId"]
 
 _PUBLIC = 16
 """Characters of a European operator's number that are public: all but the last three."""
@@ -102,6 +103,22 @@ class RemoteIdConfig(Strict):
                     '"registration" is for others'
                 )
         return self
+
+
+class RobotRemoteId(Strict):
+    """What a robot's Remote ID tells of operator and aircraft."""
+
+    remote_id: Annotated[
+        RemoteIdConfig | None, PlainSerializer(lambda _: None, return_type=None, when_used="json")
+    ] = None
+    """What its Remote ID tells of operator and aircraft; no recording and no other JSON has it."""
+
+
+class RemoteIdLevel(Strict):
+    """What a Remote ID transmitter that is not ready means before take-off."""
+
+    remote_id: PreflightLevel = "warn"
+    """Whether a Remote ID transmitter says that it is ready."""
 
 
 def _check_character(text: str) -> str:

@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config.checked import checked
+from aerodaas.config.checked import added_settings, checked
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue, public_document
-from aerodaas.config.sections.remote_id import RemoteIdConfig
 from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.errors import ConfigError
+from aerodaas.extensions.remote_id.settings import RemoteIdConfig, RobotRemoteId
+from aerodaas.recording.recorded_environment import allowed_content
 
 EXAMPLE = "FIN87astrdge12k8-xyz"
 """EN 4709-002's own."""
@@ -24,6 +25,11 @@ SERIAL = "1581F5FKD229400DR3K0"
 def made(**content: Any) -> RemoteIdConfig:  # noqa: ANN401
     """What is read of a file; raises ConfigError."""
     return checked(RemoteIdConfig, content, "robot drone: remote_id")
+
+
+def operator_of(config: EnvironmentConfig) -> RemoteIdConfig | None:
+    """What its only robot tells."""
+    return added_settings(config.robots[0], RobotRemoteId).remote_id
 
 
 def number_of(config: RemoteIdConfig) -> str:
@@ -144,17 +150,23 @@ def test_no_document_of_an_environment_says_who_operates() -> None:
         "operator": {"latitude": 47.123456, "longitude": 8.654321},
     }
     config = EnvironmentConfig.model_validate({"robots": [{"id": "drone", "remote_id": content}]})
-    assert config.robots[0].remote_id is not None
+    assert operator_of(config) is not None
     texts = [public_document(config), config.model_dump_json(), catalogue(config).model_dump_json()]
     for text in [*texts, repr(config)]:
         for secret in ("FIN87", "xyz", "47.123456", "8.654321"):
             assert secret not in text
     # It is a valid environment again.
     again = EnvironmentConfig.model_validate(json.loads(texts[0]))
-    assert again.robots[0].remote_id is None
+    assert operator_of(again) is None
     # A copy for another process has all of it but the secret end.
     copy = EnvironmentConfig.model_validate(config.model_dump(by_alias=True))
-    assert copy.robots[0].remote_id == config.robots[0].remote_id
+    assert operator_of(copy) == operator_of(config)
+
+
+def test_a_replay_reads_of_a_recording_neither_who_operates_nor_what_is_required() -> None:
+    """Whoever flies again says so."""
+    robot = {"id": "drone", "remote_id": {"uas_id": SERIAL}, "preflight": {"remote_id": "require"}}
+    assert allowed_content({"robots": [robot]}) == {"robots": [{"id": "drone"}]}
 
 
 def test_the_drones_own_transponder_has_six_digits() -> None:

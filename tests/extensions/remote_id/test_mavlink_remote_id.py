@@ -11,9 +11,9 @@ from autopilot import HERE
 from bench import Bench
 from emulated import FAMILIES, Stepped
 
-from aerodaas.config.sections.remote_id import RemoteIdConfig
-from aerodaas.drivers.mavlink.airspace.remote_id import RemoteId
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.remote_id.settings import RemoteIdConfig
+from aerodaas.extensions.remote_id.transmitter import RemoteId
 from aerodaas.messages.health import HealthItem, Verdict
 from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.vehicle import VehicleMode
@@ -311,7 +311,7 @@ def test_only_the_vehicles_own_transmitter_is_heard(
     bench.connect()
     bench.autopilot.say(READY, peer or HERE, (system, component))
     bench.clock.advance(0.1)
-    told = bench.vehicle.health().remote_id
+    told = bench.vehicle.health().objections.get("remote_id")
     assert told == ("" if heard else "no transmitter is heard")
     bench.close()
 
@@ -333,7 +333,7 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
         bench.turn()
     assert bench.turn() is VehicleMode.LOST
     assert "no word from the vehicle for 3 s" in bench.vehicle.preflight()
-    assert bench.vehicle.health().remote_id == ""
+    assert bench.vehicle.health().objections.get("remote_id") == ""
     assert math.isclose(bench.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
     bench.close()
 

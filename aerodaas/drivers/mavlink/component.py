@@ -1,0 +1,87 @@
+"""Equipment of a vehicle beside its autopilot, for which extensions bring the messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.model import RobotConfig
+from aerodaas.drivers.mavlink.connecting import Connection
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.messages.health import HealthReadings
+from aerodaas.messages.vehicle import VehicleState
+
+__all__ = ["ComponentContext", "MavlinkComponent", "MessageHandler", "mavlink_components"]
+
+MessageHandler = Callable[[Message, float], None]
+"""Processes a message at a second of the monotonic clock."""
+
+
+@dataclass(frozen=True)
+class ComponentContext:
+    """The vehicle to which a component belongs."""
+
+    robot: RobotConfig
+    settings: MavlinkSettings
+    telemetry: Telemetry
+    """Newest messages of the autopilot."""
+
+
+class MavlinkComponent:
+    """A component of one vehicle (`Extension.mavlink_components`).
+
+    Its messages do not count as a word of the autopilot: a transmitter that goes on talking does
+    not hide that the vehicle is silent. The link's thread calls the handlers and `step`, the loop's
+    thread the rest, under one lock. Seconds are monotonic.
+    """
+
+    def __init__(self, context: ComponentContext) -> None:
+        """Prepare for a vehicle that is not connected yet."""
+        self.context = context
+        self.connection: Connection | None = None
+        """None before the vehicle is connected."""
+
+    @property
+    def handlers(self) -> Mapping[str, MessageHandler]:
+        """Handlers by the name of their message, of which no other component has any."""
+        return {}
+
+    def step(self, now: float) -> None:
+        """Send what is due; called 20 times a second.
+
+        Args:
+            now: Monotonic clock.
+        """
+
+    def complete(self, state: VehicleState, now: float, placed_at: float) -> VehicleState:
+        """Return the vehicle's state with what this component knows.
+
+        Args:
+            state: The newest state.
+            now: Monotonic clock.
+            placed_at: The same clock at the state's position.
+        """
+        del now, placed_at
+        return state
+
+    def complete_health(self, readings: HealthReadings, now: float) -> HealthReadings:
+        """Return the vehicle's health with what this component knows.
+
+        Args:
+            readings: The newest readings.
+            now: Monotonic clock.
+        """
+        del now
+        return readings
+
+
+def mavlink_components(context: ComponentContext) -> list[MavlinkComponent]:
+    """The components that extensions bring for a vehicle."""
+    return [
+        imported(place)(context)
+        for extension in extensions().values()
+        for place in extension.mavlink_components
+    ]

@@ -1,0 +1,1 @@
+"""Remote ID of a MAVLink vehicle: who operates it, and whether its transmitter is ready."""
