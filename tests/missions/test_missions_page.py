@@ -29,9 +29,7 @@ def blocks(kind: str) -> list[str]:
 def test_the_table_of_states_has_every_transition() -> None:
     """The last column names the transitions that not all flying states have."""
     interrupt = frozenset.intersection(*(TRANSITIONS[state] for state in FLYING))
-    rows = re.findall(
-        r"^\| `(\w+)` \| .* \| (.*) \|$", PAGE.split("## Trajectory")[0], re.MULTILINE
-    )
+    rows = re.findall(r"^\| `(\w+)` \| .* \|(.*)\|$", PAGE.split("## Trajectory")[0], re.MULTILINE)
     found = {
         MissionState(name): {MissionState(one) for one in re.findall(r"`(\w+)`", targets)}
         for name, targets in rows
