@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.drivers.mavlink.sitl.process import SitlProcess
-from aerodaas.drivers.mavlink.sitl.programs import Family, SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.extensions.sitl.process import SitlProcess
+from aerodaas.extensions.sitl.programs import Family, SitlOptions
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, HandOver, Start

@@ -156,11 +156,6 @@ _CORE = (
         "aerodaas.cli.models:app",
         "Detectors and pose models: fetch by name, try, and measure.",
     ),
-    Command(
-        "sim",
-        "aerodaas.cli.sim:app",
-        "Start PX4 or ArduCopter in simulation, which has to be installed already.",
-    ),
     Command("cluster", "aerodaas.cli.cluster:app", "Edge and cloud as one cluster."),
     Command(
         "lease",

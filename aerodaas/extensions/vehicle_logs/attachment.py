@@ -15,9 +15,9 @@ from aerodaas.extensions.vehicle_logs.alignment import (
     recorded_clocks,
     robot_of,
 )
+from aerodaas.extensions.vehicle_logs.attaching import attach_file
 from aerodaas.extensions.vehicle_logs.log import VehicleLog
 from aerodaas.extensions.vehicle_logs.reading import MAX_LOG, read_vehicle_log
-from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
 from aerodaas.text.printable import printable
 

@@ -16,11 +16,11 @@ from sitl.flights import SitlFlight, robot_at, survey
 from sitl.relay import Relay
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.drivers.mavlink.sitl.process import SitlProcess
-from aerodaas.drivers.mavlink.sitl.programs import SitlOptions
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
+from aerodaas.extensions.sitl.process import SitlProcess
+from aerodaas.extensions.sitl.programs import SitlOptions
 from aerodaas.extensions.vehicle_logs.log_service import LogEntry
 from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
 from aerodaas.messages.mission import MissionState

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from aerodaas.cli.app import main
 from aerodaas.errors import AeroDaaSError, RecordingError
+from aerodaas.extensions.vehicle_logs.attaching import attach_file
 from aerodaas.extensions.vehicle_logs.attachment import (
     AttachedLog,
     attach_log,
@@ -22,7 +23,6 @@ from aerodaas.extensions.vehicle_logs.attachment import (
 )
 from aerodaas.extensions.vehicle_logs.log import Series
 from aerodaas.extensions.vehicle_logs.plots import log_drawings
-from aerodaas.recording.attaching import attach_file
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.page.figures import section_plots
 from aerodaas.recording.report.report import read_report, write_report

@@ -15,8 +15,8 @@ from mcap.writer import Writer
 from mcap_files import END, KINDS, Said, write_file
 
 from aerodaas.errors import RecordingError
-from aerodaas.recording import attaching as module
-from aerodaas.recording.attaching import attach_file
+from aerodaas.extensions.vehicle_logs import attaching as module
+from aerodaas.extensions.vehicle_logs.attaching import attach_file
 from aerodaas.recording.reader import Recording
 
 SAID = [Said(f"/{number % 3}", number * 1000 + 10, number) for number in range(300)]

@@ -13,8 +13,8 @@ from types import TracebackType
 
 from typing_extensions import Self
 
-from aerodaas.drivers.mavlink.sitl.programs import PROGRAMS, Family, SitlOptions
 from aerodaas.errors import SourceError
+from aerodaas.extensions.sitl.programs import PROGRAMS, Family, SitlOptions
 
 __all__ = ["SitlProcess"]
 

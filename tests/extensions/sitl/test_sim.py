@@ -16,10 +16,10 @@ import pytest
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
-from aerodaas.cli.sim import _home
-from aerodaas.drivers.mavlink.sitl.process import SitlProcess
-from aerodaas.drivers.mavlink.sitl.programs import PROGRAMS, SimulatedHome, SitlOptions
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.sitl.command_line import _home
+from aerodaas.extensions.sitl.process import SitlProcess
+from aerodaas.extensions.sitl.programs import PROGRAMS, SimulatedHome, SitlOptions
 
 SPEAKS = """#!{python}
 import json, os, pathlib, socket, subprocess, sys, time
@@ -261,7 +261,7 @@ def test_an_application_is_flown_and_the_simulator_ended(
     """With the exit code of the application."""
     application = tmp_path / "mine.py"
     application.write_text("raise SystemExit(7)\n", encoding="utf-8")
-    monkeypatch.setattr("aerodaas.cli.sim.signal.signal", lambda *_: None)
+    monkeypatch.setattr("aerodaas.extensions.sitl.command_line.signal.signal", lambda *_: None)
     state = tmp_path / "state"
     words = ["--from", str(tree(SPEAKS)), "--port", str(port), "--state", str(state)]
     began = time.monotonic()

@@ -1,0 +1,1 @@
+"""Autopilots in simulation (software in the loop) that the user has installed."""
