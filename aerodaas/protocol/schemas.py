@@ -50,6 +50,7 @@ __all__ = [
     "TokenIn",
     "TokenOut",
     "UsageOut",
+    "VehicleReport",
     "VerdictOut",
     "Word",
 ]
@@ -177,7 +178,24 @@ class RefusalOut(AnswerModel):
     """Why, and the remedy."""
 
 
-class RobotOut(AnswerModel):
+class VehicleReport(AnswerModel):
+    """Link to a vehicle, and what was heard over it last."""
+
+    link: LinkState = LinkState.UNWATCHED
+    since: float | None = None
+    """Moment since which the link is so; of a lost one, when it was last heard."""
+    heard: float | None = None
+    """Moment of battery and position."""
+    battery: float | None = None
+    position: Place | None = None
+    """Where it was last heard of."""
+    mode: str = ""
+    """What the vehicle says that it does, one of `VehicleMode`; empty where it is not known."""
+    faults: list[str] = Field(default_factory=list)
+    """What the vehicle complains of."""
+
+
+class RobotOut(VehicleReport):
     """One drone of the fleet."""
 
     id: str
@@ -194,20 +212,8 @@ class RobotOut(AnswerModel):
     """Mission that flies it; shown as the tenant is, and to tenants that it shares cameras with."""
     shared: list[str] = Field(default_factory=list)
     """Cameras of that mission that one's own tenant may attach a mission to, by full id."""
-    battery: float | None = None
-    position: Place | None = None
-    """Where it was last heard of."""
-    heard: float | None = None
-    """Moment of battery and position."""
     enabled: bool = True
     """False after an operator has taken it out of service."""
-    link: LinkState = LinkState.UNWATCHED
-    since: float | None = None
-    """Moment since which the link is so; of a lost one, when it was last heard."""
-    mode: str | None = None
-    """What the vehicle says that it does, one of `VehicleMode`."""
-    faults: list[str] = Field(default_factory=list)
-    """What the vehicle complains of."""
     objection: str = ""
     """Why it can be neither leased nor flown now; empty if it can, or is in flight."""
     preflight: Verdict | None = None

@@ -198,7 +198,7 @@ export interface RobotOut {
    */
   link: "unwatched" | "connecting" | "connected" | "mission" | "lost";
   mission: string | null;
-  mode: string | null;
+  mode: string;
   objection: string;
   position: [number, number, number] | null;
   preflight: Verdict | null;

@@ -37,7 +37,7 @@ from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
 from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.monitor.reports import VehicleReport
+from aerodaas.service.monitor.reports import WatchedVehicle
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Account, Store, Tenant
 
@@ -49,7 +49,7 @@ class Monitor:
 
     def __init__(self, registry: FleetRegistry) -> None:
         self._registry = registry
-        self._news: dict[str, VehicleReport] = {}
+        self._news: dict[str, WatchedVehicle] = {}
         self.wanted: set[str] = set()
         self.held: set[str] = set()
 
@@ -68,7 +68,7 @@ class Monitor:
     def see(self, name: str, **changes: object) -> None:
         """Tell of one drone, as connected and fit but for the changes."""
         fit: dict[str, Any] = {"link": LinkState.CONNECTED, "heard": time.time(), "battery": 0.9}
-        self._news[name] = VehicleReport(**{"held": True, **fit, **changes})
+        self._news[name] = WatchedVehicle(**{"held": True, **fit, **changes})
         self._registry.record_reports(self._news)
 
 

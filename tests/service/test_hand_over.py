@@ -20,7 +20,7 @@ from aerodaas.service.mission import ActiveMission
 from aerodaas.service.mission_service import MissionService
 from aerodaas.service.models.model_store import ModelStore
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.monitor.reports import VehicleReport
+from aerodaas.service.monitor.reports import WatchedVehicle
 
 OPERATOR = Principal("olga", "provider", Role.OPERATOR, frozenset(Scope), "t")
 
@@ -161,7 +161,7 @@ def test_drones_in_flight_are_left_alone_after_a_restart(
 def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
     """The monitor tells of all drones, those that it does not hold included."""
     provider.registry.set_link(["one"], LinkState.MISSION)
-    provider.registry.record_reports({"one": VehicleReport(), "two": VehicleReport()})
+    provider.registry.record_reports({"one": WatchedVehicle(), "two": WatchedVehicle()})
     assert provider.registry.report("one").link is LinkState.MISSION
     provider.registry.record_reports({})
     assert provider.registry.report("one").link is LinkState.MISSION

@@ -15,7 +15,7 @@ from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.monitor.reports import VehicleReport
+from aerodaas.service.monitor.reports import WatchedVehicle
 from aerodaas.service.store import RobotState, Store
 
 __all__ = ["OUT_OF_SERVICE", "FleetRegistry"]
@@ -45,7 +45,7 @@ class FleetRegistry:
         self._states: dict[str, RobotState] = {}
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
-        self._reports = {robot.id: VehicleReport() for robot in config.robots}
+        self._reports = {robot.id: WatchedVehicle() for robot in config.robots}
         self._told: dict[str, tuple[int, float, float]] = {}
         """Mission clock of each robot's newest status; when it came, as Unix time and by
         `time.monotonic`."""
@@ -62,7 +62,7 @@ class FleetRegistry:
         with self._lock:
             return dict(self._states)
 
-    def report(self, robot: str) -> VehicleReport:
+    def report(self, robot: str) -> WatchedVehicle:
         """Newest report of a robot: its link, mode and faults."""
         with self._lock:
             return self._reports[robot]
@@ -103,23 +103,23 @@ class FleetRegistry:
             lost = silent or mode == VehicleMode.LOST
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.report(name)
-            faults = (f"its mission has told nothing since {_moment(told)}",)
-            report = VehicleReport(
+            faults = [f"its mission has told nothing since {_moment(told)}"]
+            report = WatchedVehicle(
                 link=link,
                 since=before.since if before.link is link else told,
                 heard=before.heard if lost else told,
                 battery=one.charge,
                 position=one.place,
                 mode=mode,
-                faults=faults if silent else mission.faults,
+                faults=faults if silent else list(mission.faults),
             )
             least = _WRITE_SECONDS if ended is None else 0.0
             self._record(name, report, heard=report.heard, least=least)
 
-    def record_reports(self, report: Mapping[str, VehicleReport]) -> None:
+    def record_reports(self, report: Mapping[str, WatchedVehicle]) -> None:
         """Take over what the monitor tells of the drones on the ground; without any, it is gone."""
         for name, before in list(self._reports.items()):
-            one = report.get(name, VehicleReport(reason="the service looks for it again"))
+            one = report.get(name, WatchedVehicle(reason="the service looks for it again"))
             if one.link is LinkState.UNWATCHED and before.link is LinkState.MISSION:
                 continue
             if one.heard is None and one.link is LinkState.LOST:
@@ -140,7 +140,7 @@ class FleetRegistry:
         """
         with self._lock:
             for name in robots:
-                self._reports[name] = VehicleReport(link=link, since=time.time())
+                self._reports[name] = WatchedVehicle(link=link, since=time.time())
                 self._told.pop(name, None)
 
     def objection(self, robot: str) -> str:
@@ -151,7 +151,7 @@ class FleetRegistry:
         if not enabled:
             return OUT_OF_SERVICE
         if report.link is LinkState.LOST and time.monotonic() - lost_at > _DROPOUT_SECONDS:
-            return f"not reachable since {_moment(report.since)}: {report.reason}"
+            return f"not reachable since {_moment(report.since or 0.0)}: {report.reason}"
         if report.link is not LinkState.CONNECTED:
             return ""
         least = self._return_at[robot]
@@ -192,7 +192,7 @@ class FleetRegistry:
             if objection := self.objection(name):
                 raise RefusedError(409, f"{name}: {objection}")
 
-    def _moved(self, name: str, report: VehicleReport) -> bool:
+    def _moved(self, name: str, report: WatchedVehicle) -> bool:
         """Whether a drone's charge or place differs from what was written down."""
         if name not in self._written:
             return True
@@ -201,7 +201,7 @@ class FleetRegistry:
         return charged or math.dist(report.position or _HOME, row.position or _HOME) >= _METRES
 
     def _record(
-        self, name: str, report: VehicleReport, *, heard: float | None, least: float
+        self, name: str, report: WatchedVehicle, *, heard: float | None, least: float
     ) -> None:
         """Take over report, and write them down if the last row is `least` seconds old."""
         with self._lock:
@@ -223,11 +223,11 @@ class FleetRegistry:
         if due:
             self._store.robots.put(state)
 
-    def _stamp(self, name: str, report: VehicleReport) -> None:
+    def _stamp(self, name: str, report: WatchedVehicle) -> None:
         """Note since when a link is lost and a list is known: the wall clock may be set later."""
         before, wall, now = self._reports[name], time.time(), time.monotonic()
         if report.link is LinkState.LOST and before.link is not LinkState.LOST:
-            self._lost_at[name] = now - max(0.0, wall - report.since)
+            self._lost_at[name] = now - max(0.0, wall - (report.since or wall))
         if report.examined is not None and report.examined != before.examined:
             self._examined_at[name] = now - max(0.0, wall - report.examined)
 

@@ -10,7 +10,7 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.sections.actuators import permitted
 from aerodaas.messages.health import HealthReport
 from aerodaas.protocol.scenery import SceneryOut
-from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut
+from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut, VehicleReport
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
@@ -87,7 +87,10 @@ class FleetView:
         mine = lease is not None and sees(principal, lease.tenant)
         # Only of a lease that this account sees.
         own = lease if mine else None
+        heard = {"battery": state.battery, "position": state.position, "heard": state.heard}
         return RobotOut(
+            **news.model_dump(include=set(VehicleReport.model_fields) - set(heard)),
+            **heard,
             id=robot.id,
             sensors=[sensor.full_id for sensor in robot.sensors],
             lease=None if lease is None else lease.id,
@@ -95,14 +98,7 @@ class FleetView:
             area=None if own is None or own.area is None else list(own.area),
             mission=flying if mine or shared else None,
             shared=shared,
-            battery=state.battery,
-            position=state.position,
-            heard=state.heard,
             enabled=state.enabled,
-            link=news.link,
-            since=news.since or None,
-            mode=news.mode or None,
-            faults=list(news.faults),
             objection="" if flying is not None else self._registry.objection(robot.id),
             preflight=ready.verdict if news.link is LinkState.CONNECTED else None,
         )

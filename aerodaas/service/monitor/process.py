@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from aerodaas.service.flights.folder import service_free_environment
-from aerodaas.service.monitor.reports import MonitorReport, MonitorRequest, VehicleReport
+from aerodaas.service.monitor.reports import MonitorReport, MonitorRequest, WatchedVehicle
 
 __all__ = ["FleetMonitor"]
 
@@ -34,7 +34,7 @@ class FleetMonitor:
     """
 
     def __init__(
-        self, fleet: Path, log: Path, told: Callable[[Mapping[str, VehicleReport]], None]
+        self, fleet: Path, log: Path, told: Callable[[Mapping[str, WatchedVehicle]], None]
     ) -> None:
         """Watch the vehicles of the environment file `fleet`; `told` is called with all report."""
         self._command = [sys.executable, "-m", "aerodaas.service.monitor", str(fleet)]
@@ -93,7 +93,7 @@ class FleetMonitor:
         if self._process is None or self._process.poll() is not None:
             return True
         obeyed = self._report.number == self._number
-        return obeyed and not self._report.robots.get(robot, VehicleReport()).held
+        return obeyed and not self._report.robots.get(robot, WatchedVehicle()).held
 
     def _start(self, now: float) -> None:
         self._started_at = now

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.messages.health import HealthItem
-from aerodaas.protocol.schemas import LinkState
+from aerodaas.protocol.schemas import VehicleReport
 
-__all__ = ["MonitorReport", "MonitorRequest", "VehicleReport"]
+__all__ = ["MonitorReport", "MonitorRequest", "WatchedVehicle"]
 
 
 class _Line(BaseModel):
@@ -22,26 +22,13 @@ class MonitorRequest(_Line):
     robots: frozenset[str]
 
 
-class VehicleReport(_Line):
+class WatchedVehicle(VehicleReport):
     """One vehicle as the monitor sees it."""
 
     held: bool = False
     """Whether the monitor has the vehicle open, or is opening or closing it."""
-    link: LinkState = LinkState.UNWATCHED
-    since: float = 0.0
-    """Unix seconds since which the link is so; of a lost one, when it was last heard."""
     reason: str = ""
     """Why it is not connected."""
-    heard: float | None = None
-    """Unix seconds of battery and position."""
-    battery: float | None = None
-    """Charge left, 0 to 1."""
-    position: tuple[float, float, float] | None = None
-    """Metres east, north and up of home."""
-    mode: str = ""
-    """One of `VehicleMode`."""
-    faults: tuple[str, ...] = ()
-    """Complaints of the vehicle."""
     objections: tuple[str, ...] = ()
     """Why the vehicle itself would refuse to take off now."""
     health: tuple[HealthItem, ...] = ()
@@ -55,4 +42,4 @@ class MonitorReport(_Line):
 
     number: int
     """Of the newest `MonitorRequest` that it obeys."""
-    robots: dict[str, VehicleReport] = Field(default_factory=dict)
+    robots: dict[str, WatchedVehicle] = Field(default_factory=dict)

@@ -13,7 +13,7 @@ from aerodaas.errors import AeroDaaSError, failure_line
 from aerodaas.messages.vehicle import Vehicle, VehicleMode, VehicleState
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.protocol.schemas import LinkState
-from aerodaas.service.monitor.reports import VehicleReport
+from aerodaas.service.monitor.reports import WatchedVehicle
 
 __all__ = ["VehicleWatcher"]
 
@@ -46,7 +46,7 @@ class VehicleWatcher:
         self._changed = changed
         self._lock = threading.Condition()
         self._wanted = False
-        self._report = VehicleReport()
+        self._report = WatchedVehicle()
         self._read_at = -math.inf
         """Monotonic seconds of the newest reading."""
 
@@ -61,7 +61,7 @@ class VehicleWatcher:
             self._lock.notify_all()
 
     @property
-    def report(self) -> VehicleReport:
+    def report(self) -> WatchedVehicle:
         """The vehicle as it was last seen; lost, if its driver has hung since."""
         with self._lock:
             report, silence = self._report, time.monotonic() - self._read_at
@@ -88,7 +88,7 @@ class VehicleWatcher:
         """Connect, and watch until it is wanted no more or lost; returns whether it was reached."""
         reached, reason = False, ""
         if self._report.link is LinkState.UNWATCHED:
-            fresh = VehicleReport(held=True, link=LinkState.CONNECTING, since=time.time())
+            fresh = WatchedVehicle(held=True, link=LinkState.CONNECTING, since=time.time())
             self._update(**dict(fresh))
         try:
             vehicle = load_vehicle(self._robot, self._environment, observing=True)
@@ -162,7 +162,7 @@ class VehicleWatcher:
             battery=charge if math.isfinite(charge) else None,
             position=place if all(map(math.isfinite, place)) else None,
             mode=state.mode.value,
-            faults=tuple(state.faults),
+            faults=list(state.faults),
             objections=tuple(objections),
         )
 

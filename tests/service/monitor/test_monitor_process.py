@@ -16,7 +16,7 @@ from scripted_fleet import HANGING, fleet_of
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor import process as processes
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.monitor.reports import VehicleReport
+from aerodaas.service.monitor.reports import WatchedVehicle
 
 pytestmark = pytest.mark.wall_clock
 
@@ -27,7 +27,7 @@ class Told:
     def __init__(self, folder: Path, fleet: dict[str, Any]) -> None:
         path = folder / "fleet.json"
         path.write_text(json.dumps(fleet), encoding="utf-8")
-        self.news: dict[str, VehicleReport] = {}
+        self.news: dict[str, WatchedVehicle] = {}
         self.monitor = FleetMonitor(path, folder / "log", self._tell)
 
     def _tell(self, news: object) -> None:
@@ -35,7 +35,7 @@ class Told:
 
     def link(self, name: str) -> LinkState:
         """The link to one of them."""
-        return self.news.get(name, VehicleReport()).link
+        return self.news.get(name, WatchedVehicle()).link
 
     def until(self, condition: Callable[[], bool], *wanted: str) -> None:
         """Wait until something holds, with these drones wanted."""
