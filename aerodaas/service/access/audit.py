@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.schemas import AuditOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
 from aerodaas.service.store import AuditEntry, Store
@@ -103,7 +102,7 @@ class Audit:
         said, accepted = answer.text, answer.accepted
         self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)
 
-    def newest(self, limit: int = 100, tenant: str | None = None) -> list[AuditOut]:
+    def newest(self, limit: int = 100, tenant: str | None = None) -> list[AuditEntry]:
         """The newest entries of a tenant, or of all, newest first.
 
         Args:
@@ -113,20 +112,7 @@ class Audit:
         Raises:
             StoreError: If the database does not answer.
         """
-        entries = self._store.audit.all(tenant, min(max(limit, 0), _MOST_SHOWN))
-        return [
-            AuditOut(
-                at=entry.at,
-                account=entry.account,
-                tenant=entry.tenant,
-                address=entry.address,
-                action=entry.action,
-                target=entry.target,
-                accepted=entry.accepted,
-                text=entry.text,
-            )
-            for entry in entries
-        ]
+        return self._store.audit.all(tenant, min(max(limit, 0), _MOST_SHOWN))
 
 
 def _bounded(text: str, longest: int) -> str:

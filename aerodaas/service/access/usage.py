@@ -11,38 +11,9 @@ from aerodaas.protocol.schemas import UsageOut
 from aerodaas.recording.new_file import harmless
 from aerodaas.service.store import Usage
 
-__all__ = ["usage_csv", "usage_out"]
+__all__ = ["usage_csv"]
 
-_COLUMNS = (
-    "mission",
-    "tenant",
-    "account",
-    "started",
-    "flight_seconds",
-    "distance",
-    "battery_used",
-    "compute_seconds",
-    "cloud_calls",
-    "recorded_bytes",
-    "kept",
-)
-
-
-def usage_out(usage: Usage) -> UsageOut:
-    """A row as the HTTP interface shows it."""
-    return UsageOut(
-        mission=usage.mission,
-        tenant=usage.tenant,
-        account=usage.account,
-        started=usage.started,
-        flight_seconds=usage.flight_seconds,
-        distance=usage.distance,
-        battery_used=usage.battery_used,
-        compute_seconds=dict(usage.compute_seconds),
-        cloud_calls=usage.cloud_calls,
-        recorded_bytes=usage.recorded_bytes,
-        kept=usage.kept,
-    )
+_COLUMNS = tuple(UsageOut.model_fields)
 
 
 def usage_csv(rows: Iterable[Usage]) -> str:

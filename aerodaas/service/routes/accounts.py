@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -22,10 +22,10 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
-from aerodaas.service.access.usage import usage_csv, usage_out
+from aerodaas.service.access.usage import usage_csv
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.store import Store, Tenant
+from aerodaas.service.store import AuditEntry, Store, Tenant
 
 __all__ = ["AccountRoutes"]
 
@@ -60,12 +60,14 @@ class AccountRoutes:
         router.add_api_route("/accounts", self.accounts)
         router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
         router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])
-        router.add_api_route("/tenants", self.tenants)
-        router.add_api_route("/tenants/{name}", self.change_tenant, methods=["PATCH"])
+        router.add_api_route("/tenants", self.tenants, response_model=list[TenantOut])
+        router.add_api_route(
+            "/tenants/{name}", self.change_tenant, methods=["PATCH"], response_model=TenantOut
+        )
         router.add_api_route("/tokens", self.tokens)
         router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
         router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
-        router.add_api_route("/audit", self.audit)
+        router.add_api_route("/audit", self.audit, response_model=list[AuditOut])
         table: dict[int | str, dict[str, Any]] = {
             200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
         }
@@ -95,21 +97,21 @@ class AccountRoutes:
         self._audit.write(principal, "account.change", name, text, accepted=True)
         return found
 
-    def tenants(self, request: Request) -> list[TenantOut]:
+    def tenants(self, request: Request) -> list[Tenant]:
         """One's own tenant with what it may use; all of them for an administrator."""
         principal = self._admission.require(request, Role.VIEWER)
         if principal.role.reaches(Role.ADMIN):
-            return [_tenant_out(one) for one in self._store.tenants.all()]
-        return [_tenant_out(self._store.tenants.require(principal.tenant))]
+            return self._store.tenants.all()
+        return [self._store.tenants.require(principal.tenant)]
 
-    def change_tenant(self, name: str, body: TenantChange, request: Request) -> TenantOut:
+    def change_tenant(self, name: str, body: TenantChange, request: Request) -> Tenant:
         """Change what a tenant may use: of missions that begin from now on."""
         principal = self._admission.require(request, Role.ADMIN)
         changes = body.model_dump(exclude_unset=True)
         found = self._store.tenants.update(name, lambda one: replace(one, **changes))
         text = body.model_dump_json(exclude_unset=True)
         self._audit.write(principal, "tenant.change", name, text, accepted=True)
-        return _tenant_out(found)
+        return found
 
     def tokens(self, request: Request) -> list[TokenOut]:
         """One's own tokens; all of them for an administrator. Secrets are not among it."""
@@ -134,7 +136,7 @@ class AccountRoutes:
 
     def audit(
         self, request: Request, limit: Annotated[int, Query(ge=1, le=_MOST_ENTRIES)] = 100
-    ) -> list[AuditOut]:
+    ) -> list[AuditEntry]:
         """The newest entries of the audit log."""
         self._admission.require(request, Role.ADMIN)
         return self._audit.newest(limit)
@@ -150,8 +152,4 @@ class AccountRoutes:
         rows = self._store.usage.all(None if every else principal.tenant)
         if form == "csv":
             return Response(usage_csv(rows), media_type="text/csv")
-        return [usage_out(row) for row in rows]
-
-
-def _tenant_out(tenant: Tenant) -> TenantOut:
-    return TenantOut(**asdict(tenant))
+        return rows

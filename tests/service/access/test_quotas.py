@@ -9,9 +9,9 @@ from datetime import datetime, timezone
 
 import pytest
 
-from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.protocol.schemas import MissionPhase, UsageOut
 from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.access.usage import usage_csv, usage_out
+from aerodaas.service.access.usage import usage_csv
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 
@@ -121,4 +121,5 @@ def test_the_table_has_a_row_for_each_mission_and_no_formula() -> None:
     assert float(rows[0]["compute_seconds"]) == 3.0
     assert float(rows[0]["flight_seconds"]) == 61.5
     assert usage_csv([]).count("\n") == 1
-    assert usage_out(usage).compute_seconds == {"edge": 1, "e2": 2}
+    shown = UsageOut.model_validate(usage, from_attributes=True)
+    assert shown.compute_seconds == {"edge": 1, "e2": 2}
