@@ -34,13 +34,7 @@ _CORE = (
     Command(
         "compile",
         "aerodaas.cli.flying.document:compile_document",
-        "Write an application as a mission document: data, which others fly without running code.",
-        words=True,
-    ),
-    Command(
-        "graph",
-        "aerodaas.cli.flying.document:graph",
-        "Draw an application's graph as a Mermaid flowchart; nothing flies.",
+        "Write an application as a mission document that others fly without its code, or draw it.",
         words=True,
     ),
     Command(
@@ -48,12 +42,6 @@ _CORE = (
         "aerodaas.cli.flying.check:check",
         "Try everything that a flight needs, without flying.",
         words=True,
-    ),
-    Command(
-        "preflight",
-        "aerodaas.cli.flying.preflight:preflight",
-        "Print a robot's health before take-off as one list; nothing moves, and nothing is set "
-        "there.",
     ),
     Command(
         "schema",
@@ -75,11 +63,6 @@ _CORE = (
         "report",
         "aerodaas.cli.recordings.report:report",
         "Write a recording's report: one HTML page, its plots as PNG, and the figures as JSON.",
-    ),
-    Command(
-        "compare",
-        "aerodaas.cli.recordings.report:compare",
-        "Set two recordings side by side in one HTML page.",
     ),
     Command(
         "export",
@@ -106,32 +89,8 @@ _CORE = (
     ),
     Command(
         "missions",
-        "aerodaas.cli.provider.provider:missions",
-        "List the missions that you may see, newest first.",
-        panel=_PROVIDER,
-    ),
-    Command(
-        "watch",
-        "aerodaas.cli.provider.provider:watch",
-        "Watch a mission until it is over; Ctrl-C leaves it as it is.",
-        panel=_PROVIDER,
-    ),
-    Command(
-        "cancel",
-        "aerodaas.cli.provider.provider:cancel",
-        "Cancel a mission; drones in flight come home and land.",
-        panel=_PROVIDER,
-    ),
-    Command(
-        "grant",
-        "aerodaas.cli.provider.provider:grant",
-        "Share the cameras of your mission in flight with another tenant's applications.",
-        panel=_PROVIDER,
-    ),
-    Command(
-        "fetch",
-        "aerodaas.cli.provider.provider:fetch",
-        "Fetch the recording of a mission that is over.",
+        "aerodaas.cli.provider.missions:app",
+        "List, watch and cancel missions at a provider, grant their cameras, fetch recordings.",
         panel=_PROVIDER,
     ),
     Command(

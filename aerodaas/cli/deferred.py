@@ -55,14 +55,16 @@ def deferred_group(commands: Callable[[], tuple[Command, ...]]) -> type[ExampleG
     """Class of a group of commands whose modules are imported when they are called.
 
     Args:
-        commands: Gives the commands in the order in which help lists them.
+        commands: Gives the commands in the order in which help lists them, after those that the
+            group has besides.
     """
 
     class Group(ExampleGroup):
         """A group of deferred commands."""
 
         def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - Typer's
-            settings["commands"] = {one.name: DeferredCommand(one) for one in commands()}
+            deferred = {one.name: DeferredCommand(one) for one in commands()}
+            settings["commands"] = {**(settings.get("commands") or {}), **deferred}
             super().__init__(**settings)
 
     return Group

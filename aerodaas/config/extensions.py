@@ -138,6 +138,8 @@ class Extension:
     commands: tuple[Command, ...] = ()
     exports: tuple[Command, ...] = ()
     """Formats of `aerodaas export`."""
+    lab: tuple[Command, ...] = ()
+    """Commands of `aerodaas lab`."""
     views: tuple[LiveView, ...] = ()
     services: Mapping[str, str] = field(default_factory=dict)
     """`module:function` by name, such as `plans.read`, of each function that the core calls by

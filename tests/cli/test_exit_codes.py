@@ -42,7 +42,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ["report", "none.mcap"],
         ["report", "broken.mcap"],
         ["view", "none.mcap"],
-        ["compare", "none.mcap", "broken.mcap"],
+        ["report", "none.mcap", "broken.mcap"],
         ["export", "topics", "none.mcap"],
         ["import", "none"],
         ["compile", "none.mcap"],
@@ -75,11 +75,11 @@ def test_a_missing_or_broken_file_is_wrong_input(words: list[str]) -> None:
     ],
     ids=["syntax", "module", "name", "file", "NameError", "exception", "its own"],
 )
-@pytest.mark.parametrize("command", ["run", "graph"])
+@pytest.mark.parametrize("command", ["run", "compile --graph"])
 def test_an_application_that_cannot_work_is_wrong_input(command: str, text: str, code: int) -> None:
     """What it raises while it works is a failure; its own code is its own."""
     Path("app.py").write_text(text)
-    assert _code(command, "app.py") == code
+    assert _code(*command.split(), "app.py") == code
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_plan_that_cannot_be_flown_is_wrong_input(command: str, waypoint: str)
     "words",
     [
         ["fleet", "--at", "http://127.0.0.1:9"],
-        ["missions", "--at", "http://127.0.0.1:9"],
+        ["missions", "list", "--at", "http://127.0.0.1:9"],
         ["remote", "--url", "http://127.0.0.1:9", "status"],
     ],
     ids=" ".join,

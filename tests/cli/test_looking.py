@@ -26,9 +26,9 @@ LOOPBACK = "127.0.0.1"
 SETTING = {"fallback": "set", "failsafes": "set", "fence": "land", "role": "ground_station"}
 """Of a flight that sets all there is."""
 COMMANDS = {
-    "preflight": ["preflight", "drone"],
+    "health": ["check", "environment.json", "--robot", "drone"],
     "check": ["check", "environment.json"],
-    "logs": ["logs", "drone"],
+    "logs": ["logs", "list", "drone"],
 }
 CHANGES = {"PARAM_SET", "MISSION_COUNT", "MISSION_CLEAR_ALL", "MISSION_ITEM_INT", "SET_MODE"}
 """Messages that change a vehicle's parameters, plans or mode."""

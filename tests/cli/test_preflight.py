@@ -1,4 +1,4 @@
-"""`aerodaas preflight` prints a robot's health as one list, and moves nothing."""
+"""`aerodaas check --robot` prints a robot's health as one list, and moves nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DRONE: dict[str, Any] = {"id": "drone"}
 
 
 class Looked:
-    """Runs `aerodaas preflight` in a folder of its own."""
+    """Runs `aerodaas check --robot` in a folder of its own."""
 
     def __init__(
         self,
@@ -36,7 +36,9 @@ class Looked:
         """Exit code and output."""
         content = {"robots": [robot], **environment}
         (self._folder / "environment.json").write_text(json.dumps(content))
-        self._patch.setattr(sys, "argv", ["aerodaas", "preflight", *words])
+        self._patch.setattr(
+            sys, "argv", ["aerodaas", "check", "environment.json", "--robot", *words]
+        )
         with pytest.raises(SystemExit) as ended:
             main()
         told = self._capture.readouterr()
@@ -110,7 +112,6 @@ def test_battery_and_fence_refuse(look: Looked) -> None:
     ("words", "robot", "said"),
     [
         (("dron",), DRONE, "drone"),
-        (("drone", "--env", "elsewhere.json"), DRONE, "elsewhere.json"),
         (("drone",), {**DRONE, "preflight": {"wind": "panic"}}, "preflight.wind"),
         (("drone",), {**DRONE, "preflight": {"winds": "warn"}}, "winds"),
         (("drone",), {**DRONE, "driver": "mavlink", "settings": {"url": "udp"}}, "udpin:HOST"),

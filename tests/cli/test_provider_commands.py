@@ -75,10 +75,11 @@ def test_the_fleet_is_a_table_or_json(aerodaas: Command) -> None:
 def test_missions_are_listed(aerodaas: Command, stub: Stub) -> None:
     """With phase and reason; control characters of another's name do not reach the terminal."""
     stub.state = mission(MissionPhase.QUEUED, name="odd\x1b[2Jname", reason="waits for its drones")
-    shown = aerodaas("missions").out
+    shown = aerodaas("missions", "list").out
     assert all(word in shown for word in (MISSION, "queued", "waits for its drones"))
     assert "\x1b[2J" not in shown
-    assert [one["id"] for one in json.loads(aerodaas("missions", "--json").out)] == [MISSION]
+    listed = json.loads(aerodaas("missions", "list", "--json").out)
+    assert [one["id"] for one in listed] == [MISSION]
 
 
 def test_an_application_is_submitted_watched_and_recorded(
@@ -108,7 +109,7 @@ def test_a_document_is_submitted_without_being_waited_for(
     (document,) = [json.loads(one)["document"] for one in stub.sent("POST", "/v1/missions")]
     (tmp_path / "mission.json").write_text(json.dumps(document))
     ended = aerodaas("submit", "mission.json", "--no-wait")
-    assert ended.out == f"{MISSION} is submitted; aerodaas watch {MISSION} follows it\n"
+    assert ended.out == f"{MISSION} is submitted; aerodaas missions watch {MISSION} follows it\n"
     first, second = (json.loads(one) for one in stub.sent("POST", "/v1/missions"))
     assert first["document"]["navigation"] == second["document"]["navigation"]
     assert stub.sent("DELETE", MISSION) == []
@@ -127,7 +128,7 @@ def test_what_is_code_needs_its_user(aerodaas: Command, stub: Stub, tmp_path: Pa
 def test_a_refused_mission_ends_with_one(aerodaas: Command, stub: Stub) -> None:
     """With the provider's reason, also where it is watched."""
     stub.state = mission(MissionPhase.REFUSED, reason="wp1 lies outside the fence")
-    for words in (["submit", "app.py", "--no-view", "--", "first"], ["watch", MISSION]):
+    for words in (["submit", "app.py", "--no-view", "--", "first"], ["missions", "watch", MISSION]):
         ended = aerodaas(*words)
         assert ended.code == 1
         assert "refused: wp1 lies outside the fence" in ended.said
@@ -136,16 +137,16 @@ def test_a_refused_mission_ends_with_one(aerodaas: Command, stub: Stub) -> None:
 def test_a_mission_is_watched_until_it_is_over(aerodaas: Command, stub: Stub) -> None:
     """One JSON object a line, for programs."""
     stub.state = mission(MissionPhase.LANDED)
-    lines = aerodaas("watch", MISSION, "--json").out.splitlines()
+    lines = aerodaas("missions", "watch", MISSION, "--json").out.splitlines()
     assert json.loads(lines[-1])["phase"] == "landed"
-    assert f"aerodaas fetch {MISSION}" in aerodaas("watch", MISSION).out
+    assert f"aerodaas missions fetch {MISSION}" in aerodaas("missions", "watch", MISSION).out
 
 
 def test_a_mission_is_cancelled(aerodaas: Command, stub: Stub) -> None:
     """In flight, its drones come home first."""
-    assert "come home" in aerodaas("cancel", MISSION).out
+    assert "come home" in aerodaas("missions", "cancel", MISSION).out
     stub.state = mission(MissionPhase.CANCELLED)
-    assert json.loads(aerodaas("cancel", MISSION, "--json").out)["phase"] == "cancelled"
+    assert json.loads(aerodaas("missions", "cancel", MISSION, "--json").out)["phase"] == "cancelled"
     assert len(stub.sent("DELETE", MISSION)) == 2
 
 
@@ -153,14 +154,14 @@ def test_a_recording_is_fetched_and_nothing_overwritten(
     aerodaas: Command, stub: Stub, tmp_path: Path
 ) -> None:
     """To the file that is named, or the mission's."""
-    assert aerodaas("fetch", MISSION).code == 0
+    assert aerodaas("missions", "fetch", MISSION).code == 0
     assert (tmp_path / f"{MISSION}.mcap").read_bytes() == b"recorded"
-    ended = aerodaas("fetch", MISSION)
+    ended = aerodaas("missions", "fetch", MISSION)
     assert (ended.code, "already exists" in ended.said) == (2, True)
-    ended = aerodaas("fetch", MISSION, "-o", "own.mcap", "--json")
+    ended = aerodaas("missions", "fetch", MISSION, "-o", "own.mcap", "--json")
     assert json.loads(ended.out) == {"mission": MISSION, "file": "own.mcap", "bytes": 8}
     stub.refusals["/v1/missions"] = (404, {"text": "it has no recording yet"})
-    ended = aerodaas("fetch", MISSION, "-o", "none.mcap")
+    ended = aerodaas("missions", "fetch", MISSION, "-o", "none.mcap")
     assert (ended.code, "no recording yet" in ended.said) == (2, True)
 
 
@@ -169,13 +170,13 @@ def test_a_recording_is_deleted_once_it_is_here(
 ) -> None:
     """And not where it could not be fetched or written."""
     (tmp_path / "there.mcap").write_bytes(b"another")
-    assert aerodaas("fetch", MISSION, "-o", "there.mcap", "--delete").code == 2
-    assert aerodaas("fetch", MISSION, "-o", "there.mcap/in.mcap", "--delete").code == 2
+    assert aerodaas("missions", "fetch", MISSION, "-o", "there.mcap", "--delete").code == 2
+    assert aerodaas("missions", "fetch", MISSION, "-o", "there.mcap/in.mcap", "--delete").code == 2
     stub.refusals["/v1/missions"] = (404, {"text": "it has no recording yet"})
-    assert aerodaas("fetch", MISSION, "--delete").code == 2
+    assert aerodaas("missions", "fetch", MISSION, "--delete").code == 2
     stub.refusals.clear()
     assert stub.sent("DELETE", "/recording") == []
-    assert aerodaas("fetch", MISSION, "--delete").code == 0
+    assert aerodaas("missions", "fetch", MISSION, "--delete").code == 0
     assert (tmp_path / f"{MISSION}.mcap").read_bytes() == b"recorded"
     assert stub.sent("DELETE", "/recording") == [b""]
 
@@ -210,7 +211,7 @@ def test_a_login_is_tried_and_stored(
         (["submit", "none.py"], "there is no application none.py"),
         (["submit", "app.py", "--silence", "wait", "--", "x"], "continue or return, not 'wait'"),
         (["submit", "app.py", "--minutes", "0"], "--minutes"),
-        (["watch"], "Missing argument"),
+        (["missions", "watch"], "Missing argument"),
     ],
 )
 def test_bad_words_are_usage_errors(aerodaas: Command, words: list[str], said: str) -> None:
@@ -221,8 +222,8 @@ def test_bad_words_are_usage_errors(aerodaas: Command, words: list[str], said: s
 
 
 @pytest.mark.parametrize(
-    "name", ["login", "fleet", "submit", "missions", "watch", "cancel", "fetch"]
+    "name", ["login", "fleet", "submit", "missions watch", "missions cancel", "missions fetch"]
 )
 def test_each_command_teaches_by_an_example(aerodaas: Command, name: str) -> None:
     """Its help shows itself in use."""
-    assert f"aerodaas {name} " in " ".join(aerodaas(name, "--help").out.split())
+    assert f"aerodaas {name} " in " ".join(aerodaas(*name.split(), "--help").out.split())

@@ -46,7 +46,7 @@ def test_search_and_rescue_is_drawn(
 ) -> None:
     """Sensors, analyses where they run, streams, a trigger, waypoints; printed or in a file."""
     for words in (["search_and_rescue"], ["search_and_rescue", "-o", str(tmp_path / "a.mmd")]):
-        monkeypatch.setattr(sys, "argv", ["aerodaas", "graph", *words])
+        monkeypatch.setattr(sys, "argv", ["aerodaas", "compile", "--graph", *words])
         with pytest.raises(SystemExit) as ended:
             main()
         assert not ended.value.code

@@ -52,7 +52,7 @@ drone.on_start(lambda: mark("on_start"))
 drone.on_end(lambda: mark("on_end"))
 drone.get_sensor_by_id("odom").subscribe(lambda item: mark("callback"))
 """
-COMMANDS = {"check": ["--no-connect"], "graph": [], "compile": ["-o", "mission.json"]}
+COMMANDS = {"check": ["--no-connect"], "compile": ["-o", "mission.json"], "compile --graph": []}
 
 
 def built(
@@ -64,7 +64,7 @@ def built(
     )
     Path("app.py").write_text(APPLICATION.format(hooks=hooks, start=start))
     Path("marks").write_text("")
-    monkeypatch.setattr(sys, "argv", ["aerodaas", command, "app.py", *COMMANDS[command]])
+    monkeypatch.setattr(sys, "argv", ["aerodaas", *command.split(), "app.py", *COMMANDS[command]])
     monkeypatch.setattr(sys, "path", list(sys.path))
     with pytest.raises(SystemExit) as ended:
         main()
@@ -85,7 +85,9 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "env.launch()",
     ],
 )
-@pytest.mark.parametrize(("command", "opens"), [("check", ["open", "close"]), ("graph", [])])
+@pytest.mark.parametrize(
+    ("command", "opens"), [("check", ["open", "close"]), ("compile --graph", [])]
+)
 def test_what_belongs_to_the_flight_does_not_run(
     monkeypatch: pytest.MonkeyPatch, command: str, opens: list[str], start: str
 ) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,11 +15,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.flying.application import build_application
-from aerodaas.cli.flying.preflight import settled_items
+from aerodaas.cli.flying.preflight import settled_items, show_health
 from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.errors import AeroDaaSError, GraphError, SourceError, VehicleError, failure_line
+from aerodaas.errors import (
+    AeroDaaSError,
+    ConfigError,
+    GraphError,
+    SourceError,
+    VehicleError,
+    failure_line,
+)
 from aerodaas.findings import Finding
 
 if TYPE_CHECKING:
@@ -52,6 +61,11 @@ def check(
             help="Connect to vehicles and cameras; they do not move, and nothing is set there.",
         ),
     ] = True,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ID", help="Print this robot's health before take-off, as one list."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,  # noqa: FBT002
 ) -> None:
     """Try everything that a flight needs, without flying.
 
@@ -59,7 +73,13 @@ def check(
     The exit code is 1 if something is to be mended. Words after `--` are the application's own.
     Of an environment file alone, all vehicles and cameras are asked.
 
+    With `--robot`, each item of one robot's health has its value, what it should be, what that
+    means, and a remedy. The robot's section `preflight` in the environment file says what refuses a
+    take-off and what only warns. What the vehicle does not tell is unknown, never good. The exit
+    code is 1 if a take-off would be refused.
+
         aerodaas check environment.json
+        aerodaas check environment.json --robot drone --json
         aerodaas check my_app.py
         aerodaas check my_app.py --set drone.driver=mavlink --set drone.url=udpin:127.0.0.1:14540
     """
@@ -74,13 +94,25 @@ def check(
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=False,
     )
-    if _is_environment(application):
+    alone = _is_environment(application)
+    if alone:
         current_options.set(options)
         environment = Environment(application.resolve())
-        findings = _environment_alone(environment, connect=connect)
     else:
         environment = build_application(application, context.args, options)
-        findings = examine_application(environment, application.stem, connect=connect)
+    if robot is not None:
+        if environment.provider is not None:
+            raise ConfigError(f"{robot} is a provider's: `aerodaas fleet` tells its health")
+        raise typer.Exit(0 if show_health(robot, environment.config, as_json=as_json) else 1)
+    findings = (
+        _environment_alone(environment, connect=connect)
+        if alone
+        else examine_application(environment, application.stem, connect=connect)
+    )
+    if as_json:
+        told = list(findings)
+        typer.echo(json.dumps([asdict(one) for one in told]))
+        raise typer.Exit(0 if all(one.ok for one in told) else 1)
     raise typer.Exit(0 if show_findings(f"aerodaas check {application.name}", findings) else 1)
 
 

@@ -1,4 +1,4 @@
-"""`aerodaas compile`, `graph` and `schema`: an application as data or drawn, and JSON schema."""
+"""`aerodaas compile` and `schema`: an application as data or drawn, and JSON schema."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
 from aerodaas.errors import ConfigError
 
-__all__ = ["compile_document", "graph", "schema"]
+__all__ = ["compile_document", "schema"]
 
 
 def compile_document(
@@ -22,24 +22,32 @@ def compile_document(
         Path, typer.Argument(help="The application: a Python file; or a recording.")
     ],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The document's file; default: printed.")
+        Path | None, typer.Option("--output", "-o", help="The file; default: printed.")
     ] = None,
     env: OtherEnvironment = None,
+    graph: Annotated[  # noqa: FBT002
+        bool, typer.Option("--graph", help="Draw the graph as a Mermaid flowchart instead.")
+    ] = False,
 ) -> None:
-    """Write an application as a mission document: data, which others fly without running code.
+    """Write an application as a mission document that others fly without its code, or draw it.
 
     The file runs up to `start_mission()`. Words after `--` are the application's own. Of a
-    recording, it is the document that was flown.
+    recording, it is the document that was flown. Sites that show Markdown draw a flowchart, such as
+    GitHub's; so does https://mermaid.live.
 
         aerodaas compile my_app.py -o my_app.json
         aerodaas run my_app.json
         aerodaas compile flight.mcap | diff my_app.json -
+        aerodaas compile my_app.py --graph -o graph.mmd
     """
     from aerodaas.environment.document.flying import (  # noqa: PLC0415
         compile_application,
         recorded_document,
     )
 
+    if graph:
+        _put(_drawing(application, context.args, env), output)
+        return
     if application.suffix == ".mcap":
         document = recorded_document(application)
     else:
@@ -47,26 +55,13 @@ def compile_document(
     _put(document.text(), output)
 
 
-def graph(
-    context: typer.Context,
-    application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="A file; default: printed.")
-    ] = None,
-    env: OtherEnvironment = None,
-) -> None:
-    """Draw an application's graph as a Mermaid flowchart; nothing flies.
-
-    Sites that show Markdown draw it, such as GitHub's; so does https://mermaid.live.
-
-        aerodaas graph farm_survey
-        aerodaas graph my_app.py -o graph.mmd
-    """
+def _drawing(application: Path, words: list[str], env: Path | None) -> str:
+    """Flowchart of the application's graph."""
     from aerodaas.dataflow.drawing import mermaid  # noqa: PLC0415 - slow to load
 
     application = find_application(application)
     options = RunOptions(application=application.resolve(), environment=env, view=False)
-    _put(mermaid(build_application(application, context.args, options).graph), output)
+    return mermaid(build_application(application, words, options).graph)
 
 
 def schema() -> None:

@@ -1,57 +1,47 @@
-"""`aerodaas preflight`: the health of one robot's vehicle before take-off, as one list."""
+"""`aerodaas check --robot`: the health of one robot's vehicle before take-off, as one list."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.errors import UnknownIdError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from aerodaas.config.model import RobotConfig
+    from aerodaas.config.model import EnvironmentConfig, RobotConfig
     from aerodaas.messages.health import HealthItem
     from aerodaas.messages.vehicle import Vehicle
 
-__all__ = ["connected_robot", "preflight", "settled_items"]
+__all__ = ["connected_robot", "settled_items", "show_health"]
 
 _CONNECTING = 10.0
 """Wall seconds for a vehicle to answer."""
 
 
 @contextmanager
-def connected_robot(
-    name: str, file: Path, settings: Iterable[str]
-) -> Iterator[tuple[Vehicle, RobotConfig]]:
-    """Connect the robot `name` of an environment file for the length of a `with`, to look at it.
+def connected_robot(name: str, config: EnvironmentConfig) -> Iterator[tuple[Vehicle, RobotConfig]]:
+    """Connect the robot `name` of an environment for the length of a `with`, to look at it.
 
     Nothing is changed at the vehicle, whatever a flight would set there, and no video is asked for.
 
     Args:
         name: Its id.
-        file: The environment file.
-        settings: `id.setting=value`, laid over the file.
+        config: The environment.
 
     Raises:
-        ConfigError: For a file or a setting that is wrong.
-        UnknownIdError: If the file has no such robot.
+        UnknownIdError: If the environment has no such robot.
         VehicleError: If the vehicle does not answer.
     """
-    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - slow to load
-    from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - as above
-    from aerodaas.environment.environment import Environment  # noqa: PLC0415 - as above
+    from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - slow to load
 
-    overrides = dict(parse_setting(text) for text in settings)
-    config = Environment(file.resolve(), overrides=overrides).config
     robots = {one.id: one for one in config.robots}
     if name not in robots:
         raise UnknownIdError("robot", name, list(robots))
@@ -72,33 +62,29 @@ _MARKS = {
 }
 
 
-def preflight(
-    robot: Annotated[str, typer.Argument(help="Id of the robot.")],
-    env: EnvironmentFile = ENVIRONMENT,
-    setting: Overrides = None,
-    as_json: Annotated[  # noqa: FBT002
-        bool, typer.Option("--json", help="Print the list as JSON.")
-    ] = False,
-) -> None:
+def show_health(name: str, config: EnvironmentConfig, *, as_json: bool) -> bool:
     """Print a robot's health before take-off as one list; nothing moves, and nothing is set there.
 
-    Each item has its value, what it should be, what that means, and a remedy. The section
-    `preflight` of the robot in the environment file says what refuses a take-off and what only
-    warns. What the vehicle does not tell is unknown, never good. The exit code is 1 if a take-off
-    would be refused.
+    Args:
+        name: Id of the robot.
+        config: Its environment.
+        as_json: Whether it is printed for programs.
 
-        aerodaas preflight drone
-        aerodaas preflight drone --env campus.json --json
-        aerodaas preflight drone --set drone.preflight.wind=require
+    Returns:
+        False if a take-off would be refused.
+
+    Raises:
+        UnknownIdError: If the environment has no such robot.
+        VehicleError: If the vehicle does not answer.
     """
-    with connected_robot(robot, env, setting or ()) as (vehicle, config):
-        items = settled_items(vehicle, config)
-    refused = any(one.verdict.value == "refused" for one in items)
+    with connected_robot(name, config) as (vehicle, robot):
+        items = settled_items(vehicle, robot)
+    ready = all(one.verdict.value != "refused" for one in items)
     if as_json:
-        typer.echo(json.dumps({"robot": robot, "ready": not refused, "items": _rows(items)}))
+        typer.echo(json.dumps({"robot": name, "ready": ready, "items": _rows(items)}))
     else:
-        _show(robot, items)
-    raise typer.Exit(1 if refused else 0)
+        _show(name, items)
+    return ready
 
 
 def settled_items(vehicle: Vehicle, robot: RobotConfig) -> list[HealthItem]:
@@ -127,9 +113,7 @@ def _show(name: str, items: Sequence[HealthItem]) -> None:
     from rich.table import Table  # noqa: PLC0415 - as above
     from rich.text import Text  # noqa: PLC0415 - as above
 
-    table = Table(
-        title=f"aerodaas preflight {name}", title_justify="left", box=None, pad_edge=False
-    )
+    table = Table(title=f"{name} before take-off", title_justify="left", box=None, pad_edge=False)
     for column in ("item", "value", "should be", "", "remedy"):
         table.add_column(column, overflow="fold")
     for one in items:

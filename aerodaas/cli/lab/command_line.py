@@ -9,14 +9,20 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.cli.deferred import deferred_group
 from aerodaas.cli.failure import failure_of, show_failure
-from aerodaas.cli.options import ExampleGroup
+from aerodaas.config.extensions import Command, extensions
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["app"]
 
+
+def _of_extensions() -> tuple[Command, ...]:
+    return tuple(one for extension in extensions().values() for one in extension.lab)
+
+
 app = typer.Typer(
-    cls=ExampleGroup,
+    cls=deferred_group(_of_extensions),
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="""Compare analytics schedulers in simulation: thousands of drone-minutes in seconds.

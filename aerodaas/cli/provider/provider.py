@@ -1,4 +1,4 @@
-"""Commands at a provider's service: its fleet, missions on it, and leases."""
+"""Commands at a provider's service: login, its fleet, and the submission of a mission."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import typer
 from aerodaas.cli.flying.application import run_application, submit_application
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
-from aerodaas.errors import ConfigError, MissionError
+from aerodaas.errors import ConfigError
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -25,18 +25,13 @@ if TYPE_CHECKING:
 __all__ = [
     "At",
     "Json",
-    "cancel",
     "client_at",
-    "fetch",
     "fleet",
-    "grant",
     "login",
-    "missions",
     "moment",
     "print_json",
     "print_table",
     "submit",
-    "watch",
 ]
 
 _WIDE = 1000
@@ -96,10 +91,8 @@ def print_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]])
     Console(highlight=False, width=width).print(table)
 
 
-_LOOK_SECONDS = 0.5
 _READY = {"good": "ready", "warning": "warned", "refused": "refused"}
 """What the list before take-off says, by the gravest of its items."""
-MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
 
 
 def login(
@@ -263,146 +256,7 @@ def submit(
     if as_json:
         print_json(mission)
     else:
-        typer.echo(f"{mission.id} is submitted; aerodaas watch {mission.id} follows it")
-
-
-def missions(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """List the missions that you may see, newest first.
-
-    aerodaas missions
-    aerodaas missions --json | jq -r '.[] | select(.phase == "flying") | .id'
-    """
-    found = client_at(at).missions()
-    if as_json:
-        print_json(found)
-        return
-    rows = [
-        (
-            one.id,
-            one.name,
-            one.phase.value.replace("_", " "),
-            ", ".join(one.robots),
-            one.account,
-            moment(one.submitted),
-            one.reason,
-        )
-        for one in found
-    ]
-    print_table("missions", ("id", "name", "phase", "robots", "of", "submitted", "reason"), rows)
-
-
-def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """Watch a mission until it is over; Ctrl-C leaves it as it is.
-
-    Ends with 1 if the mission was refused, cancelled or failed.
-
-        aerodaas watch 3f1a6c0d9b2e
-        aerodaas watch 3f1a6c0d9b2e --json | jq -c .status
-    """
-    from aerodaas.environment.provider.follower import MissionFollower  # noqa: PLC0415 - slow
-    from aerodaas.terminal.provided import ProvidedView  # noqa: PLC0415 - slow to load
-
-    client = client_at(at)
-    found = client.mission(mission)
-    with ProvidedView(shown=not as_json) as view:
-        follower = MissionFollower(client, found, view.show_message)
-        follower.start()
-        seen = -1
-        while True:
-            if not as_json:
-                # Again without a change: it shows how old that is.
-                view.update(found)
-            elif seen < follower.changes:
-                typer.echo(found.model_dump_json())
-            seen = follower.changes
-            if found.phase.over:
-                break
-            found = follower.await_change(seen, _LOOK_SECONDS)
-    if found.phase.value != "landed":
-        raise MissionError(f"mission {found.id} {found.phase.value}: {found.reason}")
-    if not as_json:
-        typer.echo(f"landed; aerodaas fetch {found.id} brings the recording")
-
-
-def grant(
-    mission: MissionId,
-    tenant: Annotated[str, typer.Argument(help="Who may attach missions that sense only.")],
-    sensors: Annotated[
-        list[str] | None, typer.Argument(metavar="[SENSOR]…", help="Cameras. Default: all.")
-    ] = None,
-    withdraw: Annotated[  # noqa: FBT002
-        bool, typer.Option("--withdraw", help="Withdraw it: what is attached ends.")
-    ] = False,
-    at: At = None,
-    as_json: Json = False,  # noqa: FBT002
-) -> None:
-    """Share the cameras of your mission in flight with another tenant's applications.
-
-    aerodaas grant 3f1a6c0d9b2e city one/cam
-    aerodaas grant 3f1a6c0d9b2e city --withdraw
-    """
-    client = client_at(at)
-    if withdraw:
-        found = client.withdraw(mission, tenant)
-    else:
-        found = client.grant(mission, tenant, sensors or ())
-    if as_json:
-        print_json(found)
-        return
-    granted = [f"{name} ({', '.join(one) or 'all cameras'})" for name, one in found.grants.items()]
-    typer.echo(f"{found.id} shares its cameras with {'; '.join(granted) or 'nobody'}")
-
-
-def cancel(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """Cancel a mission; drones in flight come home and land.
-
-    aerodaas cancel 3f1a6c0d9b2e
-    """
-    found = client_at(at).cancel(mission)
-    if as_json:
-        print_json(found)
-    elif found.phase.over:
-        typer.echo(f"{found.id} is cancelled")
-    else:
-        typer.echo(f"{found.id}: the drones come home; aerodaas watch {found.id} follows them")
-
-
-def fetch(
-    mission: MissionId,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="The file. Default: MISSION.mcap."),
-    ] = None,
-    delete: Annotated[  # noqa: FBT002
-        bool, typer.Option("--delete", help="Remove it at the provider once it is here.")
-    ] = False,
-    at: At = None,
-    as_json: Json = False,  # noqa: FBT002
-) -> None:
-    """Fetch the recording of a mission that is over.
-
-    aerodaas fetch 3f1a6c0d9b2e -o flight.mcap
-    aerodaas fetch 3f1a6c0d9b2e --delete
-    aerodaas report flight.mcap
-    """
-    from aerodaas.terminal.provided import download_view  # noqa: PLC0415 - slow to load
-
-    client = client_at(at)
-    target = output or Path(f"{Path(mission).name}.mcap")
-    if target.exists():
-        raise ConfigError(f"{target} already exists and is not overwritten; name another file")
-    try:
-        with download_view(shown=not as_json, what=target.name) as progress:
-            client.recording(mission, target, progress)
-    except OSError as error:
-        raise ConfigError(f"cannot write {target}: {error.strerror}") from None
-    if delete:
-        client.delete_recording(mission)
-    size = target.stat().st_size
-    if as_json:
-        typer.echo(json.dumps({"mission": mission, "file": str(target), "bytes": size}))
-    else:
-        typer.echo(f"{target}: {size / 1e6:.1f} MB")
+        typer.echo(f"{mission.id} is submitted; aerodaas missions watch {mission.id} follows it")
 
 
 def _missing_token() -> str:

@@ -1,4 +1,4 @@
-"""`aerodaas report`, `compare` and `view`: what a recording shows."""
+"""`aerodaas report` and `view`: what a recording shows."""
 
 from __future__ import annotations
 
@@ -11,42 +11,42 @@ import typer
 
 from aerodaas.text.printable import printable
 
-__all__ = ["compare", "report", "view"]
+__all__ = ["report", "view"]
 
 Recorded = Annotated[Path, typer.Argument(help="The .mcap file of a run.", show_default=False)]
 
 
 def report(
     recording: Recorded,
+    other: Annotated[
+        Path | None, typer.Argument(help="Another one, set beside it.", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the report. Default: the recording's own.")
     ] = None,
 ) -> None:
     """Write a recording's report: one HTML page, its plots as PNG, and the figures as JSON.
 
-    aerodaas report runs/farm_survey-20260101-120000/flight.mcap
+    Of two recordings, one page `compare.html` sets them side by side.
+
+        aerodaas report runs/farm_survey-20260101-120000/flight.mcap
+        aerodaas report dems/flight.mcap edf/flight.mcap --out .
     """
+    folder = out or recording.parent
+    if other is not None:
+        from aerodaas.recording.report.comparison import (  # noqa: PLC0415 - as below
+            write_comparison,
+        )
+
+        typer.echo(write_comparison(recording, other, folder / "compare.html"))
+        return
     from aerodaas.recording.report.report import (  # noqa: PLC0415 - matplotlib is slow to load
         write_report,
     )
 
-    files = write_report(recording, out or recording.parent)
+    files = write_report(recording, folder)
     lines = [str(files.summary), *(f"  {section.text}" for section in files.sections)]
     typer.echo(printable("\n".join(lines)) + f"\n{files.page}")
-
-
-def compare(
-    first: Recorded,
-    second: Recorded,
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
-) -> None:
-    """Set two recordings side by side in one HTML page.
-
-    aerodaas compare runs/a/flight.mcap runs/b/flight.mcap --out a-b.html
-    """
-    from aerodaas.recording.report.comparison import write_comparison  # noqa: PLC0415 - as above
-
-    typer.echo(write_comparison(first, second, out))
 
 
 def view(

@@ -68,7 +68,7 @@ class MavlinkSettings(BaseModel):
     """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
     variable AERODAAS_MAVLINK_KEY takes its place."""
     observe: bool = False
-    """Connect only to look, as `aerodaas preflight` does, and a service between missions: nothing
+    """Connect only to look, as `aerodaas check` does, and a service between missions: nothing
     is set at the vehicle, whatever `failsafes`, `fallback` and `fence` say, and it cannot be flown.
     Judged is what a flight by these settings would meet."""
     max_speed: Positive = 10.0

@@ -310,7 +310,7 @@ class ProvidedRun:
         self._close()
         mission = self._following.mission
         if not mission.phase.over:
-            self._say(f"the mission goes on at the provider: aerodaas watch {mission.id}")
+            self._say(f"the mission goes on at the provider: aerodaas missions watch {mission.id}")
             return
         flown = time.monotonic() - self._flying_since
         here = self._fetch(mission)
@@ -334,7 +334,7 @@ class ProvidedRun:
             with download_view(shown=self.options.view, what="recording") as progress:
                 self._client.recording(mission.id, path, progress)
         except (AeroDaaSError, OSError) as error:
-            remedy = f"aerodaas fetch {mission.id} -o {path}"
+            remedy = f"aerodaas missions fetch {mission.id} -o {path}"
             self._say(f"the recording could not be fetched: {error}; {remedy}")
             return False
         return True

@@ -45,7 +45,7 @@ def submit(
         return client.submit(_order(document, options))
     except UnreachableError as error:
         raise UnreachableError(
-            f"{error}; the mission may have been taken in all the same: `aerodaas missions` tells"
+            f"{error}; the mission may have arrived all the same: `aerodaas missions list` tells"
         ) from None
 
 

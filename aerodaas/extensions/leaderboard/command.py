@@ -1,4 +1,4 @@
-"""The work of `aerodaas leaderboard`: simulations, a table, and the files."""
+"""The work of `aerodaas lab leaderboard`: simulations, a table, and the files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`aerodaas leaderboard`: its options."""
+"""`aerodaas lab leaderboard`: its options."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def leaderboard(
     95 % intervals and a test against the first. Writes a page, `leaderboard.html`, and the same
     as Markdown, CSV and JSON.
 
-        aerodaas leaderboard
-        aerodaas leaderboard -s mine.py:Mine -o board
-        aerodaas leaderboard -s dems,margin,mine.py:Mine --only --full
+        aerodaas lab leaderboard
+        aerodaas lab leaderboard -s mine.py:Mine -o board
+        aerodaas lab leaderboard -s dems,margin,mine.py:Mine --only --full
     """
     from aerodaas.extensions.leaderboard.command import leaderboard as rank  # noqa: PLC0415 - slow to load
 

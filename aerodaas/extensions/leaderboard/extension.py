@@ -5,7 +5,7 @@ from aerodaas.config.extensions import Command, Extension
 EXTENSION = Extension(
     name="leaderboard",
     summary="Analytics schedulers ranked on one fixed set of cases.",
-    commands=(
+    lab=(
         Command(
             "leaderboard",
             "aerodaas.extensions.leaderboard.command_line:leaderboard",

@@ -60,7 +60,7 @@ class TelloSettings(BaseModel):
     battery_minimum: Fraction = 0.2
     """Charge below which we do not take off; the Tello itself refuses at about 0.1."""
     observe: bool = False
-    """Connect only to look, as `aerodaas preflight` does, and a service between missions: it cannot
+    """Connect only to look, as `aerodaas check` does, and a service between missions: it cannot
     be flown, and is not landed when it is let go of in the air."""
 
 

@@ -281,7 +281,7 @@ def _within_days(clock: ClockLine, log: VehicleLog) -> ClockLine:
     return replace(clock, offset=clock.offset + rounds * _ROUND)
 
 
-_REMEDY = "give the one of this flight (aerodaas logs ROBOT lists them with their times)"
+_REMEDY = "give the one of this flight (aerodaas logs list ROBOT lists them with their times)"
 
 
 def _spans(starts: Iterable[Floats]) -> str:

@@ -1,9 +1,10 @@
-"""`aerodaas logs` and `attach`: the logs that a vehicle keeps itself."""
+"""`aerodaas logs`: the logs that a vehicle keeps itself."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import datetime, timezone
 from pathlib import Path
@@ -12,25 +13,53 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.flying.preflight import connected_robot
-from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
-from aerodaas.errors import VehicleError
+from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, ExampleGroup, Overrides
+from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.extensions.vehicle_logs.log_service import LogEntry, LogService
-    from aerodaas.messages.vehicle import Vehicle
 
-__all__ = ["attach", "logs"]
+__all__ = ["app"]
+
+Robot = Annotated[str, typer.Argument(help="Id of the robot.")]
+
+app = typer.Typer(
+    cls=ExampleGroup,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="""List, fetch and attach the logs that a robot's autopilot keeps.
+
+    aerodaas logs list drone
+    aerodaas logs fetch drone --latest --to runs/logs
+    aerodaas logs attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
+""",
+)
 
 
-def logs(
-    robot: Annotated[str, typer.Argument(help="Id of the robot.")],
-    numbers: Annotated[
-        list[int] | None, typer.Argument(help="Logs to fetch; none lists them.")
-    ] = None,
-    latest: Annotated[  # noqa: FBT002
-        bool, typer.Option("--latest", help="Fetch the newest one.")
-    ] = False,
+@app.command("list")
+def list_logs(
+    robot: Robot,
+    env: EnvironmentFile = ENVIRONMENT,
+    setting: Overrides = None,
+    as_json: Annotated[bool, typer.Option("--json", help="For programs.")] = False,  # noqa: FBT002
+) -> None:
+    """List the logs that a robot's autopilot keeps, with number, time and size.
+
+    On the ground only. No parameter and no plan of the vehicle is changed, whatever a flight sets.
+
+    aerodaas logs list drone
+    aerodaas logs list drone --env campus.json --json
+    """
+    with _log_service(robot, env, setting) as service:
+        _show(robot, service.logs(), as_json=as_json)
+
+
+@app.command()
+def fetch(
+    robot: Robot,
+    numbers: Annotated[list[int] | None, typer.Argument(help="Logs, as `list` tells them.")] = None,
+    latest: Annotated[bool, typer.Option("--latest", help="The newest one.")] = False,  # noqa: FBT002
     attach: Annotated[
         Path | None,
         typer.Option(
@@ -42,18 +71,15 @@ def logs(
     to: Annotated[Path, typer.Option(help="The folder for what is fetched.")] = Path(),
     env: EnvironmentFile = ENVIRONMENT,
     setting: Overrides = None,
-    as_json: Annotated[  # noqa: FBT002
-        bool, typer.Option("--json", help="Print the list, or the files, as JSON.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the files as JSON.")] = False,  # noqa: FBT002
 ) -> None:
-    """List the logs that a robot's autopilot keeps, or fetch some of them into a folder.
+    """Fetch logs of a robot's autopilot into a folder.
 
     On the ground only. No parameter and no plan of the vehicle is changed, whatever a flight sets.
 
-    aerodaas logs drone
-    aerodaas logs drone --latest --to runs/logs
-    aerodaas logs drone 3 4 --env campus.json
-    aerodaas logs drone --attach runs/survey-20260101-120000/flight.mcap
+    aerodaas logs fetch drone --latest --to runs/logs
+    aerodaas logs fetch drone 3 4 --env campus.json
+    aerodaas logs fetch drone --attach runs/survey-20260101-120000/flight.mcap
     """
     from aerodaas.extensions.vehicle_logs.attachment import (  # noqa: PLC0415 - slow to load
         attach_log,
@@ -62,18 +88,16 @@ def logs(
 
     # Before anything is fetched: the recording may be none.
     flown = None if attach is None else flight_of(attach, robot)
-    with connected_robot(robot, env, setting or ()) as (vehicle, _):
-        service = _log_service(vehicle, robot)
+    if not numbers and not latest and flown is None:
+        raise ConfigError("name the logs by their numbers, or give --latest or --attach RECORDING")
+    with _log_service(robot, env, setting) as service:
         found = service.logs()
         if numbers:
             chosen = _chosen(found, numbers)
-        elif latest:
+        elif latest or flown is None:
             chosen = _chosen(found, [max((one.number for one in found), default=0)])
-        elif flown is not None:
-            chosen = [_written_then(found, flown)]
         else:
-            _show(robot, found, as_json=as_json)
-            return
+            chosen = [_written_then(found, flown)]
         files = [_fetch(service, one, to, quiet=as_json) for one in chosen]
     if as_json:
         typer.echo(json.dumps([str(file) for file in files]))
@@ -84,6 +108,7 @@ def logs(
                 typer.echo(printable(str(attached)))
 
 
+@app.command()
 def attach(
     recording: Annotated[
         Path, typer.Argument(help="The .mcap file of the run.", show_default=False)
@@ -99,10 +124,10 @@ def attach(
 ) -> None:
     """Attach an autopilot's own log to the recording of its flight, its clock laid over.
 
-    `aerodaas report` draws its main topics then. `aerodaas logs ROBOT --attach RECORDING` fetches
-    the log from the vehicle first.
+    `aerodaas report` draws its main topics then. `aerodaas logs fetch ROBOT --attach RECORDING`
+    fetches the log from the vehicle first.
 
-    aerodaas attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
+    aerodaas logs attach runs/survey-20260101-120000/flight.mcap 00000012.BIN
     """
     from aerodaas.extensions.vehicle_logs.attachment import (  # noqa: PLC0415 - slow to load
         attach_log,
@@ -125,19 +150,23 @@ def _written_then(found: Sequence[LogEntry], flown: tuple[float, float]) -> LogE
     return chosen
 
 
-def _log_service(vehicle: Vehicle, robot: str) -> LogService:
-    """Log service of a robot's vehicle; VehicleError if its driver has none."""
-    from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415 - slow to load
-    from aerodaas.extensions.vehicle_logs.log_service import (  # noqa: PLC0415 - as above
-        LogService,
-    )
+@contextmanager
+def _log_service(name: str, file: Path, settings: Iterable[str] | None) -> Iterator[LogService]:
+    """Log service of a connected robot's vehicle; VehicleError if its driver has none."""
+    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - slow to load
+    from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle  # noqa: PLC0415 - as above
+    from aerodaas.environment.environment import Environment  # noqa: PLC0415 - as above
+    from aerodaas.extensions.vehicle_logs.log_service import LogService  # noqa: PLC0415 - as above
     from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs  # noqa: PLC0415 - as above
 
-    service = MavlinkLogs(vehicle) if isinstance(vehicle, MavlinkVehicle) else vehicle
-    if not isinstance(service, LogService):
-        driver = vehicle.capabilities.driver
-        raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")
-    return service
+    overrides = dict(parse_setting(text) for text in settings or ())
+    config = Environment(file.resolve(), overrides=overrides).config
+    with connected_robot(name, config) as (vehicle, _):
+        service = MavlinkLogs(vehicle) if isinstance(vehicle, MavlinkVehicle) else vehicle
+        if not isinstance(service, LogService):
+            driver = vehicle.capabilities.driver
+            raise VehicleError(f"{name}: no logs can be fetched by the driver {driver}")
+        yield service
 
 
 def _chosen(found: Sequence[LogEntry], numbers: Sequence[int]) -> list[LogEntry]:

@@ -8,13 +8,8 @@ EXTENSION = Extension(
     commands=(
         Command(
             "logs",
-            "aerodaas.extensions.vehicle_logs.commands:logs",
-            "List the logs that a robot's autopilot keeps, or fetch some of them into a folder.",
-        ),
-        Command(
-            "attach",
-            "aerodaas.extensions.vehicle_logs.commands:attach",
-            "Attach an autopilot's own log to the recording of its flight, its clock laid over.",
+            "aerodaas.extensions.vehicle_logs.commands:app",
+            "List, fetch and attach the logs that a robot's autopilot keeps.",
         ),
     ),
     report_sections=("aerodaas.extensions.vehicle_logs.report:log_sections",),

@@ -91,7 +91,7 @@ class Quotas:
             raise RefusedError(
                 403,
                 f"the recordings of {tenant} fill its storage: fetch some, and "
-                "delete them here (`aerodaas fetch MISSION --delete`)",
+                "delete them here (`aerodaas missions fetch MISSION --delete`)",
             )
         if cloud and left.cloud_calls <= 0:
             raise RefusedError(

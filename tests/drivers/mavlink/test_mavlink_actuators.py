@@ -178,7 +178,7 @@ def test_no_position_fires_a_parachute(ends: Stepped, position: str) -> None:
 
 
 def test_who_only_observes_moves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As between missions, and by `aerodaas preflight`."""
+    """As between missions, and by `aerodaas check`."""
     options = AutopilotOptions(actuators=True)
     with Stepped(monkeypatch, options, CARRIED, observe=True) as ends:
         with pytest.raises(VehicleError, match="observe"):

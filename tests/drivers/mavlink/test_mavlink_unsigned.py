@@ -102,7 +102,9 @@ def test_preflight_says_so(
         )
         (tmp_path / "environment.json").write_text(json.dumps(content))
         monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["aerodaas", "preflight", "drone"])
+        monkeypatch.setattr(
+            sys, "argv", ["aerodaas", "check", "environment.json", "--robot", "drone"]
+        )
         with pytest.raises(SystemExit) as ended:
             main()
     told = " ".join(capsys.readouterr().err.split())

@@ -380,7 +380,7 @@ def test_a_recording_that_cannot_be_fetched_is_no_failed_mission(
     environment.wait()
     said = capsys.readouterr().err
     assert "the scope is missing" in said
-    assert f"aerodaas fetch {MISSION}" in said
+    assert f"aerodaas missions fetch {MISSION}" in said
 
 
 def test_an_environment_flies_again_after_a_mission(stub: Stub, tmp_path: Path) -> None:

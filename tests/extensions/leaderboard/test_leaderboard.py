@@ -170,7 +170,7 @@ def test_what_cannot_be_is_told_before_the_simulations(tmp_path: Path) -> None:
         (("-s", "nope", "--only"), "no analytics scheduler is called 'nope'"),
         (("-s", "edf", "--only", "-o", str(tmp_path / "file")), "cannot write into"),
     ):
-        outcome = CliRunner().invoke(app, ["leaderboard", *words], env={"COLUMNS": "200"})
+        outcome = CliRunner().invoke(app, ["lab", "leaderboard", *words], env={"COLUMNS": "200"})
         assert isinstance(outcome.exception, AeroDaaSError)
         assert outcome.exception.exit_code == 2
         assert told in str(outcome.exception)

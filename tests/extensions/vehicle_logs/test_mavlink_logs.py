@@ -186,17 +186,18 @@ def test_on_the_command_line(
     with ends.unconnected():
         autopilot = ends.autopilot
         autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
-        code, told = run("drone")
+        code, told = run("list", "drone")
         assert code == 0, told
         assert "2027-01-15 08:00:00 UTC" in told
         assert "last written" in told
-        code, told = run("drone", "--latest", "--to", "got", "--json")
+        code, told = run("fetch", "drone", "--latest", "--to", "got", "--json")
         (file,) = json.loads(told)
         assert (code, Path(file).read_bytes()) == (0, DATAFLASH)
-        code, told = run("drone", "7")
+        assert run("fetch", "drone")[0] == 2
+        code, told = run("fetch", "drone", "7")
         assert code != 0
         assert "has no log 7; it has 1, 2" in told
-    code, told = run("other")
+    code, told = run("list", "other")
     assert code != 0
     assert "no logs can be fetched by the driver simulated" in told
 
@@ -222,18 +223,18 @@ def test_the_log_of_a_recorded_flight_is_attached(
         store.logs = {1: other, 2: own, 3: other}
         # Of a flight of 12 seconds: they are when a log was last written.
         store.times = {1: EPOCH - 600, 2: EPOCH + 9, 3: EPOCH + 600}
-        code, told = run("drone", "1", "--attach", "flight.mcap")
+        code, told = run("fetch", "drone", "1", "--attach", "flight.mcap")
         assert code != 0
         assert "is of another flight" in told
-        code, told = run("drone", "--attach", "flight.mcap", "--to", "got")
+        code, told = run("fetch", "drone", "--attach", "flight.mcap", "--to", "got")
         assert code == 0, told
         assert "of drone" in told
         assert "covers 0.0 to 1" in told
         store.times = dict.fromkeys(store.logs, 0)
-        code, told = run("drone", "--attach", "flight.mcap")
+        code, told = run("fetch", "drone", "--attach", "flight.mcap")
         assert code != 0
         assert "no log that it was written at 2027-01-15 08:00:05 UTC" in told
-        code, told = run("drone", "--attach", "none.mcap")
+        code, told = run("fetch", "drone", "--attach", "none.mcap")
         assert "cannot open the recording none.mcap" in told
     with Recording.open(recording) as opened:
         (name,) = opened.attachments
@@ -258,7 +259,7 @@ def test_the_command_changes_nothing_at_the_vehicle(
     with ends.unconnected():
         autopilot = ends.autopilot
         autopilot.firmware.logs.logs = {1: DATAFLASH[:90]}
-        code, told = run("drone")
+        code, told = run("list", "drone")
         assert code == 0, told
         kinds = {message.get_type() for _, message in autopilot.heard}
     assert "LOG_REQUEST_LIST" in kinds

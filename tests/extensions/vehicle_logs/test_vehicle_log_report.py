@@ -178,11 +178,11 @@ def test_on_the_command_line(
             main()
         return ended.value.code, capsys.readouterr().out
 
-    for words in (("attach", str(recording), str(log)), ("report", str(recording))):
+    for words in (("logs", "attach", str(recording), str(log)), ("report", str(recording))):
         code, told = run(*words)
         assert code == 0
         assert "own.bin of drone (ArduPilot) covers 0.0 to 60.0 s of the mission" in told
-    assert run("attach", str(tmp_path / "none.mcap"), "none.bin")[0] == 2
+    assert run("logs", "attach", str(tmp_path / "none.mcap"), "none.bin")[0] == 2
 
 
 def test_when_it_flew(recording: Path) -> None:

@@ -194,7 +194,7 @@ def test_what_speaks_against_a_take_off_is_told(ros_link: RosLink, topics: str) 
 
 
 def test_looking_publishes_nothing(ros_link: RosLink, topics: str) -> None:
-    """As `aerodaas preflight` does."""
+    """As `aerodaas check` does."""
     robot = robot_of(topics)
     environment = EnvironmentConfig(robots=[robot])
     vehicle = load_vehicle(robot, environment, observing=True)
