@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.messages.actions import Action, TriggerPhotos, action_kinds
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame
-from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["filled", "names"]
 
@@ -25,8 +25,8 @@ _SPECIAL: dict[Any, dict[str, Any]] = {
     },
     Detections: {"nearest": np.full((2, 3), 5, np.uint16)},
     Frame: {"image": np.full((2, 3, 3), 7, np.uint8), "depth": np.full((2, 3), 9, np.uint16)},
-    # These take the place of one another.
-    Waypoint: {"actuate": (("hook", "release"),), "look_at": None, "trigger_interval": None},
+    # Distance and interval take the place of one another.
+    TriggerPhotos: {"interval": None},
 }
 
 
@@ -46,6 +46,8 @@ def filled(hint: Any, **given: Any) -> Any:  # noqa: ANN401, PLR0911 - an annota
         return _PLAIN[hint]
     if origin is typing.Union or isinstance(hint, types.UnionType):
         return filled(next(one for one in inner if one is not type(None)))
+    if hint == tuple[Action, ...]:
+        return tuple({one.slot: one for one in map(filled, action_kinds().values())}.values())
     if origin is tuple:
         return tuple(filled(one) for one in inner if one is not Ellipsis)
     if origin is dict:

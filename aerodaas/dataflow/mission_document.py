@@ -51,7 +51,8 @@ _MOST_WAYPOINTS = 10_000
 """Of a document."""
 _MOST_VALUES = 10_000
 """Of the settings of one analysis or scheduler, or of a condition."""
-_MOST_MOVES = 16
+_MOST_ACTIONS = 24
+"""Of a waypoint."""
 _LONGEST = 64
 """Characters of a name."""
 _MOST_HERTZ = 1000.0
@@ -107,9 +108,9 @@ class _Entry(BaseModel):
 
 def _of_a_document(waypoint: Waypoint) -> Waypoint:
     """A waypoint whose names are short enough for a document; raises ValueError for another."""
-    if len(waypoint.actuate) > _MOST_MOVES:
-        raise ValueError(f"waypoint {waypoint.id[:_LONGEST]!r} moves more than {_MOST_MOVES}")
-    for name in (waypoint.id, *itertools.chain.from_iterable(waypoint.moves.items())):
+    if len(waypoint.actions) > _MOST_ACTIONS:
+        raise ValueError(f"waypoint {waypoint.id[:_LONGEST]!r} does more than {_MOST_ACTIONS}")
+    for name in (waypoint.id, *itertools.chain(*(one.names for one in waypoint.actions))):
         if not 0 < len(name) <= _LONGEST:
             raise ValueError(f"{name[:_LONGEST]!r}: a name has 1 to {_LONGEST} characters")
     return waypoint

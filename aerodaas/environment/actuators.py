@@ -20,7 +20,7 @@ def require_actuators(config: EnvironmentConfig, edge: NavigationEdge, line: str
     """
     carried = next((one.actuators for one in config.robots if one.id == edge.robot), [])
     for waypoint in edge.navigation.waypoints:
-        text = actuator_objection(carried, waypoint.moves, by_waypoint=True)
+        text = actuator_objection(carried, waypoint.actions, by_waypoint=True)
         if text:
             message = f"{edge.robot}: waypoint {waypoint.id!r}: {text}"
             raise GraphError(f"{message}\n  at {line}") if line else refusal(message)

@@ -15,6 +15,7 @@ from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import GraphError, UnknownIdError
+from aerodaas.messages.actions import MoveActuator
 from aerodaas.mission.commands import (
     Actuate,
     End,
@@ -151,8 +152,8 @@ class Robot(PaperNames, IRobot):
             GraphError: For an unknown actuator or position.
             MissionError: If the robot does not fly or refuses.
         """
-        wanted = {actuator: position}
-        if text := actuator_objection(self.config.actuators, wanted, by_waypoint=False):
+        moves = [MoveActuator(actuator, position)]
+        if text := actuator_objection(self.config.actuators, moves, by_waypoint=False):
             raise refusal(f"{self.robot_id}: {text}")
         self.environment.command(self.robot_id, Actuate(actuator, position))
 

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar
 
 import numpy as np
-from annotated_types import Ge, Gt, Le
+from annotated_types import Ge, Gt
+from typing_extensions import Unpack
 
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
-from aerodaas.messages.payload import GimbalTarget, LensTarget
-from aerodaas.messages.serialization.json_types import Int64, PairsAsObject, StrictlyTyped
+from aerodaas.messages.actions import (
+    LARGEST,
+    Action,
+    ActionKeywords,
+    Actions,
+    Number,
+    actions_of,
+    json_of_actions,
+)
+from aerodaas.messages.serialization.json_types import Int64
 from aerodaas.messages.serialization.records import fast_pickle, shared_pickle
 
 if TYPE_CHECKING:
@@ -23,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DEFAULT_PRIORITY",
-    "LEAST_TRIGGER",
     "FollowedTarget",
     "HeightDatum",
     "HeightReference",
@@ -36,6 +44,7 @@ __all__ = [
     "WaypointType",
 ]
 
+A = TypeVar("A", bound=Action)
 DEFAULT_PRIORITY = 5
 """Priority of navigation that states none; smaller is more urgent, as in the paper."""
 
@@ -94,21 +103,7 @@ class SchedulingType(str, enum.Enum):
     UNORDERED = "unordered"
 
 
-_WHOLE = 100.0
-"""Percent."""
-_HALF_TURN = 3.1416
-"""Radians: pi, and the rounding of who writes it by hand."""
-LARGEST = 1e9
-"""Largest number of a waypoint either way: 64 bits hold as many seconds in nanoseconds; Earth is
-smaller in metres."""
-LEAST_TRIGGER = 0.1
-"""Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
-
-Number: TypeAlias = Annotated[float, StrictlyTyped(), Ge(-LARGEST), Le(LARGEST)]
-Flag: TypeAlias = Annotated[bool, StrictlyTyped()]
-Angle: TypeAlias = Annotated[Number, Ge(-_HALF_TURN), Le(_HALF_TURN)]
-Percent: TypeAlias = Annotated[Number, Ge(0.0), Le(_WHOLE)]
 
 
 def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
@@ -132,25 +127,8 @@ def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
         raise InvalidWaypointError(message)
 
 
-def _moves(owner: str, asked: object) -> tuple[tuple[str, str], ...]:
-    """Pairs of actuator and position."""
-    pairs = tuple(asked.items()) if isinstance(asked, Mapping) else asked
-    if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
-        message = f'{owner}: actuate is positions by actuator, {{"hook": "release"}}, not {asked!r}'
-        raise InvalidWaypointError(message)
-    moves = tuple((str(name), str(position)) for name, position in pairs)
-    if len(dict(moves)) < len(moves):
-        raise InvalidWaypointError(f"{owner}: actuate names an actuator twice: give two waypoints")
-    return moves
-
-
-def _is_pair(value: object) -> bool:
-    texts = value if isinstance(value, tuple | list) else ()
-    return [type(one) for one in texts] == [str, str]
-
-
 @shared_pickle
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Waypoint:
     """A place to fly to, with hover time, yaw, speed and priority.
 
@@ -177,38 +155,43 @@ class Waypoint:
     """Seconds of mission time by which to arrive; None for no deadline."""
     above: HeightReference | str | None = None
     """What z is counted from: `home`, `sea` or `ground`; None: as `waypoint_type` says."""
-    gimbal_pitch: Angle | None = None
-    """Radians to which the gimbal is turned on the way there, 0 at the horizon, negative
-    downwards: -pi/2 looks straight down. None leaves it as it is, or level where `gimbal_yaw` is
-    given."""
-    gimbal_yaw: Angle | None = None
-    """Radians from the nose, counter-clockwise; None leaves it as it is, or ahead where
-    `gimbal_pitch` is given."""
-    photo: Flag = False
-    """Whether a picture is taken there, once the gimbal looks where it is to."""
-    actuate: Annotated[dict[str, str] | tuple[tuple[str, str], ...], PairsAsObject()] = ()
-    """Positions by actuator, such as `{"hook": "release"}`, that are taken there one after the
-    other, after the picture; kept as a tuple of pairs."""
-    trigger_distance: Annotated[Number, Ge(LEAST_TRIGGER)] | None = None
-    """Metres between pictures on the way there, along the straight line from where it begins; the
-    drone does not stop for them. None takes none."""
-    trigger_interval: Annotated[Number, Ge(LEAST_TRIGGER)] | None = None
-    """Seconds between pictures on the way there and during the stay; the drone does not stop for
-    them. None takes none."""
-    look_at: tuple[Number, Number, Number] | None = None
-    """A place that the gimbal keeps looking at from the way there on, or the nose where the gimbal
-    cannot, until a waypoint has another one or `gimbal_pitch` or `gimbal_yaw`. It is counted as
-    x, y and z are."""
+    actions: Actions = ()
+    """What is done there, or on the way there."""
 
-    zoom: Percent | None = None
-    """Percent of the camera's zoom, 0 (sees most) to 100, that is set on the way there; None leaves
-    it as it is."""
-    focus: Percent | None = None
-    """The same for the focus, 0 (near) to 100 (far)."""
-    video: Flag | None = None
-    """Whether the camera's recording on its own card is begun there (True) or ended (False), after
-    the picture and before actuators move; None leaves it as it is. One that the mission has begun
-    ends with it."""
+    def __init__(
+        self,
+        id: str,  # noqa: A002 - the field's name
+        x: float,
+        y: float,
+        z: float,
+        hover_duration: float = 0.0,
+        waypoint_type: WaypointType | str = WaypointType.RELATIVE,
+        yaw: float | None = None,
+        speed: float | None = None,
+        priority: int = DEFAULT_PRIORITY,
+        deadline: float | None = None,
+        above: HeightReference | str | None = None,
+        actions: Iterable[Action] = (),
+        **keywords: Unpack[ActionKeywords],
+    ) -> None:
+        """Hold the fields, with the actions as such or by keywords, as `photo=True`."""
+        values = (id, x, y, z, hover_duration, waypoint_type, yaw, speed, priority, deadline, above)
+        for name, value in zip(_FIELDS, (*values, tuple(actions)), strict=True):
+            object.__setattr__(self, name, value)
+        if keywords:
+            object.__setattr__(self, "actions", self._actions_by(keywords))
+        self.__post_init__()
+
+    def _actions_by(self, keywords: Mapping[str, Any]) -> tuple[Action, ...]:
+        try:
+            found = actions_of(keywords)
+        except InvalidWaypointError as error:
+            raise InvalidWaypointError(f"waypoint {self.id!r}: {error}") from None
+        if found and self.actions:
+            told = ", ".join(keywords)
+            message = f"waypoint {self.id!r}: give it actions or {told}, not both: see with_actions"
+            raise InvalidWaypointError(message)
+        return found or self.actions
 
     @classmethod
     def __get_pydantic_core_schema__(
@@ -222,7 +205,7 @@ class Waypoint:
         schema["serialization"] = core_schema.plain_serializer_function_ser_schema(
             _given, when_used="json"
         )
-        return schema
+        return core_schema.no_info_before_validator_function(_current_form, schema)
 
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
@@ -239,56 +222,21 @@ class Waypoint:
         if self.speed is not None and self.speed <= 0:
             message = f"{owner}: speed must be positive, not {self.speed}"
             raise InvalidWaypointError(message)
-        self._check_camera(owner)
-        if self.actuate != ():
-            object.__setattr__(self, "actuate", _moves(owner, self.actuate))
         self._require_on_the_globe(owner, self.x, self.y)
+        if self.actions:
+            self._check_actions(owner)
 
-    def _check_camera(self, owner: str) -> None:
-        for name, angle in (("gimbal_pitch", self.gimbal_pitch), ("gimbal_yaw", self.gimbal_yaw)):
-            if angle is not None and abs(angle) > _HALF_TURN:
-                message = f"{owner}: {name} is in radians, from -pi to pi, not {angle}"
-                raise InvalidWaypointError(message)
-        photo: object = self.photo
-        if not isinstance(photo, bool):
-            message = f"{owner}: photo must be True or False, not {photo!r}"
-            raise InvalidWaypointError(message)
-        video: object = self.video
-        if not isinstance(video, bool | None):
-            message = f"{owner}: video must be True, False or None, not {video!r}"
-            raise InvalidWaypointError(message)
-        for name in ("trigger_distance", "trigger_interval"):
-            value = getattr(self, name)
-            if value is not None and value < LEAST_TRIGGER:
-                message = f"{owner}: {name} must be at least {LEAST_TRIGGER}, not {value}"
-                raise InvalidWaypointError(message)
-        if self.trigger_distance is not None and self.trigger_interval is not None:
-            message = f"{owner}: give it trigger_distance or trigger_interval, not both"
-            raise InvalidWaypointError(message)
-        for name in ("zoom", "focus"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 <= value <= _WHOLE:
-                message = f"{owner}: {name} is in percent, from 0 to 100, not {value}"
-                raise InvalidWaypointError(message)
-        self._check_look_at(owner)
-
-    def _check_look_at(self, owner: str) -> None:
-        if self.look_at is None:
-            return
-        if self.gimbal is not None:
-            message = f"{owner}: give it look_at or the gimbal's angles, not both"
-            raise InvalidWaypointError(message)
-        place: object = self.look_at
-        if not (
-            isinstance(place, tuple | list)
-            and len(place) == len("xyz")
-            and all(isinstance(one, int | float | np.floating) for one in place)
-            and all(abs(one) <= LARGEST for one in place)
-        ):
-            message = f"{owner}: look_at must be three finite numbers (x, y, z), not {place!r}"
-            raise InvalidWaypointError(message)
-        object.__setattr__(self, "look_at", tuple(map(float, place)))
-        self._require_on_the_globe(owner, *self.look_at[:2])
+    def _check_actions(self, owner: str) -> None:
+        taken: dict[str, Action] = {}
+        for action in self.actions:
+            other = taken.setdefault(action.slot, action)
+            if other is not action:
+                raise InvalidWaypointError(
+                    f"{owner}: give it one of {other} and {action}, not both: "
+                    "a second waypoint at its place may have the other"
+                )
+            if action.place is not None:
+                self._require_on_the_globe(owner, *action.place[:2])
 
     def _require_on_the_globe(self, owner: str, x: float, y: float) -> None:
         north_pole, date_line = 90.0, 180.0
@@ -326,12 +274,10 @@ class Waypoint:
             InvalidWaypointError: For a global waypoint without `origin`, and for one above sea or
                 ground where home's own height is not known.
         """
-        if self.look_at is not None:
-            x, y, z = self.look_at
-            bare = replace(self, look_at=None)
-            seen = replace(bare, x=x, y=y, z=z).resolve(takeoff, origin, datum)
-            there = bare.resolve(takeoff, origin, datum)
-            return replace(there, look_at=(seen.x, seen.y, seen.z))
+        if any(action.place is not None for action in self.actions):
+            there = replace(self, actions=()).resolve(takeoff, origin, datum)
+            resolved = (self._resolved(one, takeoff, origin, datum) for one in self.actions)
+            return replace(there, actions=tuple(resolved))
         if self.above is not None:
             kind = self.waypoint_type
             if kind is WaypointType.GLOBAL:
@@ -353,6 +299,15 @@ class Waypoint:
             x, y, _ = origin.to_local(self.x, self.y, origin.altitude)
             z = self.z
         return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
+
+    def _resolved(
+        self, action: Action, takeoff: Vector, origin: GeodeticOrigin | None, datum: HeightDatum
+    ) -> Action:
+        if action.place is None:
+            return action
+        x, y, z = action.place
+        place = replace(self, x=x, y=y, z=z, actions=()).resolve(takeoff, origin, datum)
+        return action.moved((place.x, place.y, place.z))
 
     def _local_height(self, place: Waypoint, datum: HeightDatum) -> float:
         """Metres over the local frame's zero, of a waypoint that says what it is counted from."""
@@ -377,24 +332,15 @@ class Waypoint:
             )
         return ground + self.z
 
-    @property
-    def gimbal(self) -> GimbalTarget | None:
-        """Where the gimbal is to look; None to leave it as it is."""
-        if self.gimbal_pitch is None and self.gimbal_yaw is None:
-            return None
-        return GimbalTarget(self.gimbal_pitch or 0.0, self.gimbal_yaw or 0.0)
+    def action(self, kind: type[A]) -> A | None:
+        """The first action of a kind; None if there is none."""
+        return next((one for one in self.actions if isinstance(one, kind)), None)
 
-    @property
-    def lens(self) -> LensTarget | None:
-        """Zoom and focus for the camera; None to leave them as they are."""
-        if self.zoom is None and self.focus is None:
-            return None
-        return LensTarget(self.zoom, self.focus)
-
-    @property
-    def moves(self) -> dict[str, str]:
-        """Positions by actuator that are taken there, in order; empty for none."""
-        return dict(self.actuate)
+    def with_actions(self, *actions: Action) -> Waypoint:
+        """A copy with further actions, each in the place of one that excludes it."""
+        slots = {action.slot for action in actions}
+        kept = (action for action in self.actions if action.slot not in slots)
+        return replace(self, actions=(*kept, *actions))
 
     @property
     def position(self) -> Vector:
@@ -402,28 +348,32 @@ class Waypoint:
         return np.array([self.x, self.y, self.z], dtype=np.float64)
 
 
-_NUMBERS = tuple(
-    field.name
-    for field in fields(Waypoint)
-    if field.name
-    in {
-        *("x", "y", "z", "hover_duration", "yaw", "speed", "deadline"),
-        *("gimbal_pitch", "gimbal_yaw", "trigger_distance", "trigger_interval"),
-        *("zoom", "focus"),
-    }
-)
-_DEFAULTS = [(field.name, field.default) for field in fields(Waypoint)]
+_NUMBERS = ("x", "y", "z", "hover_duration", "yaw", "speed", "deadline")
+_DEFAULTS = {field.name: field.default for field in fields(Waypoint)}
+_FIELDS = tuple(_DEFAULTS)
 
 
 def _given(waypoint: Waypoint) -> dict[str, Any]:
     """The fields of a waypoint that are not at their default value; its numbers are floats."""
-    values = ((name, getattr(waypoint, name), default) for name, default in _DEFAULTS)
+    values = ((name, getattr(waypoint, name), default) for name, default in _DEFAULTS.items())
     given = {
         name: float(value) if name in _NUMBERS else value
         for name, value, default in values
         if value != default
     }
-    return {**given, "actuate": waypoint.moves} if waypoint.actuate else given
+    if waypoint.actions:
+        given["actions"] = json_of_actions(waypoint.actions)
+    return given
+
+
+def _current_form(value: object) -> object:
+    """A waypoint's JSON, in which actions were fields of its own up to version 0.1."""
+    keywords = ActionKeywords.__annotations__.keys()
+    if not (isinstance(value, dict) and keywords & value.keys()):
+        return value
+    kept = {name: one for name, one in value.items() if name not in keywords}
+    actions = actions_of({name: value[name] for name in keywords & value.keys()})
+    return {**kept, "actions": (*kept.get("actions", ()), *actions)}
 
 
 class TargetState(str, enum.Enum):

@@ -490,30 +490,75 @@ export interface BatteryOutlook {
  */
 export interface Waypoint {
   above?: HeightReference | string | null;
-  actuate?:
-    | {
-        [k: string]: string;
-      }
-    | [string, string][];
+  actions?: (TriggerPhotos | LookAt | AimGimbal | SetLens | TakePhoto | RecordVideo | MoveActuator)[];
   deadline?: number | null;
-  focus?: number | null;
-  gimbal_pitch?: number | null;
-  gimbal_yaw?: number | null;
   hover_duration?: number;
   id: string;
-  look_at?: [number, number, number] | null;
-  photo?: boolean;
   priority?: number;
   speed?: number | null;
-  trigger_distance?: number | null;
-  trigger_interval?: number | null;
-  video?: boolean | null;
   waypoint_type?: WaypointType | string;
   x: number;
   y: number;
   yaw?: number | null;
   z: number;
+}
+/**
+ * Take pictures on the way to the waypoint, by distance or by time, without a stop.
+ */
+export interface TriggerPhotos {
+  distance?: number | null;
+  interval?: number | null;
+  type?: "trigger_photos";
+}
+/**
+ * Keep the gimbal, or the nose where the gimbal cannot turn, on a place.
+ *
+ * From the way to the waypoint on, until one has another place or turns the gimbal.
+ */
+export interface LookAt {
+  type?: "look_at";
+  x: number;
+  y: number;
+  z: number;
+}
+/**
+ * Turn the gimbal on the way to the waypoint.
+ */
+export interface AimGimbal {
+  pitch?: number;
+  type?: "aim_gimbal";
+  yaw?: number;
+}
+/**
+ * Set the camera's zoom and focus on the way to the waypoint; None leaves one as it is.
+ */
+export interface SetLens {
+  focus?: number | null;
+  type?: "set_lens";
   zoom?: number | null;
+}
+/**
+ * Take one picture at the waypoint, once the gimbal looks where it is to.
+ */
+export interface TakePhoto {
+  type?: "take_photo";
+}
+/**
+ * Begin or end the camera's recording on its own card, at the waypoint after the picture.
+ *
+ * A recording that the mission has begun ends with it.
+ */
+export interface RecordVideo {
+  on?: boolean;
+  type?: "record_video";
+}
+/**
+ * Have an actuator take a position at the waypoint, after picture and video.
+ */
+export interface MoveActuator {
+  actuator: string;
+  position: string;
+  type?: "move_actuator";
 }
 /**
  * The newest knowledge about a vehicle.

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from keywords import keywords
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.dataflow.mission_document import NavigationDocument
@@ -94,7 +95,7 @@ def test_a_document_holds_moves_in_order() -> None:
     """There and back."""
     stop = Waypoint("drop", 0, 5, 2, actuate={"hatch": "open", "hook": "release"})
     text = NavigationDocument(robot="drone", waypoints=[stop]).model_dump_json()
-    assert '"actuate":{"hatch":"open","hook":"release"}' in text
+    assert '"actions":[{"type":"move_actuator","actuator":"hatch","position":"open"},' in text
     (read,) = NavigationDocument.model_validate_json(text).waypoints
     assert read == stop
-    assert list(read.moves) == ["hatch", "hook"]
+    assert list(keywords(read).actuate) == ["hatch", "hook"]

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import CameraModel, rotation_from_rpy
+from aerodaas.messages.actions import AimGimbal
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import GimbalAttitude, GimbalTarget, levelled
+from aerodaas.messages.payload import GimbalAttitude, levelled
 from aerodaas.messages.waypoints import Waypoint
 
 CAMERA = CameraModel.from_fov(64, 48, 1.0)
@@ -49,9 +50,9 @@ def test_nadir_has_the_top_of_the_picture_ahead() -> None:
 
 def test_a_waypoint_says_where_the_gimbal_looks() -> None:
     """One angle leaves the other at zero; none leaves the gimbal."""
-    assert Waypoint("a", 0, 0, 2).gimbal is None
-    assert Waypoint("a", 0, 0, 2, gimbal_pitch=-1.0).gimbal == GimbalTarget(-1.0, 0.0)
-    assert Waypoint("a", 0, 0, 2, gimbal_yaw=0.5).gimbal == GimbalTarget(0.0, 0.5)
+    assert Waypoint("a", 0, 0, 2).actions == ()
+    assert Waypoint("a", 0, 0, 2, gimbal_pitch=-1.0).actions == (AimGimbal(-1.0, 0.0),)
+    assert Waypoint("a", 0, 0, 2, gimbal_yaw=0.5).actions == (AimGimbal(0.0, 0.5),)
 
 
 @pytest.mark.parametrize(

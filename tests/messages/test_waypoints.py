@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import pickle
 import typing
@@ -24,8 +25,21 @@ from aerodaas import (
     Waypoint,
     WaypointType,
 )
+from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry.frames import GeodeticOrigin
+from aerodaas.messages.actions import (
+    Action,
+    AimGimbal,
+    LookAt,
+    MoveActuator,
+    RecordVideo,
+    SetLens,
+    TakePhoto,
+    TriggerPhotos,
+    action_kinds,
+)
+from aerodaas.messages.serialization.schema import MessageError, json_of, message_of
 from aerodaas.messages.waypoints import HeightDatum
 
 finite = st.floats(-1e4, 1e4)
@@ -158,7 +172,7 @@ def test_numbers_that_are_none_are_refused_by_name(value: float, field: str) -> 
 def test_values_that_cannot_be_flown(values: dict[str, Any], message: str) -> None:
     """Each is refused with a reason."""
     with pytest.raises(InvalidWaypointError, match=message):
-        Waypoint("w", **{"x": 0, "y": 0, "z": 1, **values})
+        Waypoint("w", **dict[str, Any]({"x": 0, "y": 0, "z": 1, **values}))
 
 
 @given(bad, st.sampled_from(["forward", "left", "up", "yaw_rate", "valid_for"]))
@@ -223,25 +237,99 @@ def test_places_on_the_globe_are_on_it(kind: str) -> None:
         Waypoint("w", 47, 8, 1, waypoint_type=kind).resolve(np.zeros(3), None)
 
 
-@pytest.mark.parametrize("kind", [Waypoint, VelocityCommand])
+ACTIONS = tuple(action_kinds().values())
+
+
+def numbers_of(kind: Any) -> list[str]:  # noqa: ANN401 - a dataclass
+    """Names of a dataclass' fields that hold numbers."""
+    hints = typing.get_type_hints(kind)
+    return [name for name, hint in hints.items() if {float, int} & {hint, *typing.get_args(hint)}]
+
+
+@pytest.mark.parametrize("kind", [Waypoint, VelocityCommand, *ACTIONS])
 def test_each_number_is_finite(kind: Any) -> None:  # noqa: ANN401 - a dataclass
     """A field that holds numbers and takes one that is none would reach the autopilot."""
-    hints = typing.get_type_hints(kind)
-    numbers = [name for name, hint in hints.items() if float in {hint, *typing.get_args(hint)}]
-    assert len(numbers) > 4
-    for name in numbers:
+    for name in set(numbers_of(kind)) - {"priority"}:
         with pytest.raises(InvalidWaypointError, match=f"{name} must be a finite number"):
             filled(kind, **{name: math.nan})
 
 
 @pytest.mark.parametrize("value", [1e308, -1e308, 10**400, 1.1e9])
-def test_each_number_can_be_counted_in_nanoseconds(value: float) -> None:
+@pytest.mark.parametrize("kind", [Waypoint, *ACTIONS])
+def test_each_number_can_be_counted_in_nanoseconds(kind: Any, value: float) -> None:  # noqa: ANN401
     """A larger one would overflow in flight: in a clock, or in a distance that is squared."""
-    hints = typing.get_type_hints(Waypoint)
-    names = [name for name, hint in hints.items() if {float, int} & {hint, *typing.get_args(hint)}]
-    assert {"trigger_interval", "hover_duration", "deadline", "priority", "x"} <= set(names)
-    for name in names:
+    for name in numbers_of(kind):
         with pytest.raises(InvalidWaypointError, match=name):
-            filled(Waypoint, **{name: value})
-    with pytest.raises(InvalidWaypointError, match="look_at"):
-        Waypoint("w", 1, 2, 3, look_at=(0, 0, value))
+            filled(kind, **{name: value})
+
+
+def test_numbers_are_found() -> None:
+    """Of a waypoint and of its actions."""
+    assert {"hover_duration", "deadline", "priority", "x"} <= set(numbers_of(Waypoint))
+    assert set(numbers_of(TriggerPhotos)) == {"distance", "interval"}
+
+
+KEYWORDS: list[tuple[dict[str, Any], tuple[Action, ...]]] = [
+    ({"photo": True, "video": False}, (TakePhoto(), RecordVideo(on=False))),
+    ({"photo": False, "video": None, "actuate": {}}, ()),
+    ({"trigger_distance": 5}, (TriggerPhotos(distance=5.0),)),
+    ({"trigger_interval": 2.0, "zoom": 5}, (TriggerPhotos(interval=2.0), SetLens(zoom=5.0))),
+    ({"look_at": (1, 2, 3), "focus": 0.0}, (LookAt(1, 2, 3), SetLens(focus=0.0))),
+    (
+        {"actuate": {"hatch": "open", "hook": "release"}},
+        (MoveActuator("hatch", "open"), MoveActuator("hook", "release")),
+    ),
+]
+
+
+@pytest.mark.parametrize(("keywords", "actions"), KEYWORDS)
+def test_keywords_and_earlier_documents_name_actions(
+    keywords: dict[str, Any], actions: tuple[Action, ...]
+) -> None:
+    """The constructor takes them, and so does JSON up to version 0.1; actions are written."""
+    waypoint = Waypoint("a", 1, 2, 3, **keywords)
+    assert waypoint.actions == actions
+    earlier = json.loads(json.dumps({"id": "a", "x": 1, "y": 2, "z": 3, **keywords}))
+    assert message_of(Waypoint, earlier) == waypoint
+    document = NavigationDocument.model_validate({"robot": "drone", "waypoints": [earlier]})
+    assert document.waypoints == [waypoint]
+    written = json_of(waypoint)
+    assert not written.keys() & keywords.keys()
+    assert message_of(Waypoint, written) == waypoint
+
+
+@pytest.mark.parametrize("kind", ACTIONS, ids=lambda kind: kind.__name__)
+def test_a_waypoint_brings_each_kind_of_action_across(kind: type[Action]) -> None:
+    """As JSON and by pickle, with a value in each field."""
+    waypoint = Waypoint("a", 1, 2, 3, actions=[filled(kind)])
+    assert message_of(Waypoint, json_of(waypoint)) == waypoint
+    assert pickle.loads(pickle.dumps(waypoint)) == waypoint  # noqa: S301 - our own bytes
+    assert [type(action) for action in waypoint.actions] == [kind]
+
+
+@pytest.mark.parametrize(
+    ("actions", "said"),
+    [
+        ((AimGimbal(), LookAt(1, 2, 3)), r"one of AimGimbal\(.*\) and LookAt\(.*, not both"),
+        ((TakePhoto(), TakePhoto()), "not both"),
+        ((MoveActuator("hook", "grab"), MoveActuator("hook", "release")), "not both"),
+    ],
+)
+def test_actions_that_exclude_each_other_are_refused(
+    actions: tuple[Action, ...], said: str
+) -> None:
+    """And in the place of one, another one comes."""
+    with pytest.raises(InvalidWaypointError, match=f"waypoint 'w': .*{said}"):
+        Waypoint("w", 1, 2, 3, actions=actions)
+    one = Waypoint("w", 1, 2, 3, actions=actions[:1])
+    assert one.with_actions(*actions[1:]).actions == actions[1:]
+
+
+def test_actions_and_keywords_are_not_mixed() -> None:
+    """A copy by `replace` would keep what its caller means to replace."""
+    with pytest.raises(InvalidWaypointError, match="give it actions or photo, not both"):
+        Waypoint("w", 1, 2, 3, actions=[SetLens(5.0)], photo=True)
+    with pytest.raises(InvalidWaypointError, match="a waypoint has no fotos"):
+        Waypoint("w", 1, 2, 3, fotos=True)  # type: ignore[call-arg]
+    with pytest.raises(MessageError, match="on_fire"):
+        message_of(Waypoint, {"id": "w", "x": 1, "y": 2, "z": 3, "actions": [{"type": "on_fire"}]})

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from flying import FLAT, Flyer, robot
+from keywords import keywords
 from PIL import Image
 
 from aerodaas import AeroNavigation, Environment, Waypoint
@@ -55,7 +56,7 @@ def test_a_survey_leaves_its_pictures_beside_the_recording(flyer: Flyer) -> None
         states = [one.value for one in recording.records(schemas=("aerodaas.VehicleState",))]
         plans = [one.value for one in recording.records(schemas=("aerodaas.Plan",))]
         alerts = [one.value for one in recording.records(schemas=("aerodaas.Alert",))]
-    assert [one.video for one in plans[0].waypoints] == [True, None]
+    assert [keywords(one).video for one in plans[0].waypoints] == [True, None]
     assert not [one for one in alerts if one.kind == "video"]
     assert [photo.label for photo in photos] == ["nadir", "aside"]
     assert [photo.zoom for photo in photos] == [0.0, 50.0]

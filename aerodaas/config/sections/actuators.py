@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
 from aerodaas.config.checked import Strict, near
 from aerodaas.identifiers import Identifier
+from aerodaas.messages.actions import Action, MoveActuator
 
 __all__ = [
     "ACTUATOR_TYPES",
@@ -122,17 +123,20 @@ def permitted(
 
 
 def actuator_objection(
-    actuators: Sequence[ActuatorConfig], moves: Mapping[str, str], *, by_waypoint: bool
+    actuators: Sequence[ActuatorConfig], actions: Iterable[Action], *, by_waypoint: bool
 ) -> str:
-    """Why these `moves` (positions by actuator) are not possible; empty if they are.
+    """Why actuators cannot be moved as `actions` say; empty if they can.
 
     Args:
         actuators: Those of the robot.
-        moves: Position by actuator's id.
+        actions: The actions, of which those of other kinds are left out.
         by_waypoint: Whether a waypoint asks, which has no say over a parachute.
     """
     known = {one.id: one for one in actuators}
-    for name, position in moves.items():
+    for action in actions:
+        if not isinstance(action, MoveActuator):
+            continue
+        name, position = action.actuator, action.position
         actuator = known.get(name)
         if actuator is None:
             return f"no actuator is called {name!r}{near(name, known)}"

@@ -11,6 +11,15 @@ import typer
 
 from aerodaas.cli.options import ExampleGroup
 from aerodaas.errors import ConfigError
+from aerodaas.messages.actions import (
+    AimGimbal,
+    LookAt,
+    RecordVideo,
+    SetLens,
+    TakePhoto,
+    TriggerPhotos,
+    action_kinds,
+)
 from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:
@@ -70,23 +79,25 @@ def _flown(waypoint: Waypoint) -> str:
 
 def _pictures(waypoint: Waypoint) -> str:
     said = []
-    if waypoint.trigger_distance is not None:
-        said.append(f", a picture every {waypoint.trigger_distance:g} m on the way")
-    if waypoint.trigger_interval is not None:
-        said.append(f", a picture every {waypoint.trigger_interval:g} s on the way")
-    if waypoint.look_at is not None:
-        x, y, z = waypoint.look_at
-        said.append(f", looks at {x:.7f}, {y:.7f}, {z:g} m")
-    elif waypoint.gimbal is not None:
-        pitch, yaw = map(math.degrees, (waypoint.gimbal.pitch, waypoint.gimbal.yaw))
-        said.append(f", gimbal at pitch {pitch:.0f}, yaw {yaw:.0f} degrees")
-    for name, percent in (("zoom", waypoint.zoom), ("focus", waypoint.focus)):
-        if percent is not None:
-            said.append(f", {name} at {percent:g} %")
-    if waypoint.photo:
-        said.append(", a picture")
-    if waypoint.video is not None:
-        said.append(f", video {'begins' if waypoint.video else 'ends'}")
+    order = list(action_kinds())
+    for action in sorted(waypoint.actions, key=lambda action: order.index(action.type)):
+        match action:
+            case TriggerPhotos(distance=None, interval=interval):
+                said.append(f", a picture every {interval:g} s on the way")
+            case TriggerPhotos(distance=distance):
+                said.append(f", a picture every {distance:g} m on the way")
+            case LookAt(x=x, y=y, z=z):
+                said.append(f", looks at {x:.7f}, {y:.7f}, {z:g} m")
+            case AimGimbal(pitch=pitch, yaw=yaw):
+                pitch, yaw = math.degrees(pitch), math.degrees(yaw)
+                said.append(f", gimbal at pitch {pitch:.0f}, yaw {yaw:.0f} degrees")
+            case SetLens(zoom=zoom, focus=focus):
+                named = (("zoom", zoom), ("focus", focus))
+                said += [f", {name} at {value:g} %" for name, value in named if value is not None]
+            case TakePhoto():
+                said.append(", a picture")
+            case RecordVideo(on=on):
+                said.append(f", video {'begins' if on else 'ends'}")
     return "".join(said)
 
 

@@ -38,7 +38,17 @@ from aerodaas.extensions.plans.commands import (
 from aerodaas.extensions.plans.formats.numbers import LatLon, place
 from aerodaas.extensions.plans.plan import PlanItem
 from aerodaas.geometry.frames import wrap_angle
-from aerodaas.messages.waypoints import LEAST_TRIGGER, HeightReference, Waypoint
+from aerodaas.messages.actions import (
+    LEAST_TRIGGER,
+    AimGimbal,
+    LookAt,
+    MoveActuator,
+    RecordVideo,
+    SetLens,
+    TakePhoto,
+    TriggerPhotos,
+)
+from aerodaas.messages.waypoints import HeightReference, Waypoint
 
 __all__ = ["Height", "PictureItems", "same_place"]
 
@@ -64,19 +74,8 @@ def same_place(waypoint: Waypoint, item: PlanItem) -> Waypoint:
         waypoint: Waypoint at the place.
         item: Item of the plan, whose number is the new waypoint's id.
     """
-    return replace(
-        waypoint,
-        id=f"item{item.number}",
-        hover_duration=0.0,
-        gimbal_pitch=None,
-        gimbal_yaw=None,
-        look_at=None,
-        photo=False,
-        zoom=None,
-        focus=None,
-        video=None,
-        actuate={},
-    )
+    kept = tuple(one for one in waypoint.actions if isinstance(one, TriggerPhotos))
+    return replace(waypoint, id=f"item{item.number}", hover_duration=0.0, actions=kept)
 
 
 class _Aim:
@@ -97,11 +96,10 @@ class _Aim:
     def at(self, waypoint: Waypoint) -> Waypoint:
         """`waypoint`, with this aim; raises InvalidWaypointError if it cannot have it."""
         if self.spot is None:
-            pitch, yaw = self.angles
-            return replace(waypoint, gimbal_pitch=pitch, gimbal_yaw=yaw)
+            return waypoint.with_actions(AimGimbal(*self.angles))
         if waypoint.above != self.above:
             raise InvalidWaypointError("its height is not counted from what the waypoint's is")
-        return replace(waypoint, look_at=self.spot)
+        return waypoint.with_actions(LookAt(*self.spot))
 
 
 class PictureItems:
@@ -168,11 +166,9 @@ class PictureItems:
     def given(self, waypoint: Waypoint) -> tuple[Waypoint, list[tuple[PlanItem, str]]]:
         """A new waypoint, with what items before it say, and what it cannot have."""
         self._begun = None
-        dressed = replace(
-            self._with_lens(waypoint),
-            trigger_distance=self._distance,
-            trigger_interval=self._interval,
-        )
+        dressed = self._with_lens(waypoint)
+        if self._distance or self._interval:
+            dressed = dressed.with_actions(TriggerPhotos(self._distance, self._interval))
         aim, self._aim = self._aim, None
         if aim is None:
             return dressed, []
@@ -227,22 +223,22 @@ class PictureItems:
             return why_not(item.command)
         if not waypoints:
             return _NOT_HERE
-        if waypoints[-1].video is not None:
+        if waypoints[-1].action(RecordVideo):
             # The picture of a waypoint is taken before.
             waypoints.append(same_place(waypoints[-1], item))
-        if waypoints[-1].photo:
+        if waypoints[-1].action(TakePhoto):
             return "one picture is taken at a waypoint"
         self._aim_here(waypoints)
-        waypoints[-1] = replace(waypoints[-1], photo=True)
+        waypoints[-1] = waypoints[-1].with_actions(TakePhoto())
         return ""
 
     def _aim_here(self, waypoints: list[Waypoint]) -> None:
         """Give a pending aim and lens to the waypoint before, where pictures are taken now."""
-        if not waypoints or waypoints[-1].photo:
+        if not waypoints or waypoints[-1].action(TakePhoto):
             return
         self._set_lens_here(waypoints)
         aim, last = self._aim, waypoints[-1]
-        if aim is None or last.gimbal is not None or last.look_at is not None:
+        if aim is None or last.action(AimGimbal) or last.action(LookAt):
             return
         waypoints[-1] = aim.at(last)
         self._aim = None
@@ -251,13 +247,14 @@ class PictureItems:
         """`waypoint`, with the pending zoom and focus."""
         lens = {name: percent for name, (_, percent) in self._lens.items()}
         self._lens.clear()
-        zoom, focus = lens.get("zoom", waypoint.zoom), lens.get("focus", waypoint.focus)
-        return replace(waypoint, zoom=zoom, focus=focus)
+        before = waypoint.action(SetLens) or SetLens()
+        return waypoint.with_actions(replace(before, **lens)) if lens else waypoint
 
     def _set_lens_here(self, waypoints: list[Waypoint]) -> None:
         """Give a pending zoom and focus to the waypoint before."""
         last = waypoints[-1]
-        items = [item for name, (item, _) in self._lens.items() if getattr(last, name) is not None]
+        lens = last.action(SetLens) or SetLens()
+        items = [item for name, (item, _) in self._lens.items() if getattr(lens, name) is not None]
         if items:
             # Both are set, one on the way there, one at a waypoint of its own in the same place.
             waypoints.append(same_place(last, items[0]))
@@ -282,12 +279,12 @@ class PictureItems:
         if not waypoints:
             return _NOT_HERE
         last = waypoints[-1]
-        if last.video is not None or last.hover_duration or last.actuate:
+        if last.hover_duration or last.action(RecordVideo) or last.action(MoveActuator):
             # A waypoint has one order for its video, which comes before stay and actuators.
             waypoints.append(same_place(last, item))
         if on:
             self._aim_here(waypoints)
-        waypoints[-1] = replace(waypoints[-1], video=on)
+        waypoints[-1] = waypoints[-1].with_actions(RecordVideo(on))
         return ""
 
     def _mount(self, item: PlanItem, _: list[Waypoint]) -> str:

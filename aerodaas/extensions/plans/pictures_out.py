@@ -21,6 +21,7 @@ from aerodaas.extensions.plans.commands import (
     VIDEO_STOP_CAPTURE,
 )
 from aerodaas.extensions.plans.plan import PlanItem
+from aerodaas.messages.actions import AimGimbal, RecordVideo, SetLens, TakePhoto, TriggerPhotos
 from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["PictureWriter"]
@@ -48,12 +49,13 @@ class PictureWriter:
             spot: Place to look at, by latitude and longitude in degrees and height in metres; None
                 for none.
         """
-        yield from self._triggers(waypoint.trigger_distance, waypoint.trigger_interval)
-        if waypoint.zoom is not None:
-            yield _item(SET_CAMERA_ZOOM, OF_RANGE, waypoint.zoom)
-        if waypoint.focus is not None:
-            yield _item(SET_CAMERA_FOCUS, OF_RANGE, waypoint.focus)
-        gimbal = waypoint.gimbal
+        yield from self._triggers(waypoint.action(TriggerPhotos))
+        lens = waypoint.action(SetLens) or SetLens()
+        if lens.zoom is not None:
+            yield _item(SET_CAMERA_ZOOM, OF_RANGE, lens.zoom)
+        if lens.focus is not None:
+            yield _item(SET_CAMERA_FOCUS, OF_RANGE, lens.focus)
+        gimbal = waypoint.action(AimGimbal)
         if gimbal is not None:
             values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)
             yield PlanItem(
@@ -65,18 +67,20 @@ class PictureWriter:
 
     def behind(self, waypoint: Waypoint) -> Iterator[PlanItem]:
         """Plan items at `waypoint`."""
-        if waypoint.photo:
+        if waypoint.action(TakePhoto):
             yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
-        if waypoint.video is not None:
-            yield _item(VIDEO_START_CAPTURE if waypoint.video else VIDEO_STOP_CAPTURE)
+        if video := waypoint.action(RecordVideo):
+            yield _item(VIDEO_START_CAPTURE if video.on else VIDEO_STOP_CAPTURE)
             if waypoint.hover_duration:
                 yield _item(NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
 
     def end(self) -> Iterator[PlanItem]:
         """Plan items that end with the last waypoint."""
-        yield from self._triggers(None, None)
+        yield from self._triggers(None)
 
-    def _triggers(self, distance: float | None, interval: float | None) -> Iterator[PlanItem]:
+    def _triggers(self, trigger: TriggerPhotos | None) -> Iterator[PlanItem]:
+        distance = None if trigger is None else trigger.distance
+        interval = None if trigger is None else trigger.interval
         # A camera by distance is not stopped by what stops one by time, and the other way round.
         if self._interval is not None and interval is None:
             yield _item(IMAGE_STOP_CAPTURE)

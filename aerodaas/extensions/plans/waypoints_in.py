@@ -32,6 +32,7 @@ from aerodaas.extensions.plans.formats.numbers import LatLon, finite, place
 from aerodaas.extensions.plans.pictures_in import PictureItems, same_place
 from aerodaas.extensions.plans.plan import Notice, Plan, PlanItem
 from aerodaas.geometry.frames import yaw_ned_to_enu
+from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.waypoints import HeightReference, Waypoint, WaypointType
 
 __all__ = ["Ground", "waypoints_of"]
@@ -245,12 +246,12 @@ class _ReadWaypoints:
             self._say(item, "nothing is moved before the first waypoint")
             return
         last = self.waypoints[-1]
-        name, position = move
-        if name in last.moves:
+        action = MoveActuator(*move)
+        if any(one.slot == action.slot for one in last.actions):
             # Both are done, one at a waypoint of its own in the same place.
-            self.waypoints.append(replace(same_place(last, item), actuate={name: position}))
+            self.waypoints.append(same_place(last, item).with_actions(action))
         else:
-            self.waypoints[-1] = replace(last, actuate={**last.moves, name: position})
+            self.waypoints[-1] = last.with_actions(action)
 
     def _change_speed(self, item: PlanItem) -> None:
         kind, speed, throttle, relative = item.values

@@ -36,6 +36,7 @@ from aerodaas.extensions.plans.plan import (
     PlanItem,
 )
 from aerodaas.geometry.frames import GeodeticOrigin, yaw_enu_to_ned
+from aerodaas.messages.actions import LookAt, MoveActuator, RecordVideo
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = ["planned", "write_plan"]
@@ -134,10 +135,10 @@ def _place(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, floa
 
 def _spot(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, float] | None:
     """The place that a waypoint looks at, as `_place` writes one."""
-    if waypoint.look_at is None:
+    look = waypoint.action(LookAt)
+    if look is None:
         return None
-    x, y, z = waypoint.look_at
-    return _place(replace(waypoint, x=x, y=y, z=z, look_at=None), home)
+    return _place(replace(waypoint, x=look.x, y=look.y, z=look.z, actions=()), home)
 
 
 def _items(
@@ -159,15 +160,16 @@ def _items(
             yield PlanItem(0, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
         yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
         # An autopilot does what stands behind a waypoint after its stay; a video comes before it.
-        stay = waypoint.hover_duration if waypoint.video is None else 0.0
+        stay = 0.0 if waypoint.action(RecordVideo) else waypoint.hover_duration
         held = (stay, 0.0, 0.0, yaw)
         above = HeightReference(waypoint.above or HeightReference.HOME)
         frame = _FRAMES.get(above, FRAME_RELATIVE)
         yield from pictures.before(waypoint, frame, _spot(waypoint, home))
         yield PlanItem(0, NAV_WAYPOINT, frame, held, *at)
         yield from pictures.behind(waypoint)
-        for name, position in waypoint.moves.items():
-            yield move_item(0, name, position, actuators)
+        for action in waypoint.actions:
+            if isinstance(action, MoveActuator):
+                yield move_item(0, action.actuator, action.position, actuators)
     yield from pictures.end()
     still = (0.0, 0.0, 0.0, 0.0)
     yield PlanItem(0, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)

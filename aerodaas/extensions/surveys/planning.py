@@ -188,11 +188,11 @@ def planned_photos(
     before: PhotoTrigger | None = None
     for previous, waypoint in pairwise(waypoints):
         trigger = PhotoTrigger(waypoint, previous.position, 0, before)
-        if waypoint.trigger_distance is not None:
+        if trigger.distance is not None:
             found = trigger.pass_all()
             places += [(float(place[0]), float(place[1])) for place in found]
-            goes_on = before is not None and before.distance == waypoint.trigger_distance
-            gaps += [waypoint.trigger_distance] * (len(found) - (not goes_on))
+            goes_on = before is not None and before.distance == trigger.distance
+            gaps += [trigger.distance] * (len(found) - (not goes_on))
         if len(places) > MOST_PHOTOS:
             raise SchedulerError(
                 f"the survey takes more than {MOST_PHOTOS} pictures: draw a smaller area, fly "

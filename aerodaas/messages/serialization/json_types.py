@@ -18,7 +18,6 @@ __all__ = [
     "Int64",
     "NanIsNull",
     "NestedLists",
-    "PairsAsObject",
     "Real",
     "SignedBits",
     "StrictlyTyped",
@@ -87,34 +86,6 @@ class StrictlyTyped:
         schema = handler(source)
         schema["strict"] = True  # type: ignore[typeddict-unknown-key] - any scalar's has it
         return schema
-
-
-@dataclass(frozen=True)
-class PairsAsObject:
-    """A tuple of pairs of texts as an object; read from an object or a list of pairs.
-
-    Args:
-        longest: Most pairs that are read.
-    """
-
-    longest: int = 1000
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema by which pydantic reads and writes the pairs."""
-        from pydantic_core import core_schema  # noqa: PLC0415 - slow to load
-
-        del source
-        texts = handler.generate_schema(dict[str, str])
-        pairs = handler.generate_schema(tuple[tuple[str, str], ...])
-        texts["max_length"] = self.longest  # type: ignore[typeddict-unknown-key] - a dictionary's
-        return core_schema.union_schema(
-            [texts, pairs],
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                dict, return_schema=texts
-            ),
-        )
 
 
 @dataclass(frozen=True)

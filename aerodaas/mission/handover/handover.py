@@ -8,7 +8,7 @@ and the first setpoint, or order to return or land, ends the vehicle's mission m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -27,7 +27,6 @@ from aerodaas.messages.mission_mode import (
     PlannedPlace,
 )
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
-from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Answer, HandOver, TakeBack
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
@@ -82,7 +81,9 @@ def unflyable(
     reasons = []
     if limits.rangefinder_clearance > 0.0:
         reasons.append("rangefinder_clearance is kept by setpoints alone")
-    reasons += [f"{stop.id}: {text}" for stop in stops for text in _asks(stop.waypoint)]
+    for stop in stops:
+        purposes = dict.fromkeys(action.purpose for action in stop.waypoint.actions)
+        reasons += [f"{stop.id}: it {purpose}" for purpose in purposes]
     places = [position, *(stop.waypoint.position for stop in stops)]
     for stop, (start, end) in zip(stops, pairwise(places), strict=True):
         text = ""
@@ -95,19 +96,6 @@ def unflyable(
         reasons += [f"{stop.id}: {text}"] if text else []
     more = f"; and {len(reasons) - _NAMED} more" if len(reasons) > _NAMED else ""
     return "; ".join(reasons[:_NAMED]) + more
-
-
-def _asks(waypoint: Waypoint) -> Iterator[str]:
-    if waypoint.photo or waypoint.trigger_distance or waypoint.trigger_interval:
-        yield "it takes pictures"
-    if waypoint.gimbal is not None or waypoint.look_at is not None:
-        yield "it turns the gimbal"
-    if waypoint.lens is not None:
-        yield "it sets the camera's lens"
-    if waypoint.video is not None:
-        yield "it begins or ends a video"
-    if waypoint.actuate:
-        yield "it moves actuators"
 
 
 def _too_low(start: Vector, end: Vector, clearance: GroundClearance) -> str:

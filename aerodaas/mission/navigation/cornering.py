@@ -15,6 +15,7 @@ import numpy as np
 from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.geometry.braking import braking_distance, braking_speed
 from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.actions import TriggerPhotos
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.navigation.leg import Leg
@@ -96,7 +97,7 @@ class Cornering:
             or rest > _ROUNDING
             or not leg.is_facing(odometry.yaw)
             or _stays(stop.waypoint)
-            or following.waypoint.trigger_distance is not None
+            or _takes_pictures_by_distance(following.waypoint)
             or self.photographer.ends_with_picture(stop, self.limits.arrival_radius)
         ):
             return 0.0
@@ -122,11 +123,9 @@ class Cornering:
 
 def _stays(waypoint: Waypoint) -> bool:
     """Whether there is something to do at a waypoint for which the drone stays there."""
-    return bool(
-        waypoint.hover_duration > 0.0
-        or waypoint.photo
-        or waypoint.actuate
-        or waypoint.gimbal is not None
-        or waypoint.lens is not None
-        or waypoint.video is not None
-    )
+    return waypoint.hover_duration > 0.0 or any(action.stops for action in waypoint.actions)
+
+
+def _takes_pictures_by_distance(waypoint: Waypoint) -> bool:
+    trigger = waypoint.action(TriggerPhotos)
+    return trigger is not None and trigger.distance is not None

@@ -20,6 +20,7 @@ from aerodaas.config.sections.actuators import (
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.geometry.frames import Vector, length
+from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
@@ -40,8 +41,8 @@ class _Task:
     """Actuator commands of one stop."""
 
     stop: QueuedWaypoint
-    left: list[tuple[str, str]]
-    """Actuators and positions that are still to be taken, in order."""
+    left: list[MoveActuator]
+    """Moves that are still to be made, in order."""
     since: int | None = None
     """Mission clock since which the first of them is due, nanoseconds."""
     number: int | None = None
@@ -82,12 +83,12 @@ class Actuation:
 
     def objection(self, waypoint: Waypoint) -> str:
         """Why what a waypoint asks of actuators is not possible; empty if it is."""
-        return actuator_objection(self.robot.actuators, waypoint.moves, by_waypoint=True)
+        return actuator_objection(self.robot.actuators, waypoint.actions, by_waypoint=True)
 
     def move(self, command: Actuate) -> Answer:
         """Move an actuator by command, wherever the drone is; a failure becomes an alert."""
-        wanted = {command.actuator: command.position}
-        if text := actuator_objection(self.robot.actuators, wanted, by_waypoint=False):
+        actions = [MoveActuator(command.actuator, command.position)]
+        if text := actuator_objection(self.robot.actuators, actions, by_waypoint=False):
             return Answer(accepted=False, text=text)
         try:
             number = self._actuators().move(command.actuator, command.position)
@@ -172,11 +173,11 @@ class Actuation:
 
     def _finish(self, task: _Task, fault: str, now: int) -> None:
         """Go on with the next actuator of a stop; with none after a fault."""
-        (name, position), task.left = task.left[0], task.left[1:]
+        move, task.left = task.left[0], task.left[1:]
         task.number = task.since = None
         if fault:
-            more = f"; nor {', '.join(one for one, _ in task.left)}" if task.left else ""
-            text = f"{task.stop.id}: {name}: {position}: not done: {fault}{more}"
+            more = f"; nor {', '.join(one.actuator for one in task.left)}" if task.left else ""
+            text = f"{task.stop.id}: {move.actuator}: {move.position}: not done: {fault}{more}"
             self.log.alert(now, _KIND, text)
             task.left = []
             if self.robot.mission.on_actuator_failure != "continue":
@@ -194,11 +195,12 @@ class Actuation:
             Whether the drone has to stay there for it; never for longer than the time-out of each
             actuator.
         """
-        if not stop.waypoint.actuate:
+        if stop.waypoint.action(MoveActuator) is None:
             return False
         task = self._tasks.get(stop.id)
         if task is None or task.stop is not stop:
-            task = self._tasks[stop.id] = _Task(stop, list(stop.waypoint.moves.items()))
+            moves = [one for one in stop.waypoint.actions if isinstance(one, MoveActuator)]
+            task = self._tasks[stop.id] = _Task(stop, moves)
         task.attended = now
         if not task.left or not stop.arrived:
             return bool(task.left)
@@ -224,7 +226,7 @@ class Actuation:
             actuators.withdraw(task.number)
             raise VehicleError(f"not told within {timeout:g} s that it is done")
         if task.number is None and near:
-            task.number = actuators.move(*task.left[0])
+            task.number = actuators.move(*task.left[0].names)
 
     def _actuators(self) -> Actuators:
         actuators = None if self.vehicle is None else self.vehicle.actuators

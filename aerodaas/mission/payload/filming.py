@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from aerodaas.clock import seconds
 from aerodaas.errors import VehicleError, failure_line
+from aerodaas.messages.actions import RecordVideo
 from aerodaas.messages.payload import VideoCamera
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.log import MissionLog
@@ -63,14 +64,14 @@ class Filming:
         Returns:
             Whether the drone has to stay there for it; never for longer than the time-out.
         """
-        on = stop.waypoint.video
-        if on is None:
+        action = stop.waypoint.action(RecordVideo)
+        if action is None:
             return False
         if self._served.get(stop.id) is not stop:
             if not stop.arrived:
                 return True
             self._served[stop.id] = stop
-            self._order_camera(_Order(on, f"at {stop.id}", now), now)
+            self._order_camera(_Order(action.on, f"at {stop.id}", now), now)
             self.poll(now)
         order = self._order
         return order is not None and not (order.acknowledged or order.over)

@@ -13,6 +13,7 @@ import numpy as np
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import Vector, length, wrap_angle
+from aerodaas.messages.actions import TriggerPhotos
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
 
@@ -53,9 +54,10 @@ class PhotoTrigger:
         `before` is the trigger of a leg that ended at `start`: one of the same distance or interval
         is gone on with.
         """
-        self.distance = waypoint.trigger_distance
+        action = waypoint.action(TriggerPhotos)
+        self.distance = None if action is None else action.distance
         """Metres between two pictures; None by time."""
-        self.interval = waypoint.trigger_interval
+        self.interval = None if action is None else action.interval
         """Seconds between two pictures; None by distance."""
         self._start = start
         self._way = waypoint.position - start

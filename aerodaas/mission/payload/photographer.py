@@ -15,6 +15,7 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.errors import VehicleError, failure_line
 from aerodaas.geometry.frames import Vector
+from aerodaas.messages.actions import AimGimbal, LookAt, SetLens, TakePhoto
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import (
     Gimbal,
@@ -26,6 +27,7 @@ from aerodaas.messages.payload import (
     PhotoOutcome,
 )
 from aerodaas.messages.vehicle import PayloadVehicle
+from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog, words
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.payload.filming import Filming
@@ -179,9 +181,13 @@ class _Task:
     """Pictures on the way to one stop, and at it."""
 
     stop: QueuedWaypoint
+    trigger: PhotoTrigger
+    photo: bool
+    """Whether a picture is taken at the stop."""
     aim: GimbalTarget | None
     """Where the gimbal is to look, within its range; None to leave it."""
-    trigger: PhotoTrigger
+    lens: LensTarget | None
+    """Zoom and focus; None to leave them."""
     told_at: int | None = None
     """Mission clock at which the gimbal was told, nanoseconds."""
     began: int | None = None
@@ -189,6 +195,16 @@ class _Task:
     request: PhotoRequest | None = None
     """The picture that was asked for."""
     over: bool = False
+
+
+def _targets(waypoint: Waypoint) -> tuple[bool, GimbalTarget | None, LensTarget | None]:
+    """Whether a picture is taken, and targets for gimbal and lens."""
+    aim, lens = waypoint.action(AimGimbal), waypoint.action(SetLens)
+    return (
+        waypoint.action(TakePhoto) is not None,
+        None if aim is None else GimbalTarget(aim.pitch, aim.yaw),
+        None if lens is None else LensTarget(lens.zoom, lens.focus),
+    )
 
 
 class Photographer:
@@ -321,13 +337,13 @@ class Photographer:
             follows = before is not None and before.stop.arrived
             start = before.stop.waypoint.position if before and follows else odometry.position
             earlier = before.trigger if before and follows else None
-            trigger = PhotoTrigger(waypoint, start, now, earlier)
-            task = self._tasks[stop.id] = _Task(stop, waypoint.gimbal, trigger)
-            task.over = waypoint.gimbal is None and waypoint.lens is None and not waypoint.photo
+            task = _Task(stop, PhotoTrigger(waypoint, start, now, earlier), *_targets(waypoint))
+            task.over = task.aim is None and task.lens is None and not task.photo
+            self._tasks[stop.id] = task
         self._served = task
-        if waypoint.look_at is not None:
-            self._point_of_interest.at(np.array(waypoint.look_at))
-        elif waypoint.gimbal is not None:
+        if (look := waypoint.action(LookAt)) is not None:
+            self._point_of_interest.at(np.array(look.place))
+        elif waypoint.action(AimGimbal) is not None:
             self._point_of_interest.at(None)
         return task
 
@@ -359,7 +375,7 @@ class Photographer:
         gimbal = self._gimbal()
         if task.aim is not None and gimbal is None:
             raise VehicleError("the vehicle has no gimbal, or none that answers")
-        if task.stop.waypoint.photo and self._shutter.camera is None:
+        if task.photo and self._shutter.camera is None:
             raise VehicleError(NO_CAMERA)
         lens = self._lens_set(task)
         there = self._point_of_interest.place is None or self._point_of_interest.there
@@ -371,7 +387,7 @@ class Photographer:
             raise VehicleError(self._lateness(gimbal, now, lens=lens))
         if not (there and lens) or self._shutter.busy:
             return
-        if task.stop.waypoint.photo:
+        if task.photo:
             task.request = self._shutter.request(task.stop.id, now)
         else:
             task.over = True
@@ -397,7 +413,7 @@ class Photographer:
 
     def _lens_set(self, task: _Task) -> bool:
         """Whether the camera's lens is as it is to be; tells it if not, raises what it objects."""
-        target = task.stop.waypoint.lens
+        target = task.lens
         if target is None:
             return True
         camera = self._shutter.camera
@@ -436,7 +452,7 @@ class Photographer:
 
     def _give_up(self, task: _Task, reason: str, now: int) -> None:
         task.over = True
-        if task.stop.waypoint.photo:
+        if task.photo:
             self._shutter.lose(task.stop.id, reason, now)
         else:
             what = "gimbal not aimed" if task.aim is not None else "lens not set"

@@ -12,6 +12,7 @@ from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.mission import Place, RobotStatus
 from aerodaas.protocol.schemas import (
     Area,
@@ -256,10 +257,11 @@ class FlightOrders:
         """Raise RefusedError for a document that moves what the tenant may not."""
         may = self._settings.actuators.get(tenant, frozenset())
         asked = {
-            f"{entry.robot}/{name}"
+            f"{entry.robot}/{action.actuator}"
             for entry in document.navigation
             for waypoint in entry.waypoints
-            for name in waypoint.moves
+            for action in waypoint.actions
+            if isinstance(action, MoveActuator)
         }
         if refused := sorted(asked - may):
             raise RefusedError(

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
+from keywords import keywords
 from plan_files import plan
 
 from aerodaas.errors import ConfigError
@@ -128,7 +129,7 @@ def test_a_structure_scan_is_flown_around_the_structure(tmp_path: Path) -> None:
         ("DO_SET_ROI_WPNEXT_OFFSET", 1),
         ("DO_SET_ROI_NONE", 1),
     ]
-    triggered = [one.trigger_distance is not None for one in waypoints]
+    triggered = [keywords(one).trigger_distance is not None for one in waypoints]
     assert triggered == [False, *[False, True, True, True, True] * 4, False]
 
 

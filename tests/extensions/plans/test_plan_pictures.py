@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from keywords import keywords
 from plan_files import item, lines, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, Waypoint
@@ -47,8 +48,13 @@ def test_a_survey_of_qgroundcontrol_takes_its_pictures(tmp_path: Path) -> None:
     )
     waypoints, notices = read(tmp_path, do(205, -90, 0, 0, z=2), transects, item(20, [0] * 7, 2))
     assert notices == []
-    assert [one.trigger_distance for one in waypoints] == [None, 25.0, None, 25.0]
-    assert [one.gimbal_pitch for one in waypoints] == [pytest.approx(DOWN), None, None, None]
+    assert [keywords(one).trigger_distance for one in waypoints] == [None, 25.0, None, 25.0]
+    assert [keywords(one).gimbal_pitch for one in waypoints] == [
+        pytest.approx(DOWN),
+        None,
+        None,
+        None,
+    ]
 
 
 def test_pictures_of_hover_and_capture_are_the_waypoints_before(tmp_path: Path) -> None:
@@ -63,10 +69,10 @@ def test_pictures_of_hover_and_capture_are_the_waypoints_before(tmp_path: Path) 
         waypoint(0.003),
     )
     assert notices == []
-    assert [one.photo for one in waypoints] == [True, True, False]
-    assert waypoints[0].gimbal_pitch == pytest.approx(math.radians(-45))
-    assert waypoints[0].gimbal_yaw == pytest.approx(math.radians(-30))
-    assert waypoints[1].gimbal is None
+    assert [keywords(one).photo for one in waypoints] == [True, True, False]
+    assert keywords(waypoints[0]).gimbal_pitch == pytest.approx(math.radians(-45))
+    assert keywords(waypoints[0]).gimbal_yaw == pytest.approx(math.radians(-30))
+    assert keywords(waypoints[1]).gimbal_pitch is None
 
 
 @pytest.mark.parametrize(
@@ -79,7 +85,7 @@ def test_pictures_by_time_go_on_until_they_are_stopped(tmp_path: Path, begin: An
         *(waypoint(0.001), begin, waypoint(0.002), waypoint(0.003), do(2001), waypoint(0.004)),
     )
     assert notices == []
-    assert [one.trigger_interval for one in waypoints] == [None, 3.0, 3.0, None]
+    assert [keywords(one).trigger_interval for one in waypoints] == [None, 3.0, 3.0, None]
 
 
 def test_a_region_of_interest_is_looked_at_until_it_ends(tmp_path: Path) -> None:
@@ -94,10 +100,15 @@ def test_a_region_of_interest_is_looked_at_until_it_ends(tmp_path: Path) -> None
         waypoint(0.004),
     )
     assert notices == []
-    assert [one.look_at for one in waypoints] == [None, (47.0015, 8.001, 3.0), None, None]
-    assert [one.gimbal is not None for one in waypoints] == [False, False, False, True]
+    assert [keywords(one).look_at for one in waypoints] == [None, (47.0015, 8.001, 3.0), None, None]
+    assert [keywords(one).gimbal_pitch is not None for one in waypoints] == [
+        False,
+        False,
+        False,
+        True,
+    ]
     old = read(tmp_path, do(201, 3, x=47.1, y=8.1, z=4, frame=3), waypoint(0.001))[0]
-    assert old[0].look_at == (47.1, 8.1, 4.0)
+    assert keywords(old[0]).look_at == (47.1, 8.1, 4.0)
 
 
 def test_zoom_and_focus_are_the_next_waypoints(tmp_path: Path) -> None:
@@ -120,10 +131,10 @@ def test_zoom_and_focus_are_the_next_waypoints(tmp_path: Path) -> None:
         waypoint(0.004),
     )
     assert notices == []
-    assert [one.zoom for one in waypoints] == [20.0, None, 100.0, 30.0, 40.0, None]
-    assert [one.focus for one in waypoints] == [None, 0.0, 55.5, None, None, None]
-    assert [one.photo for one in waypoints] == [False, False, True, False, False, False]
-    assert [one.trigger_distance for one in waypoints][-2:] == [None, 25.0]
+    assert [keywords(one).zoom for one in waypoints] == [20.0, None, 100.0, 30.0, 40.0, None]
+    assert [keywords(one).focus for one in waypoints] == [None, 0.0, 55.5, None, None, None]
+    assert [keywords(one).photo for one in waypoints] == [False, False, True, False, False, False]
+    assert [keywords(one).trigger_distance for one in waypoints][-2:] == [None, 25.0]
     assert waypoints[3].x == waypoints[4].x
 
 
@@ -139,10 +150,13 @@ def test_a_lens_that_is_set_anew_for_pictures_is_a_waypoint_of_its_own(tmp_path:
         do(2000, 0, 0, 1),
     )
     assert notices == []
-    assert [(one.zoom, one.focus) for one in waypoints] == [(10.0, None), (40.0, 50.0)]
-    assert [one.photo for one in waypoints] == [False, True]
+    assert [(keywords(one).zoom, keywords(one).focus) for one in waypoints] == [
+        (10.0, None),
+        (40.0, 50.0),
+    ]
+    assert [keywords(one).photo for one in waypoints] == [False, True]
     assert [one.hover_duration for one in waypoints] == [5.0, 0.0]
-    assert [one.gimbal is None for one in waypoints] == [False, True]
+    assert [keywords(one).gimbal_pitch is None for one in waypoints] == [False, True]
     assert len({one.id for one in waypoints}) == 2
     assert np.array_equal(waypoints[0].position, waypoints[1].position)
 
@@ -151,7 +165,7 @@ def test_mission_planners_lens_is_read(tmp_path: Path) -> None:
     """Its lines have the same parameters."""
     rows = ("0 531 2 75 0 0 0 0 0", "0 532 2 100 0 0 0 0 0", "3 16 0 0 0 0 47.001 8 20")
     ((one,), notices) = flown_plan(lines(tmp_path / "a.waypoints", *rows))
-    assert (one.zoom, one.focus) == (75.0, 100.0)
+    assert (keywords(one).zoom, keywords(one).focus) == (75.0, 100.0)
     assert notices == []
 
 
@@ -198,7 +212,7 @@ def test_mission_planner_writes_no_mount_mode(tmp_path: Path) -> None:
     """ArduPilot does not look at it; PX4's 0 is to fold the gimbal away."""
     path = lines(tmp_path / "a.waypoints", "0 205 -60 0 0 0 0 0 0", "3 16 0 0 0 0 47.001 8 20")
     ((one,), notices) = flown_plan(path)
-    assert one.gimbal_pitch == pytest.approx(math.radians(-60))
+    assert keywords(one).gimbal_pitch == pytest.approx(math.radians(-60))
     assert notices == []
     assert "not mode 0" in read(tmp_path, do(205, -60), waypoint(0.001))[1][0]
 
@@ -232,14 +246,14 @@ def test_a_video_begins_and_ends_at_the_waypoint_before(tmp_path: Path) -> None:
         waypoint(0.003),
     )
     assert notices == []
-    assert [one.video for one in waypoints] == [True, False, None]
-    assert [one.photo for one in waypoints] == [True, False, False]
-    assert [one.gimbal is not None for one in waypoints] == [True, False, True]
-    assert [one.zoom for one in waypoints] == [30.0, None, None]
+    assert [keywords(one).video for one in waypoints] == [True, False, None]
+    assert [keywords(one).photo for one in waypoints] == [True, False, False]
+    assert [keywords(one).gimbal_pitch is not None for one in waypoints] == [True, False, True]
+    assert [keywords(one).zoom for one in waypoints] == [30.0, None, None]
     both = read(tmp_path, waypoint(0.001), do(2500), do(2501))[0]
-    assert [one.video for one in both] == [True, False]
+    assert [keywords(one).video for one in both] == [True, False]
     begun = read(tmp_path, waypoint(0.001), do(1000, -45, 30, None, None, x=12), do(2500))[0]
-    assert begun[0].gimbal_pitch == pytest.approx(math.radians(-45))
+    assert keywords(begun[0]).gimbal_pitch == pytest.approx(math.radians(-45))
 
 
 def test_a_video_keeps_its_place_among_stay_picture_and_actuators(tmp_path: Path) -> None:
@@ -252,10 +266,10 @@ def test_a_video_keeps_its_place_among_stay_picture_and_actuators(tmp_path: Path
     hook = GripperConfig(id="hook", type="gripper")
     waypoints, notices = flown_plan(path, actuators=[hook])
     assert notices == []
-    assert [one.video for one in waypoints] == [None, True, False, None, None, True]
+    assert [keywords(one).video for one in waypoints] == [None, True, False, None, None, True]
     assert [one.hover_duration for one in waypoints] == [5.0, 7.0, 0.0, 0.0, 0.0, 0.0]
-    assert [one.photo for one in waypoints] == [False, False, False, True, False, False]
-    assert [bool(one.moves) for one in waypoints] == [False] * 4 + [True, False]
+    assert [keywords(one).photo for one in waypoints] == [False, False, False, True, False, False]
+    assert [bool(keywords(one).actuate) for one in waypoints] == [False] * 4 + [True, False]
     assert len({one.id for one in waypoints}) == 6
     assert len({one.x for one in waypoints}) == 2
 
@@ -290,17 +304,17 @@ def test_pictures_come_back(
     waypoints, notices = flown_plan(path)
     assert [notice.command for notice in notices] == ["NAV_TAKEOFF"]
     came = [one.resolve(np.zeros(3), HOME) for one in waypoints]
-    assert [one.photo for one in came] == [one.photo for one in asked]
-    assert [one.video for one in came] == [one.video for one in asked]
+    assert [keywords(one).photo for one in came] == [keywords(one).photo for one in asked]
+    assert [keywords(one).video for one in came] == [keywords(one).video for one in asked]
     assert [one.hover_duration for one in came] == [one.hover_duration for one in asked]
     for ours, theirs in zip(asked, came, strict=True):
-        assert theirs.trigger_distance == pytest.approx(ours.trigger_distance)
-        assert theirs.trigger_interval == pytest.approx(ours.trigger_interval)
-        assert theirs.gimbal_pitch == pytest.approx(ours.gimbal_pitch, abs=1e-9)
-        assert theirs.gimbal_yaw == pytest.approx(ours.gimbal_yaw, abs=1e-9)
-        assert theirs.look_at == pytest.approx(ours.look_at, abs=0.01)
-        assert theirs.zoom == pytest.approx(ours.zoom, abs=1e-6)
-        assert theirs.focus == pytest.approx(ours.focus, abs=1e-6)
+        assert keywords(theirs).trigger_distance == pytest.approx(keywords(ours).trigger_distance)
+        assert keywords(theirs).trigger_interval == pytest.approx(keywords(ours).trigger_interval)
+        assert keywords(theirs).gimbal_pitch == pytest.approx(keywords(ours).gimbal_pitch, abs=1e-9)
+        assert keywords(theirs).gimbal_yaw == pytest.approx(keywords(ours).gimbal_yaw, abs=1e-9)
+        assert keywords(theirs).look_at == pytest.approx(keywords(ours).look_at, abs=0.01)
+        assert keywords(theirs).zoom == pytest.approx(keywords(ours).zoom, abs=1e-6)
+        assert keywords(theirs).focus == pytest.approx(keywords(ours).focus, abs=1e-6)
 
 
 def test_what_a_ground_station_finds_of_pictures(tmp_path: Path) -> None:

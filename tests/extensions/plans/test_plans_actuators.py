@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from keywords import keywords
 from plan_files import item, plan
 
 from aerodaas import AeroNavigation, Waypoint
@@ -46,7 +47,7 @@ def test_items_become_moves_of_the_waypoint_before(tmp_path: Path) -> None:
         item(16, [0, 0, 0, None, 47.0019, 8.0, 20]),
     )
     waypoints, notices = flown_plan(path, actuators=CARRIED)
-    assert [(one.id, one.moves) for one in waypoints] == [
+    assert [(one.id, keywords(one).actuate) for one in waypoints] == [
         ("item1", {"hatch": "open", "hook": "release", "pump": "on"}),
         ("item5", {"pump": "off"}),
         ("item6", {}),
@@ -70,7 +71,7 @@ def test_what_moves_nothing_is_said(
     """An unknown number, another pulse, a toggle; and a plan fires no parachute."""
     path = plan(tmp_path / "drop.plan", HERE, item(number, [*values, 0, 0, 0, 0, 0], 2))
     waypoints, notices = flown_plan(path, actuators=CARRIED)
-    assert waypoints[0].moves == {}
+    assert keywords(waypoints[0]).actuate == {}
     assert [notice.why for notice in notices] == [said]
 
 
@@ -101,7 +102,7 @@ def test_what_is_written_is_read_again(asked: list[dict[str, str]]) -> None:
     ]
     made: Plan = planned(flown, HOME, None, CARRIED)[0]
     read, _ = waypoints_of(made, None, None, CARRIED)
-    assert [one.moves for one in read] == asked
+    assert [keywords(one).actuate for one in read] == asked
 
 
 def test_what_a_plan_cannot_hold_is_refused(tmp_path: Path) -> None:
@@ -112,4 +113,4 @@ def test_what_a_plan_cannot_hold_is_refused(tmp_path: Path) -> None:
         navigation.to_plan(tmp_path / "drop.plan", HOME)
     navigation.to_plan(tmp_path / "drop.plan", HOME, actuators=CARRIED)
     read, _ = flown_plan(tmp_path / "drop.plan", actuators=CARRIED)
-    assert read[0].moves == {"hook": "release"}
+    assert keywords(read[0]).actuate == {"hook": "release"}

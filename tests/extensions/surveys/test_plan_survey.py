@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from flying import FLAT, robot
+from keywords import keywords
 
 from aerodaas import AeroNavigation, Environment
 from aerodaas.errors import SchedulerError
@@ -41,8 +42,8 @@ def test_a_robot_plans_a_survey_by_its_camera(tmp_path: Path) -> None:
     AeroNavigation(data=survey.waypoints).to_plan(plan, GeodeticOrigin(47.0, 8.0, 500.0))
     with pytest.warns(UserWarning, match="NAV_TAKEOFF"):
         came = AeroNavigation.from_plan(plan).waypoints
-    assert [one.trigger_distance for one in came] == [
-        one.trigger_distance for one in survey.waypoints
+    assert [keywords(one).trigger_distance for one in came] == [
+        keywords(one).trigger_distance for one in survey.waypoints
     ]
     with pytest.raises(SchedulerError, match="a height or a ground resolution"):
         plan_survey(env.get_robot_by_id("drone"), field)

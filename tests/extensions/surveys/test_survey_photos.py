@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from keywords import keywords
 from surveyors import simulated, surveying
 
 from aerodaas.errors import ConfigError, SchedulerError
@@ -71,7 +72,7 @@ def test_a_lens_that_zooms_is_set_to_what_was_planned_with() -> None:
     for settings, zoom in (({**DOWN, "zoom": 4}, 0.0), (DOWN, None)):
         camera = survey_camera(surveying("simulated", settings))
         survey = planned_survey(surveying(), FIELD, SurveySettings(10.0, camera=camera))
-        assert {one.zoom for one in survey.waypoints} == {zoom}
+        assert {keywords(one).zoom for one in survey.waypoints} == {zoom}
 
 
 def test_a_robot_has_its_camera() -> None:

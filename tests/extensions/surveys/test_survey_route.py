@@ -98,9 +98,10 @@ def test_a_survey_is_planned_by_its_camera(mapper: FlightServer) -> None:
     assert 0.9 * 1.2 < photos["spacing"] <= 1.2
     assert photos["interval"] == pytest.approx(photos["spacing"])
     assert "needs 2 s for one" in photos["warning"]
-    triggers = [one.get("trigger_distance") for one in answer["waypoints"]]
+    actions = [{one["type"]: one for one in stop["actions"]} for stop in answer["waypoints"]]
+    triggers = [one.get("trigger_photos", {}).get("distance") for one in actions]
     assert sum(one is not None for one in triggers) == answer["sweeps"]
-    assert {one["gimbal_pitch"] for one in answer["waypoints"]} == {-math.pi / 2}
+    assert {one["aim_gimbal"]["pitch"] for one in actions} == {-math.pi / 2}
     assert len(photos["places"]) > 15 * answer["sweeps"]
     assert ask(mapper.address(), "/v1/missions/own/survey", SURVEY)[2]["photos"] is None
 

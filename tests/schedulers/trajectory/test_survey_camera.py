@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from keywords import keywords
 
 from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.trajectory.coverage import cover
@@ -95,12 +96,14 @@ def test_every_place_is_on_as_many_pictures_as_the_overlap_says(
     most = camera.trigger_distance(20.0)
     lines = []
     for before, there in pairwise(plan.waypoints):
-        assert there.gimbal_pitch == -math.pi / 2
-        if there.trigger_distance is None:
+        assert keywords(there).gimbal_pitch == -math.pi / 2
+        if keywords(there).trigger_distance is None:
             continue
         long = math.dist((before.x, before.y), (there.x, there.y))
-        assert there.trigger_distance <= most + 1e-9
-        assert long / there.trigger_distance == pytest.approx(round(long / there.trigger_distance))
+        assert keywords(there).trigger_distance <= most + 1e-9
+        assert long / keywords(there).trigger_distance == pytest.approx(
+            round(long / keywords(there).trigger_distance)
+        )
         lines.append(shapely.LineString([(before.x, before.y), (there.x, there.y)]))
     assert len(lines) == plan.sweeps
     for one, other in pairwise(sorted(lines, key=lambda line: line.centroid.coords[0])):
@@ -112,16 +115,16 @@ def test_a_strip_around_a_zone_is_one_line() -> None:
     plan = cover(
         FIELD, height=20.0, camera=SurveyCamera(1.0, gimbal=False), no_fly=[ZONE], start=(0.0, 0.0)
     )
-    distances = [one.trigger_distance for one in plan.waypoints]
+    distances = [keywords(one).trigger_distance for one in plan.waypoints]
     groups = " ".join("x" if one is None else f"{one:.6f}" for one in distances).split("x")
     kinds = [set(group.split()) for group in groups if group.split()]
     assert len(kinds) == plan.sweeps
     assert all(len(kind) == 1 for kind in kinds)
     assert max(len(group.split()) for group in groups) > 1
-    assert {one.gimbal_pitch for one in plan.waypoints} == {None}
+    assert {keywords(one).gimbal_pitch for one in plan.waypoints} == {None}
 
 
 def test_a_width_alone_takes_no_pictures() -> None:
     """As ever."""
     plan = cover(FIELD, height=20.0, width=10.0)
-    assert {one.trigger_distance for one in plan.waypoints} == {None}
+    assert {keywords(one).trigger_distance for one in plan.waypoints} == {None}
