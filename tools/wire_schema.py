@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import TypeAdapter, create_model
 from pydantic.json_schema import JsonSchemaMode
 
-from aerodaas.config.sections.robot import CameraConfig, RobotConfig
+from aerodaas.config.sections.robot import CameraConfig, LimitsConfig, RobotConfig
 from aerodaas.extensions.surveys.messages import SurveyIn, SurveyOut
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
@@ -49,10 +49,18 @@ _OUT: tuple[type, ...] = (
     StateMessage,
     SurveyOut,
 )
-_DRAWN = ("id", "limits", "sensors", "start")
+_DRAWN = ("id", "sensors", "start")
 _FIELDS: dict[str, Any] = {
     name: (RobotConfig.model_fields[name].annotation, ...) for name in _DRAWN
 }
+_HEEDED = ("cruise_speed", "geofence", "max_climb", "max_speed", "takeoff_height")
+_LIMITS: dict[str, Any] = {
+    name: (LimitsConfig.model_fields[name].annotation, ...) for name in _HEEDED
+}
+_FIELDS["limits"] = (
+    create_model("LimitsConfig", __doc__="Limits, as far as the page heeds them.", **_LIMITS),
+    ...,
+)
 _ROBOT = create_model(
     "RobotConfig", __doc__="One drone of an environment, as far as the page draws it.", **_FIELDS
 )

@@ -132,6 +132,9 @@ class Extension:
     mavlink_components: tuple[str, ...] = ()
     """`module:Class` of each `drivers.mavlink.component.MavlinkComponent` of every MAVLink
     vehicle: equipment beside its autopilot, by its own messages."""
+    safety_rules: tuple[str, ...] = ()
+    """`module:Class` of each `mission.safety.supervisor.SafetyRule` of every drone, made with the
+    robot's limits."""
     preflight_checks: tuple[str, ...] = ()
     """`module:function` of items of the list before take-off: each gets a robot's limits and its
     preflight settings, and returns a `mission.safety.checklist.PreflightCheck`."""

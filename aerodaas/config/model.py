@@ -42,7 +42,6 @@ from aerodaas.config.sections.robot import (
     SensorConfig,
 )
 from aerodaas.config.sections.terrain import TerrainConfig
-from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier, ScopedName
 from aerodaas.text.json_text import check_plain, read_json
 
@@ -71,7 +70,6 @@ __all__ = [
     "TaskConfig",
     "TenantConfig",
     "TerrainConfig",
-    "TrafficConfig",
     "as_runtime_env",
     "validated",
 ]

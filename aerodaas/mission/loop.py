@@ -26,7 +26,6 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import traffic_neighbours
 
 __all__ = ["SetpointLoop"]
 
@@ -158,7 +157,7 @@ class SetpointLoop:
         return self._send(VelocitySetpoint(np.zeros(3)), state, now, neighbours)
 
     def _around(self, state: VehicleState, neighbours: Iterable[Neighbour]) -> list[Neighbour]:
-        return [*neighbours, *traffic_neighbours(state, self.mission.limits.traffic)]
+        return [*neighbours, *self.mission.neighbours(state)]
 
     def _ask(self, action: TakeOff | Land | Return, state: VehicleState, now: int) -> None:
         """Request the action once, then every second while the vehicle's mode does not show it."""

@@ -70,6 +70,7 @@ from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motors import MotorWatch
+from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.supervisor import CALM, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
 
@@ -179,6 +180,10 @@ class Mission:
     def finished(self) -> bool:
         """Whether the mission is over, completed or not."""
         return self.state in TERMINAL
+
+    def neighbours(self, state: VehicleState) -> list[Neighbour]:
+        """What else flies around the vehicle, by the safety rules of extensions."""
+        return self._supervisor.neighbours(state)
 
     @property
     def alerts(self) -> Sequence[Alert]:

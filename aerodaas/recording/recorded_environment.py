@@ -92,7 +92,6 @@ _LIMITS: dict[str, Rule] = {
         "battery_land",
     ),
     "geofence": _fields("polygon", "floor", "ceiling", "margin", "no_fly"),
-    "traffic": _fields("action", "distance", "height", "lookahead"),
 }
 _ROBOT: dict[str, Rule] = {
     "id": _word,

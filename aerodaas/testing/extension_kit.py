@@ -62,6 +62,7 @@ def _places(extension: Extension) -> Iterator[str]:
     yield from extension.elevation_formats.values()
     yield from extension.routes
     yield from extension.mavlink_components
+    yield from extension.safety_rules
     yield from extension.preflight_checks
     yield from extension.report_sections
     yield from extension.services.values()

@@ -778,31 +778,14 @@ export interface RobotConfig {
   start: [number, number, number];
 }
 /**
- * Limits that the drone's node enforces, and the delays of its watchdogs.
+ * Limits, as far as the page heeds them.
  */
 export interface LimitsConfig {
-  arrival_radius: number;
-  battery_land: number;
-  battery_return: number;
-  command_timeout: number;
   cruise_speed: number;
-  endurance: number;
   geofence: GeofenceConfig;
-  link_timeout: number;
-  max_acceleration: number;
   max_climb: number;
-  max_range: number;
   max_speed: number;
-  max_yaw_rate: number;
-  preflight_timeout: number;
-  rangefinder_clearance: number;
-  reaction_time: number;
-  return_timeout: number;
-  separation: number;
-  silence_return: number;
   takeoff_height: number;
-  takeoff_timeout: number;
-  traffic: TrafficConfig;
 }
 /**
  * Where the drone may be: a polygon in ENU metres, a floor and a ceiling above home.
@@ -813,16 +796,6 @@ export interface GeofenceConfig {
   margin: number;
   no_fly: [number, number][][];
   polygon: [number, number][];
-}
-/**
- * Other aircraft, as the vehicle hears them (ADS-B), and what they mean in flight.
- */
-export interface TrafficConfig {
-  action: "ignore" | "warn" | "hold" | "return" | "land";
-  distance: number;
-  height: number;
-  lookahead: number;
-  own_address: string | null;
 }
 /**
  * One sensor. `driver` names a camera or reading; further settings go to that driver.

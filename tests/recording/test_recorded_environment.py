@@ -93,8 +93,6 @@ LOCAL_ALONE = {
     "simulation.execution_times",
     "simulation.network",
     "simulation.network_period",
-    # Recorded traffic has no echo of the drone's own.
-    "robots.limits.traffic.own_address",
     # Policies of who flies: whether a parachute may be fired, what a take-off is refused for.
     "robots.actuators.may_release",
     *(f"robots.preflight.{name}" for name in core_fields(PreflightConfig)),

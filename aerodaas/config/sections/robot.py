@@ -12,7 +12,6 @@ from aerodaas.config.extensions import SettingsSection
 from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.identifiers import Identifier
 
 __all__ = [
@@ -95,7 +94,6 @@ class LimitsConfig(Extensible):
     battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
     """Charge at which it lands where it is, and that a return keeps in reserve."""
     geofence: GeofenceConfig = GeofenceConfig()
-    traffic: TrafficConfig = TrafficConfig()
 
     @model_validator(mode="after")
     def _agree(self) -> Self:

@@ -17,7 +17,6 @@ import numpy as np
 from aerodaas.clock import Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.config.sections.actuators import ACTUATOR_TYPES
-from aerodaas.drivers.mavlink.airspace.airspace import Airspace
 from aerodaas.drivers.mavlink.component import (
     ComponentContext,
     MessageHandler,
@@ -96,7 +95,7 @@ class MavlinkVehicle:
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
         context = ComponentContext(self._robot, self._settings, self._telemetry)
-        self._components = [Airspace(context), *mavlink_components(context)]
+        self._components = mavlink_components(context)
         self._report = VehicleReport(
             self._telemetry, self._phase, self._touchdown, self._components
         )

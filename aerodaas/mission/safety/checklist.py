@@ -22,7 +22,6 @@ from aerodaas.messages.payload import CameraStatus
 from aerodaas.messages.vehicle import Vehicle, VehicleState
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
-from aerodaas.mission.safety.traffic import DEMANDS, encounters
 
 __all__ = ["Checklist", "PreflightCheck", "concerns", "refusals", "sun_elevation"]
 
@@ -84,7 +83,6 @@ _REMEDIES = {
     "fence": "move the drone, or mend limits.geofence",
     "fallback": '"fallback": "set" in the settings of the robot (docs/mavlink.md)',
     "link": "look at antennas, cables and the address",
-    "traffic": "wait until it is gone",
     OWN_CHECKS: "do what it says",
 }
 
@@ -143,7 +141,6 @@ class Checklist:
             if found is not None and check.level != "ignore":
                 texts = faults.get(check.name, [])
                 items.append(_judged(found, check.level, texts) if check.level else found)
-        items += self._traffic(state)
         others = [text for text in faults.get("", []) if text not in objections]
         if others:
             items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
@@ -171,19 +168,6 @@ class Checklist:
         objections = place_objections(state, self._limits, self._fence)
         value = "; ".join(objections) or "inside, and so is the take-off"
         return _by(objections, HealthItem("fence", value, "inside", Verdict.GOOD))
-
-    def _traffic(self, state: VehicleState) -> list[HealthItem]:
-        """Other aircraft, where the vehicle hears of any, judged by `limits.traffic`."""
-        config = self._limits.traffic
-        if config.action == "ignore" or not state.traffic:
-            return []
-        near = encounters(state, state.traffic, config)
-        value = "; ".join(one.text.removeprefix("traffic: ") for one in near)
-        bound = f"none within {config.distance:g} m and {config.height:g} m of height"
-        verdict = Verdict.REFUSED if config.action in DEMANDS else Verdict.WARNING
-        return [
-            HealthItem("traffic", value or "none near", bound, verdict if near else Verdict.GOOD)
-        ]
 
     def _health(self, state: VehicleState, told: HealthReadings) -> Iterator[HealthItem]:
         policy = self._policy

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.config.model import LimitsConfig
 from aerodaas.geometry.energy import EnergyMeter
 from aerodaas.geometry.frames import Vector, is_finite, length
@@ -17,11 +19,12 @@ from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.motion import STANDS_AFTER, MotionWatch
-from aerodaas.mission.safety.traffic import TrafficWatch
+from aerodaas.mission.safety.neighbours import Neighbour
 
 __all__ = [
     "CALM",
     "Assessment",
+    "SafetyRule",
     "Supervisor",
     "charge_objection",
     "has_position",
@@ -74,8 +77,25 @@ CALM = Assessment(Fault(FailsafeAction.NOTHING, "", ""))
 """An assessment without faults."""
 
 
+class SafetyRule(Protocol):
+    """Rule of an extension for one drone in flight (`Extension.safety_rules`)."""
+
+    def assess(self, state: VehicleState, now: int) -> list[Fault]:
+        """Faults at present, and what they demand; the gravest of all rules decides.
+
+        Args:
+            state: The vehicle's state.
+            now: Mission clock at which it was read, nanoseconds.
+        """
+        ...
+
+    def neighbours(self, state: VehicleState) -> list[Neighbour]:
+        """What else flies around the vehicle, to be kept away from."""
+        ...
+
+
 class Supervisor:
-    """Watches battery, link, position, mode and traffic of one vehicle in flight."""
+    """Watches battery, link, position and mode of one vehicle in flight, and extensions' rules."""
 
     _STALE = 1.0
     """Age in seconds from which a vehicle's state no longer shows its position."""
@@ -94,7 +114,11 @@ class Supervisor:
         self._home = home
         self._fence = fence
         self._meter = meter
-        self._traffic = TrafficWatch(limits)
+        self._rules: list[SafetyRule] = [
+            imported(place)(limits)
+            for extension in extensions().values()
+            for place in extension.safety_rules
+        ]
         self.motion = MotionWatch(limits)
         """Told by the setpoint loop what the drone follows."""
         self._taken: Fault | None = None
@@ -127,11 +151,16 @@ class Supervisor:
         if (pilot := checks[0]) is not None:
             self._taken_at = now if self._taken is None else self._taken_at
             self._taken = pilot
-        findings += self._traffic.assess(state, now)
+        for rule in self._rules:
+            findings += rule.assess(state, now)
         findings += [Fault(FailsafeAction.NOTHING, "vehicle", text) for text in state.faults]
         if not findings:
             return CALM
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
+
+    def neighbours(self, state: VehicleState) -> list[Neighbour]:
+        """What else flies around the vehicle, by the rules of extensions."""
+        return [one for rule in self._rules for one in rule.neighbours(state)]
 
     def taken_over(self, now: int) -> tuple[Fault, bool] | None:
         """Fault of a lasting takeover, as last assessed; None without one.

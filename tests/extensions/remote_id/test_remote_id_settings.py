@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from aerodaas.config.checked import added_settings, checked
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue, public_document
-from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.remote_id.settings import RemoteIdConfig, RobotRemoteId
 from aerodaas.recording.recorded_environment import allowed_content
@@ -167,11 +166,3 @@ def test_a_replay_reads_of_a_recording_neither_who_operates_nor_what_is_required
     """Whoever flies again says so."""
     robot = {"id": "drone", "remote_id": {"uas_id": SERIAL}, "preflight": {"remote_id": "require"}}
     assert allowed_content({"robots": [robot]}) == {"robots": [{"id": "drone"}]}
-
-
-def test_the_drones_own_transponder_has_six_digits() -> None:
-    """Hexadecimal ones."""
-    assert TrafficConfig(own_address="4b12Ff").own_address == "4b12Ff"
-    for wrong in ("4B12F", "4B12FF0", "4B12FG", ""):
-        with pytest.raises(ConfigError, match="own_address"):
-            checked(TrafficConfig, {"own_address": wrong}, "limits.traffic")

@@ -7,16 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aerodaas.clock import seconds
-from aerodaas.config.sections.robot import LimitsConfig
-from aerodaas.config.sections.traffic import TrafficConfig
+from aerodaas.config.checked import added_settings
+from aerodaas.config.model import LimitsConfig, PreflightConfig
+from aerodaas.extensions.traffic.settings import TrafficConfig, TrafficLimits
 from aerodaas.geometry.frames import Vector, is_finite
+from aerodaas.messages.health import HealthItem, HealthReadings, Verdict
 from aerodaas.messages.vehicle import Traffic, VehicleState
+from aerodaas.mission.safety.checklist import PreflightCheck
 from aerodaas.mission.safety.failsafe import FailsafeAction, Fault
 from aerodaas.mission.safety.neighbours import Neighbour
 
-__all__ = ["DEMANDS", "Encounter", "TrafficWatch", "encounters", "meets_in", "traffic_neighbours"]
+__all__ = ["Encounter", "TrafficWatch", "encounters", "meets_in", "preflight_check"]
 
-DEMANDS = {
+_DEMANDS = {
     "hold": FailsafeAction.HOLD,
     "return": FailsafeAction.RETURN,
     "land": FailsafeAction.LAND,
@@ -57,11 +60,11 @@ class Encounter:
 
 
 class TrafficWatch:
-    """Demands of the traffic around one drone, cycle by cycle."""
+    """Safety rule of one drone: demands of the traffic around it, cycle by cycle."""
 
     def __init__(self, limits: LimitsConfig) -> None:
         """Judge for a drone of these `limits`."""
-        self._config = config = limits.traffic
+        self._config = config = added_settings(limits, TrafficLimits).traffic
         # It would be near again at once if the drone flew on.
         further = {
             "distance": _RELEASE * config.distance + limits.cruise_speed * config.lookahead,
@@ -78,7 +81,7 @@ class TrafficWatch:
             state: The vehicle's state with the traffic that it sees.
             now: Mission clock, nanoseconds.
         """
-        demand = DEMANDS.get(self._config.action, FailsafeAction.NOTHING)
+        demand = _DEMANDS.get(self._config.action, FailsafeAction.NOTHING)
         known = [one for one in state.traffic if one.address in self._near]
         for one in (
             *encounters(state, state.traffic, self._config),
@@ -92,6 +95,35 @@ class TrafficWatch:
             if seconds(now - when) <= _CLEAR
         }
         return [fault for _, fault in self._near.values()]
+
+    def neighbours(self, state: VehicleState) -> list[Neighbour]:
+        """The aircraft to keep away from, where the drone does more than tell of them."""
+        if self._config.action not in _DEMANDS:
+            return []
+        apart = self._config.distance, self._config.height
+        return [Neighbour(one.position, one.velocity, apart, "traffic") for one in state.traffic]
+
+
+def preflight_check(limits: LimitsConfig, policy: PreflightConfig) -> PreflightCheck:
+    """The item of the list before take-off, where the vehicle hears of any aircraft.
+
+    Args:
+        limits: The robot's limits, `traffic` among them.
+        policy: Levels of other items; none of them counts.
+    """
+    del policy
+    config = added_settings(limits, TrafficLimits).traffic
+
+    def examine(state: VehicleState, _: HealthReadings) -> HealthItem | None:
+        if config.action == "ignore" or not state.traffic:
+            return None
+        near = encounters(state, state.traffic, config)
+        value = "; ".join(one.text.removeprefix("traffic: ") for one in near)
+        bound = f"none within {config.distance:g} m and {config.height:g} m of height"
+        verdict = Verdict.REFUSED if config.action in _DEMANDS else Verdict.WARNING
+        return HealthItem("traffic", value or "none near", bound, verdict if near else Verdict.GOOD)
+
+    return PreflightCheck("traffic", "wait until it is gone", examine)
 
 
 def encounters(
@@ -151,16 +183,3 @@ def _within(way: Vector, closing: Vector, reach: float) -> tuple[float, float]:
         return never
     root = math.sqrt(discriminant)
     return (-half - root) / square, (-half + root) / square
-
-
-def traffic_neighbours(state: VehicleState, config: TrafficConfig) -> list[Neighbour]:
-    """The aircraft to keep away from, where the drone does more than tell of them.
-
-    Args:
-        state: The vehicle's state with the traffic that it sees.
-        config: Distance and height to keep, metres; an action that only tells returns none.
-    """
-    if config.action not in DEMANDS:
-        return []
-    apart = config.distance, config.height
-    return [Neighbour(one.position, one.velocity, apart, "traffic") for one in state.traffic]

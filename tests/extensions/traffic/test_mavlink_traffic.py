@@ -11,9 +11,9 @@ from emulated import FAMILIES, Stepped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config.sections.traffic import TrafficConfig
-from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.traffic.settings import TrafficConfig
+from aerodaas.extensions.traffic.table import TrafficTable
 from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.vehicle import Traffic, VehicleState

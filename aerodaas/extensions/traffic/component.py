@@ -1,4 +1,4 @@
-"""The traffic that a vehicle hears of."""
+"""The traffic that a MAVLink vehicle hears of."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.drivers.mavlink.airspace.traffic import TrafficTable
+from aerodaas.config.checked import added_settings
 from aerodaas.drivers.mavlink.component import ComponentContext, MavlinkComponent, MessageHandler
 from aerodaas.drivers.mavlink.microservices.commander import Commander, PendingCommand
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.extensions.traffic.settings import TrafficLimits
+from aerodaas.extensions.traffic.table import TrafficTable
 from aerodaas.geometry.frames import Vector, is_finite
 from aerodaas.messages.vehicle import VehicleState
 
-__all__ = ["Airspace"]
+__all__ = ["TrafficComponent"]
 
 _RATE = 20.0
 """ADSB_VEHICLE a second that are asked for: an autopilot tells one aircraft with each."""
 
 
-class Airspace(MavlinkComponent):
+class TrafficComponent(MavlinkComponent):
     """Traffic around one vehicle."""
 
     def __init__(self, context: ComponentContext) -> None:
         """Know of no traffic yet."""
         super().__init__(context)
-        self._traffic = TrafficTable(context.robot.limits.traffic)
+        self._traffic = TrafficTable(added_settings(context.robot.limits, TrafficLimits).traffic)
         self._asked_after = -1
         """Restarts of the autopilot after which it was last asked for traffic."""
         self._here: Vector = np.full(3, np.nan)

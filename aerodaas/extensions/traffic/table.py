@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.config.sections.traffic import TrafficConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.extensions.traffic.settings import TrafficConfig
 from aerodaas.geometry.frames import GeodeticOrigin, Vector, length
 from aerodaas.messages.vehicle import Traffic
 

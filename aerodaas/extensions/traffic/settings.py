@@ -8,7 +8,7 @@ from pydantic import Field
 
 from aerodaas.config.checked import Positive, Strict
 
-__all__ = ["TrafficConfig"]
+__all__ = ["TrafficConfig", "TrafficLimits"]
 
 
 class TrafficConfig(Strict):
@@ -27,3 +27,10 @@ class TrafficConfig(Strict):
     own_address: Annotated[str, Field(pattern=r"^[0-9A-Fa-f]{6}$")] | None = None
     """24-bit address (six hexadecimal digits) of the drone's own transponder, whose echo is no
     traffic."""
+
+
+class TrafficLimits(Strict):
+    """How far a drone keeps from other aircraft."""
+
+    traffic: TrafficConfig = TrafficConfig()
+    """Other aircraft, as the vehicle hears them, and what they mean in flight."""

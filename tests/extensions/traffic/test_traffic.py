@@ -14,9 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.config.checked import checked
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.sections.preflight import PreflightConfig
-from aerodaas.config.sections.traffic import TrafficConfig
+from aerodaas.errors import ConfigError
+from aerodaas.extensions.traffic.encounters import Encounter, TrafficWatch, encounters, meets_in
+from aerodaas.extensions.traffic.settings import TrafficConfig
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.health import Verdict
 from aerodaas.messages.mission import MissionState as S
@@ -34,13 +37,7 @@ from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
-from aerodaas.mission.safety.traffic import (
-    Encounter,
-    TrafficWatch,
-    encounters,
-    meets_in,
-    traffic_neighbours,
-)
+from aerodaas.recording.recorded_environment import allowed_content
 
 CLOSE = TrafficConfig(action="hold", distance=100.0, height=50.0, lookahead=10.0)
 
@@ -121,9 +118,14 @@ def test_it_agrees_with_a_look_at_every_moment(way: Vector, closing: Vector) -> 
         assert abs(there[2]) <= CLOSE.height + 1e-6
 
 
+def limits_of(config: TrafficConfig, **others: float) -> LimitsConfig:
+    """Limits of a drone among others."""
+    return LimitsConfig.model_validate({"traffic": config, **others})
+
+
 def watching(config: TrafficConfig) -> TrafficWatch:
     """For a drone of 2 m/s that climbs at 1.5 m/s."""
-    return TrafficWatch(LimitsConfig(traffic=config, cruise_speed=2.0, max_climb=1.5))
+    return TrafficWatch(limits_of(config, cruise_speed=2.0, max_climb=1.5))
 
 
 @pytest.mark.parametrize(
@@ -196,7 +198,8 @@ def test_an_aircraft_counts_for_five_seconds_after_it_was_near() -> None:
 @pytest.mark.parametrize("action", ["ignore", "warn"])
 def test_who_is_only_told_of_bounds_nothing(action: Any) -> None:  # noqa: ANN401
     """The flight goes on as it was."""
-    assert traffic_neighbours(state(aircraft((1, 1, 10))), TrafficConfig(action=action)) == []
+    watch = watching(TrafficConfig(action=action))
+    assert watch.neighbours(state(aircraft((1, 1, 10)))) == []
 
 
 WIDE = LimitsConfig(max_speed=9.0, max_climb=9.0, max_range=5000.0, separation=0.0)
@@ -300,7 +303,7 @@ def flown(
 ) -> Flight:
     """A mission to a waypoint in the east, among aircraft."""
     config = TrafficConfig(action=action, distance=30.0, height=20.0, lookahead=2.0)  # type: ignore[arg-type]
-    limits = LimitsConfig(cruise_speed=2.0, traffic=config)
+    limits = limits_of(config, cruise_speed=2.0)
     return flight(add(*places), limits=limits, vehicle=Surrounded(traffic, **given))
 
 
@@ -430,7 +433,7 @@ def test_a_lost_link_goes_before_traffic() -> None:
 )
 def test_traffic_is_an_item_before_take_off(action: Any, verdict: Verdict) -> None:  # noqa: ANN401
     """Where anything flies; near is refused where the drone would act on it."""
-    limits = LimitsConfig(traffic=CLOSE.model_copy(update={"action": action}))
+    limits = limits_of(CLOSE.model_copy(update={"action": action}))
     vehicle = KinematicVehicle()
     checklist = Checklist(vehicle, limits, PreflightConfig())
 
@@ -475,3 +478,19 @@ def test_a_setpoint_of_a_place_is_bounded_as_well() -> None:
     assert isinstance(sent.setpoint, VelocitySetpoint)
     assert sent.setpoint.velocity.tolist() == pytest.approx([0.0, 0.0, 0.0])
     assert sent.clipped_by == ("traffic",)
+
+
+def test_the_drones_own_transponder_has_six_digits() -> None:
+    """Hexadecimal ones."""
+    assert TrafficConfig(own_address="4b12Ff").own_address == "4b12Ff"
+    for wrong in ("4B12F", "4B12FF0", "4B12FG", ""):
+        with pytest.raises(ConfigError, match="own_address"):
+            checked(TrafficConfig, {"own_address": wrong}, "limits.traffic")
+
+
+def test_a_replay_reads_of_a_recording_all_but_the_drones_own_address() -> None:
+    """Recorded traffic has no echo of the drone's own."""
+    told = {**CLOSE.model_dump(), "own_address": "4b1234"}
+    read = allowed_content({"robots": [{"id": "drone", "limits": {"traffic": told}}]})
+    kept = CLOSE.model_dump(exclude={"own_address"})
+    assert read == {"robots": [{"id": "drone", "limits": {"traffic": kept}}]}

@@ -1,1 +1,0 @@
-"""Remote ID, and traffic that a MAVLink vehicle hears of."""
