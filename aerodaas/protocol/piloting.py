@@ -33,7 +33,6 @@ _MOST_WAYPOINTS = 1000
 _Id = Annotated[str, Field(min_length=1, max_length=64)]
 _Ids = Annotated[list[_Id], Field(max_length=_MOST_WAYPOINTS)]
 _Axis = Annotated[float, Field(ge=-100, le=100)]
-_AXES = ("forward", "left", "up", "yaw_rate")
 
 
 class RearrangeIn(RequestModel):
@@ -82,30 +81,7 @@ class ControlsIn(RequestModel):
     """A command of manual control, as the service hands it to a flight's own process."""
 
     robot: Word
-    session: Annotated[int, Field(gt=0)]
-    operator: str = ""
-    """Of a takeover; with neither this nor `steer` the controls are let go."""
-    steer: SteerIn | None = None
-
-    @classmethod
-    def of(cls, robot: str, command: TakeControls | Steer | ReleaseControls) -> ControlsIn:
-        """Write a command."""
-        match command:
-            case TakeControls():
-                return cls(robot=robot, session=command.session, operator=command.operator)
-            case Steer(session, velocity):
-                axes = {name: getattr(velocity, name) for name in _AXES}
-                return cls(robot=robot, session=session, steer=SteerIn(at=0, **axes))
-            case ReleaseControls():
-                return cls(robot=robot, session=command.session)
-
-    def command(self) -> TakeControls | Steer | ReleaseControls:
-        """The command."""
-        if self.operator:
-            return TakeControls(self.operator, self.session)
-        if self.steer is not None:
-            return Steer(self.session, self.steer.velocity())
-        return ReleaseControls(self.session)
+    command: Annotated[TakeControls | Steer | ReleaseControls, Field(union_mode="left_to_right")]
 
 
 class ControlsOut(AnswerModel):

@@ -7,26 +7,13 @@ from pydantic import Field
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.protocol.bases import AnswerModel
-from aerodaas.simulation.ground_plan import ShapeKind, ground_plan
+from aerodaas.simulation.ground_plan import Shape, ground_plan
 from aerodaas.simulation.world import World
 
-__all__ = ["ARCHIVE_PATH", "SceneryOut", "ShapeOut", "TilesOut"]
+__all__ = ["ARCHIVE_PATH", "SceneryOut", "TilesOut"]
 
 ARCHIVE_PATH = "/v1/map.pmtiles"
 """Where the page finds an archive of tiles that is a file."""
-
-
-class ShapeOut(AnswerModel):
-    """One thing of a simulated world that stands still."""
-
-    kind: ShapeKind
-    outline: list[tuple[float, float]]
-    """Metres east and north: the corners of an area, the points of a road's or fence's line, the
-    middle of a tree."""
-    height: float
-    """Metres."""
-    width: float
-    """Of a road, and of a tree's crown, metres."""
 
 
 class TilesOut(AnswerModel):
@@ -46,7 +33,7 @@ class TilesOut(AnswerModel):
 class SceneryOut(AnswerModel):
     """Scenery that the map draws below a flight; empty where nothing is known."""
 
-    shapes: list[ShapeOut] = Field(default_factory=list)
+    shapes: list[Shape] = Field(default_factory=list)
     tiles: TilesOut | None = None
 
     @classmethod
@@ -63,20 +50,12 @@ class SceneryOut(AnswerModel):
         return cls(shapes=_shapes(config, seed), tiles=_tiles(config))
 
 
-def _shapes(config: EnvironmentConfig, seed: int | None) -> list[ShapeOut]:
+def _shapes(config: EnvironmentConfig, seed: int | None) -> list[Shape]:
     if not all(map(_simulated, config.robots)):
         return []
     chosen = {} if seed is None else {"seed": seed}
     world = World.load(config.simulation.model_copy(update=chosen))
-    return [
-        ShapeOut(
-            kind=one.kind,
-            outline=[(round(east, 2), round(north, 2)) for east, north in one.outline],
-            height=round(one.height, 2),
-            width=round(one.width, 2),
-        )
-        for one in ground_plan(world)
-    ]
+    return ground_plan(world)
 
 
 def _simulated(robot: RobotConfig) -> bool:

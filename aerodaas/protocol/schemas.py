@@ -30,6 +30,7 @@ __all__ = [
     "AuditOut",
     "CommandIn",
     "FleetOut",
+    "FlightLeaseIn",
     "GrantIn",
     "LeaseIn",
     "LeaseOut",
@@ -264,6 +265,15 @@ class LeaseOut(AnswerModel):
     ends: float | None = None
     """When a granted lease expires."""
     area: list[tuple[float, float]] | None = None
+
+
+class FlightLeaseIn(RequestModel):
+    """State of the lease of a flight, as the service tells the flight's process."""
+
+    ends: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    """Unix seconds of its end; None once it has ended."""
+    reason: str = ""
+    """Why it has ended."""
 
 
 class GrantIn(RequestModel):

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 from aerodaas.analytics.remote import RemoteAnalytics
 from aerodaas.config.plugins import load_plugin
 from aerodaas.errors import MissionError
-from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
+from aerodaas.protocol.schemas import FlightLeaseIn, LeaseState, MissionIn, MissionPhase, StreamKind
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.orders import HostFlight

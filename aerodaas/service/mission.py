@@ -16,8 +16,13 @@ from pathlib import Path
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
 from aerodaas.files.private_file import write_private
-from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import LeaseState, MissionOut, MissionPhase, VerdictOut
+from aerodaas.protocol.schemas import (
+    FlightLeaseIn,
+    LeaseState,
+    MissionOut,
+    MissionPhase,
+    VerdictOut,
+)
 from aerodaas.service.errors import without_folders
 from aerodaas.service.flights.folder import FlightFolder, start_process
 from aerodaas.service.flights.link import FlightLink

@@ -50,8 +50,17 @@ class Shape:
 
 
 def ground_plan(world: World) -> list[Shape]:
-    """Shapes of a world that stand still, in the scenario's order."""
-    return [shape for thing in world.things if (shape := _shape(thing)) is not None]
+    """Shapes of a world that stand still, in the scenario's order, to the centimetre."""
+    shapes = (shape for thing in world.things if (shape := _shape(thing)) is not None)
+    return [
+        Shape(
+            one.kind,
+            tuple((round(east, 2), round(north, 2)) for east, north in one.outline),
+            round(one.height, 2),
+            round(one.width, 2),
+        )
+        for one in shapes
+    ]
 
 
 def _shape(thing: Thing) -> Shape | None:

@@ -5,7 +5,7 @@ import { ask, usePolled } from "./connection";
 import type { Point } from "./place";
 import type { Sight } from "./sight";
 import { px } from "./sight";
-import type { SceneryOut, ShapeOut } from "./wire";
+import type { SceneryOut, Shape } from "./wire";
 
 /** Where a tree's crown is, as a share of its height. */
 const CROWN = 0.62;
@@ -24,11 +24,11 @@ export function useScenery(path: string, recorded?: SceneryOut): SceneryOut {
   return recorded ?? polled.answer ?? EMPTY;
 }
 
-export function SceneryLayer({ shapes, sight }: { shapes: readonly ShapeOut[]; sight: Sight }) {
+export function SceneryLayer({ shapes, sight }: { shapes: readonly Shape[]; sight: Sight }) {
   const { east, north, scale } = sight.view;
   // Many shapes, and ten states a second: drawn anew only where the view has changed.
   return useMemo(() => {
-    const far = (one: ShapeOut) => Math.min(...one.outline.map((point) => point[1]));
+    const far = (one: Shape) => Math.min(...one.outline.map((point) => point[1]));
     const ordered = [...shapes].sort(
       (one, other) =>
         Number(FLAT.has(other.kind)) - Number(FLAT.has(one.kind)) || far(other) - far(one),
@@ -43,7 +43,7 @@ export function SceneryLayer({ shapes, sight }: { shapes: readonly ShapeOut[]; s
   }, [shapes, east, north, scale, sight.size, sight.tilted]);
 }
 
-function Thing({ shape, sight }: { shape: ShapeOut; sight: Sight }) {
+function Thing({ shape, sight }: { shape: Shape; sight: Sight }) {
   const { kind, outline, height, width } = shape;
   const [first] = outline;
   if (!first) return null;

@@ -705,13 +705,13 @@ export interface Alert {
  * Scenery that the map draws below a flight; empty where nothing is known.
  */
 export interface SceneryOut {
-  shapes: ShapeOut[];
+  shapes: Shape[];
   tiles: TilesOut | null;
 }
 /**
- * One thing of a simulated world that stands still.
+ * One thing of the plan.
  */
-export interface ShapeOut {
+export interface Shape {
   height: number;
   kind: "building" | "crops" | "fence" | "road" | "rubble" | "tower" | "tree";
   outline: [number, number][];
@@ -813,7 +813,7 @@ export interface SensorConfig {
  * Scenery that the map draws below a flight; empty where nothing is known.
  */
 export interface SceneryOut1 {
-  shapes: ShapeOut[];
+  shapes: Shape[];
   tiles: TilesOut | null;
 }
 /**

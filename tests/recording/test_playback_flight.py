@@ -17,12 +17,12 @@ from aerodaas.clock import seconds
 from aerodaas.messages.mission import Decision
 from aerodaas.messages.vehicle import VehicleState
 from aerodaas.protocol.playback import RecordedOut
-from aerodaas.protocol.scenery import ShapeOut
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.playback import flight as playback
 from aerodaas.recording.playback import track
 from aerodaas.recording.playback.flight import DecisionSums, read_flight
 from aerodaas.recording.reader import Recording, vehicle_states
+from aerodaas.simulation.ground_plan import Shape
 
 FLIGHT = SyntheticFlight(frames=2.0)
 FLIGHT_END = [step.status for step in FLIGHT.steps()][-1]
@@ -152,7 +152,7 @@ def test_what_it_was_flown_in_and_what_happened(path: Path) -> None:
     }
 
 
-def flown_in(path: Path, world: object, driver: str = "simulated") -> list[ShapeOut]:
+def flown_in(path: Path, world: object, driver: str = "simulated") -> list[Shape]:
     """What a recording that says it was flown in this world shows below its flight."""
     environment = {"robots": [{"id": "x", "driver": driver}], "simulation": {"world": world}}
     with path.open("wb") as file:

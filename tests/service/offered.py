@@ -16,8 +16,8 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.schemas import (
+    FlightLeaseIn,
     LinkState,
     MissionIn,
     MissionOut,

@@ -9,8 +9,14 @@ from typing import Any, cast
 import pytest
 from offered import PILOT, Link, Provider
 
-from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import (
+    FlightLeaseIn,
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+    Scope,
+)
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.orders import FlightOrder, Outcome

@@ -24,10 +24,9 @@ from aerodaas.errors import ConfigError, MissionError, SourceError
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.health import HealthItem, HealthReport, Verdict
 from aerodaas.messages.mission import MissionState, MissionStatus, RobotStatus
-from aerodaas.mission.commands import Answer
-from aerodaas.protocol.flights import FlightLeaseIn
+from aerodaas.mission.commands import Answer, TakeControls
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import CommandIn, PictureForm
+from aerodaas.protocol.schemas import CommandIn, FlightLeaseIn, PictureForm
 from aerodaas.service.flights import link, server
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
@@ -393,7 +392,7 @@ def test_a_command_that_is_refused_is_answered(flight: Flight) -> None:
         raise MissionError(f"{robot} does not fly in this mission")
 
     flight.drones.obey = refuse
-    given = ControlsIn(robot="two", session=1, operator="olga")
+    given = ControlsIn(robot="two", command=TakeControls("olga", 1))
     answer = flight.link.fly(given, operator=True)
     assert (answer.accepted, answer.text) == (False, "two does not fly in this mission")
 

@@ -12,8 +12,7 @@ from offered import PILOT, Link, Monitor, Provider
 
 from aerodaas.errors import MissionError
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.flights import FlightLeaseIn
-from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import FlightLeaseIn, LeaseIn, LinkState, MissionPhase, Role, Scope
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.mission import ActiveMission

@@ -22,7 +22,7 @@ from websockets.sync.client import ClientConnection, connect
 from aerodaas.analytics.here.relay import LARGEST_ANSWER, HereRelay, HereUser
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.http_server.addresses import listen
-from aerodaas.mission.commands import Answer
+from aerodaas.mission.commands import Answer, Steer
 from aerodaas.protocol.piloting import ControlsIn
 from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
 from aerodaas.service import mission as missions
@@ -297,7 +297,7 @@ def test_an_operators_hand_is_a_pilots_once_the_role_is_gone(
 
     def fly(_: MissionService, who: Any, mission: str, what: ControlsIn) -> Answer:  # noqa: ANN401
         del mission
-        asked.append((who.role, "steers" if what.steer else "takes or leaves"))
+        asked.append((who.role, "steers" if isinstance(what.command, Steer) else "takes or leaves"))
         return Answer(accepted=True)
 
     monkeypatch.setattr(MissionService, "fly", fly)

@@ -7,7 +7,7 @@ import json
 import logging
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 from urllib.parse import urlencode
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -19,10 +19,11 @@ from aerodaas.errors import MissionError, SilentError
 from aerodaas.http_client import http_client, http_errors
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.flights import FlightLeaseIn
+from aerodaas.protocol.live import StateMessage
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     CommandIn,
+    FlightLeaseIn,
     GrantIn,
     MissionOut,
     NavigationIn,
@@ -91,15 +92,6 @@ def flight_address(path: str, role: Role, **query: str | float) -> dict[str, Any
 
 def _as_role(role: Role) -> dict[str, str]:
     return {"Authorization": f"Bearer {role.value}"}
-
-
-class _State(BaseModel):
-    """Message of a live view with the mission's state."""
-
-    kind: Literal["mission"]
-    now: int
-    """Host time of the flight's process, nanoseconds."""
-    mission: MissionOut
 
 
 class FlightLink:
@@ -272,7 +264,7 @@ class FlightLink:
                 text = view.recv(_SILENT_SECONDS)
                 if text == '{"kind": "end"}':
                     return
-                state = _State.model_validate_json(text)
+                state = StateMessage.model_validate_json(text)
                 if ahead is None:
                     # The flight's process may count host time from elsewhere.
                     ahead = seconds(host_time_ns() - state.now)

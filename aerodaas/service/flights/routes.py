@@ -16,9 +16,8 @@ from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.clock import host_time_ns
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.mission.commands import Answer
-from aerodaas.protocol.flights import FlightLeaseIn
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import GrantIn, Role, Scope
+from aerodaas.protocol.schemas import FlightLeaseIn, GrantIn, Role, Scope
 from aerodaas.service.flights.server import LeasedFlight, LeaseWatch
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission

@@ -495,8 +495,7 @@ def _worded(command: PilotCommand) -> tuple[Command, str]:
         case ActuateIn():
             return command.command(), f"move {command.actuator} to {command.position}"
         case ControlsIn():
-            given = command.command()
-            return given, told_of_controls(given)
+            return command.command, told_of_controls(command.command)
 
 
 def _listed(ids: Sequence[str]) -> str:

@@ -80,7 +80,7 @@ class LiveRoutes:
         def give(command: ControlCommand) -> Answer:
             # As the account is now: an operator's hand does not outlive the role.
             sender = self._admission.require(socket, Role.PILOT, Scope.FLY)
-            answer = self._missions.fly(sender, mission, ControlsIn.of(robot, command))
+            answer = self._missions.fly(sender, mission, ControlsIn(robot=robot, command=command))
             if told_of_controls(command):
                 target = f"{mission}/{robot}"
                 self._admission.note_answer(sender, "controls", target, answer)
