@@ -25,9 +25,11 @@ from aerodaas.actors.process_variables import ray_variables
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import cleaned
 from aerodaas.errors import ConfigError
+from aerodaas.runtime.dispatch.offload import CloudProcess
 from aerodaas.runtime.placement import Placement
+from aerodaas.runtime.plan import ActorPlan, FlightPlan
 
-__all__ = ["isolation_options"]
+__all__ = ["environment_options", "isolation_options"]
 
 _INSTALL_TIMEOUT = 600.0
 """Seconds for the packages of one analysis: PyTorch alone is gigabytes."""
@@ -40,6 +42,22 @@ class _Installed:
     command: tuple[str, ...] = ()
     """Command line of a Python that has the packages."""
     problem: str = ""
+
+
+def environment_options(plan: FlightPlan) -> dict[str, dict[str, Any]]:
+    """Ray options for the environment of each process that runs analyses, by name.
+
+    Called before any actor exists, so that a failure leaves nothing behind. Raises ConfigError
+    for an environment that a node cannot provide, and for a place without a node.
+    """
+    processes: dict[str, ActorPlan | CloudProcess] = {one.name: one for one in plan.actors}
+    for number, process in enumerate(plan.dispatch.cloud if plan.dispatch else ()):
+        processes[f"cloud/{number}/{process.site}"] = process
+    for place in {*plan.edges, *(one.place for one in processes.values())}:
+        nodes_at(place)
+    return {
+        name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
+    }
 
 
 def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str) -> dict[str, Any]:

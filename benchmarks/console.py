@@ -28,7 +28,7 @@ from _report import Report
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.schemas import COMMANDS
 from aerodaas.recording.reader import Recording
 from aerodaas.service.http import page as console_page
 from tools.browser import Browser, Page

@@ -25,12 +25,12 @@ from aerodaas.actors.dispatch.dispatcher import DispatcherSpec
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
+from aerodaas.actors.isolation import environment_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.recorder import RecorderActor, RecorderSpec
 from aerodaas.actors.run.actor_state import ActorState, ask, require_clock, routes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
-from aerodaas.actors.run.environment_options import environment_options
 from aerodaas.actors.run.live import live_source
 from aerodaas.actors.run.losses import (
     DeadError,

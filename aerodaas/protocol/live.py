@@ -12,8 +12,7 @@ from pydantic import Field
 from aerodaas.messages.detections import Detections
 from aerodaas.messages.frames import Header
 from aerodaas.messages.waypoints import FollowedTarget
-from aerodaas.protocol.bases import AnswerModel
-from aerodaas.protocol.schemas import MissionOut
+from aerodaas.protocol.schemas import AnswerModel, MissionOut
 
 __all__ = [
     "DepthItem",

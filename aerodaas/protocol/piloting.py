@@ -17,8 +17,7 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
-from aerodaas.protocol.bases import AnswerModel, RequestModel
-from aerodaas.protocol.schemas import Word
+from aerodaas.protocol.schemas import AnswerModel, RequestModel, Word
 
 __all__ = [
     "ActuateIn",

@@ -8,9 +8,9 @@ from __future__ import annotations
 import enum
 from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import ConfigDict, FailFast, Field, field_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -18,17 +18,26 @@ from aerodaas.identifiers import ScopedWord, Word
 from aerodaas.messages.health import Verdict
 from aerodaas.messages.mission import Place, RobotStatus
 from aerodaas.messages.waypoints import LARGEST, NavigationType, SchedulingType
-from aerodaas.mission.commands import AddNavigation
-from aerodaas.protocol.bases import AnswerModel, RequestModel
-from aerodaas.protocol.commands import CommandWord
+from aerodaas.mission.commands import (
+    AddNavigation,
+    ClearNavigation,
+    Command,
+    End,
+    Pause,
+    Resume,
+    ReturnHome,
+)
 
 __all__ = [
+    "COMMANDS",
     "AccountIn",
     "AccountOut",
     "AnalyticsOut",
+    "AnswerModel",
     "Area",
     "AuditOut",
     "CommandIn",
+    "CommandWord",
     "FleetOut",
     "FlightLeaseIn",
     "GrantIn",
@@ -41,6 +50,7 @@ __all__ = [
     "MissionPhase",
     "NavigationIn",
     "RefusalOut",
+    "RequestModel",
     "RobotOut",
     "Role",
     "Scope",
@@ -54,6 +64,7 @@ __all__ = [
     "VehicleReport",
     "VerdictOut",
     "Word",
+    "word_for",
 ]
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
@@ -67,6 +78,18 @@ _MOST_MINUTES = 24 * 60
 _YEAR_DAYS = 366
 _MOST_STORED = 2**63 - 1
 """Largest whole number that a database holds."""
+
+
+class RequestModel(BaseModel):
+    """Base of requests: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AnswerModel(BaseModel):
+    """Base of answers."""
+
+    model_config = ConfigDict(frozen=True)
 
 
 class Role(str, enum.Enum):
@@ -391,6 +414,23 @@ class MissionOut(AnswerModel):
     """What the analytics scheduler has done so far; None without one, and after the flight."""
     recording: bool = False
     """Whether the recording can be fetched."""
+
+
+CommandWord: TypeAlias = Literal["pause", "resume", "clear", "return-home", "land"]
+
+COMMANDS: Mapping[CommandWord, Command] = {
+    "pause": Pause(),
+    "resume": Resume(),
+    "clear": ClearNavigation(),
+    "return-home": ReturnHome("its user asked to return"),
+    "land": End("its user asked to land"),
+}
+"""Commands to a flying robot by the word that the wire has for each."""
+
+
+def word_for(command: Command) -> CommandWord | None:
+    """The word for a command; None for one that the wire has no word for."""
+    return next((word for word, one in COMMANDS.items() if type(one) is type(command)), None)
 
 
 class CommandIn(RequestModel):

@@ -15,7 +15,7 @@ from aerodaas.config.plugins import plugin_names
 from aerodaas.environment.run import Run
 from aerodaas.messages.mission import MissionState
 from aerodaas.mission.state_machine import FLYING, TRANSITIONS
-from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.schemas import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")

@@ -18,9 +18,8 @@ from aerodaas.mission.commands import (
     ReleaseParachute,
     TakeBack,
 )
-from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
-from aerodaas.protocol.schemas import CommandIn, NavigationIn
+from aerodaas.protocol.schemas import CommandIn, NavigationIn, word_for
 
 __all__ = ["send_command"]
 

@@ -12,8 +12,7 @@ from typing_extensions import Self
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint
 from aerodaas.extensions.surveys.planning import MOST_CORNERS
-from aerodaas.protocol.bases import AnswerModel, RequestModel
-from aerodaas.protocol.schemas import Number, Word
+from aerodaas.protocol.schemas import AnswerModel, Number, RequestModel, Word
 
 __all__ = ["SurveyIn", "SurveyOut", "SurveyPhotosOut"]
 

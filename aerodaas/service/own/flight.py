@@ -19,10 +19,10 @@ from aerodaas.errors import AeroDaaSError, ConfigError, SilentError
 from aerodaas.messages.health import HealthReport
 from aerodaas.messages.mission import GROUNDED, MissionState, MissionStatus, Place, RobotStatus
 from aerodaas.mission.commands import AddNavigation, Answer, Command, StreamItem
-from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ActuateIn, ControlsIn, RearrangeIn, told_of_controls
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import (
+    COMMANDS,
     AccountOut,
     AnalyticsOut,
     CommandIn,

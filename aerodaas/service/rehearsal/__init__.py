@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from aerodaas.service.rehearsal.findings import OtherArea
-from aerodaas.service.rehearsal.verdict import judge
+from aerodaas.service.rehearsal.findings import OtherArea, judge
 
 __all__ = ["OtherArea", "judge"]

@@ -1,9 +1,10 @@
-"""Findings about a rehearsed flight: each a reason to refuse it, with its figures and place."""
+"""Verdict of a rehearsed flight: each finding is a reason to refuse it, with figures and place."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.protocol.schemas import VerdictOut
+from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.service.flights.environment import Outline
 
-__all__ = ["Finding", "OtherArea", "findings_of", "landing_time"]
+__all__ = ["Finding", "OtherArea", "findings_of", "judge"]
 
 _GROUND = ("", "idle", "preflight", "landed", "aborted")
 _BOUNDARIES = {
@@ -98,7 +101,7 @@ def findings_of(
     return found
 
 
-def landing_time(robot: RobotFlight) -> float | None:
+def _landing_time(robot: RobotFlight) -> float | None:
     """Mission seconds at which a robot had landed; None if it did not."""
     last = robot.bands[-1] if robot.bands else None
     return last.start if last is not None and last.state == "landed" else None
@@ -125,7 +128,7 @@ class _RobotFindings:
             yield from self._separation(other)
 
     def _landing(self) -> Iterator[Finding]:
-        end, flight = landing_time(self._flight), self._flight
+        end, flight = _landing_time(self._flight), self._flight
         if end is None and flight.bands[-1].state == "aborted":
             yield Finding(f"{self._id} did not land as planned: {flight.outcome}", self._last())
         elif end is None:
@@ -227,3 +230,43 @@ def _pair(position: NDArray[np.float64]) -> tuple[float, float]:
 
 def _place(position: Sequence[float] | NDArray[np.float64]) -> str:
     return f"({position[0]:.1f}, {position[1]:.1f})"
+
+
+def judge(
+    recording: Path,
+    config: EnvironmentConfig,
+    *,
+    minutes: float,
+    others: Sequence[OtherArea] = (),
+) -> VerdictOut:
+    """The verdict of a rehearsed flight.
+
+    Args:
+        recording: MCAP file of the flight.
+        config: Environment that it flew in.
+        minutes: Of the lease.
+        others: Areas of all other granted leases.
+
+    Returns:
+        Every reason against the flight, with its figures and a remedy; without any it is
+        approved. The time is that of the last landing, distance and battery are sums over robots.
+
+    Raises:
+        RecordingError: If the recording cannot be read.
+        ConfigError: If a robot's fence is invalid.
+    """
+    with Recording.open(recording) as opened:
+        flight, whole = RecordedFlight.read(opened), opened.complete and not opened.damaged
+    reasons = [one.text for one in findings_of(flight, config, minutes=minutes, others=others)]
+    if not whole:
+        reasons.append("the rehearsal's recording breaks off: submit the mission again")
+    robots = [robot for robot in flight.robots.values() if robot.bands]
+    landings = [end for robot in robots if (end := _landing_time(robot)) is not None]
+    charges = [robot.battery[np.isfinite(robot.battery)] for robot in robots]
+    return VerdictOut(
+        approved=not reasons,
+        reasons=reasons,
+        seconds=max(landings, default=None),
+        distance=sum(robot.distance for robot in robots),
+        battery_used=float(sum(known[0] - known[-1] for known in charges if len(known))),
+    )

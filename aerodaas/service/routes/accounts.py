@@ -22,7 +22,7 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
-from aerodaas.service.access.usage import usage_csv
+from aerodaas.service.access.quotas import usage_csv
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.store import AuditEntry, Store, Tenant

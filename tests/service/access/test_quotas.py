@@ -10,8 +10,7 @@ from datetime import datetime, timezone
 import pytest
 
 from aerodaas.protocol.schemas import MissionPhase, UsageOut
-from aerodaas.service.access.quotas import Quotas
-from aerodaas.service.access.usage import usage_csv
+from aerodaas.service.access.quotas import Quotas, usage_csv
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 

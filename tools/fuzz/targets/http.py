@@ -19,8 +19,7 @@ from aerodaas.dataflow.graph import Graph
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.messages.mission import MissionState, RobotStatus
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.protocol.commands import COMMANDS
-from aerodaas.protocol.schemas import Role
+from aerodaas.protocol.schemas import COMMANDS, Role
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.limits import OWN_FLIGHT
 from aerodaas.service.own.access import FlightTokens, principal_of
