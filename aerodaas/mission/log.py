@@ -115,7 +115,7 @@ def words(text: str) -> str:
 
 
 def subject(kind: str, text: str, about: str = "") -> tuple[str, str]:
-    """Key by which faults are the same: several of the vehicle share one kind, and of traffic.
+    """Key by which faults are the same: several of the vehicle share one kind.
 
     Args:
         kind: Kind of the fault.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from aerodaas.config.extensions import extensions, imported
 from aerodaas.config.model import RobotConfig
@@ -37,6 +38,9 @@ class MavlinkComponent:
     not hide that the vehicle is silent. The link's thread calls the handlers and `step`, the loop's
     thread the rest, under one lock. Seconds are monotonic.
     """
+
+    senders: ClassVar[frozenset[int]] = frozenset()
+    """Ids of the components of the vehicle, beside its autopilot, from which its messages come."""
 
     def __init__(self, context: ComponentContext) -> None:
         """Prepare for a vehicle that is not connected yet."""

@@ -165,6 +165,7 @@ class MavlinkVehicle:
             on_component=self.payload.take_component,
             healthy=self._watchdog.healthy,
             stands=self._stands,
+            equipment={name: one.senders for one in self._components for name in one.handlers},
         )
         link.open()
         self._link = link

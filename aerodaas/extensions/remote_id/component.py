@@ -8,6 +8,7 @@ from dataclasses import replace
 from aerodaas.config.checked import added_settings
 from aerodaas.config.model import LimitsConfig, PreflightConfig
 from aerodaas.drivers.mavlink.component import ComponentContext, MavlinkComponent, MessageHandler
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.extensions.remote_id.settings import RemoteIdLevel, RobotRemoteId
 from aerodaas.extensions.remote_id.transmitter import OperatorPlace, RemoteId
 from aerodaas.messages.health import HealthItem, HealthReadings, Verdict
@@ -21,6 +22,8 @@ _ITEM, _SUBJECT, _READY = "remote_id", "Remote ID", "ready"
 
 class RemoteIdComponent(MavlinkComponent):
     """Remote ID transmitter of one vehicle."""
+
+    senders = frozenset(range(mavlink.MAV_COMP_ID_ODID_TXRX_1, mavlink.MAV_COMP_ID_ODID_TXRX_3 + 1))
 
     def __init__(self, context: ComponentContext) -> None:
         """Know of no transmitter yet."""

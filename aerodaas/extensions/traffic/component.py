@@ -26,6 +26,8 @@ _RATE = 20.0
 class TrafficComponent(MavlinkComponent):
     """Traffic around one vehicle."""
 
+    senders = frozenset({mavlink.MAV_COMP_ID_ADSB})
+
     def __init__(self, context: ComponentContext) -> None:
         """Know of no traffic yet."""
         super().__init__(context)

@@ -9,9 +9,10 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol, TypeAlias
 
 from aerodaas.config.extensions import service
@@ -67,22 +68,13 @@ _WANTED = frozenset(
         mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
         *(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mavlink.MAVLINK_MSG_ID_RELAY_STATUS),
         *(mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO, mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR),
-        *(mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, mavlink.MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS),
         EventMessage.id,
     }
 )
-"""Messages that the driver processes; those of a listener come on top."""
+"""Messages that the driver processes; those of a listener and of equipment come on top."""
 _MESSAGE_IDS = {message.msgname: number for number, message in mavlink.mavlink_map.items()} | {
     EventMessage.msgname: EventMessage.id
 }
-
-_ABOARD = {
-    "ADSB_VEHICLE": frozenset({mavlink.MAV_COMP_ID_ADSB}),
-    "OPEN_DRONE_ID_ARM_STATUS": frozenset(
-        range(mavlink.MAV_COMP_ID_ODID_TXRX_1, mavlink.MAV_COMP_ID_ODID_TXRX_3 + 1)
-    ),
-}
-"""Components beside the autopilot from which a message of this name is heard, too."""
 
 
 @dataclass(slots=True)
@@ -133,8 +125,13 @@ class MavlinkLink:
         on_component: Callable[[Message, float], None] = lambda *_: None,
         healthy: Callable[[float], bool],
         stands: Callable[[], bool],
+        equipment: Mapping[str, Collection[int]] = MappingProxyType({}),
     ) -> None:
-        """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing."""
+        """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing.
+
+        `equipment` has names of messages that equipment beside the autopilot brings, with ids of
+        the components from which they are heard, too.
+        """
         self.counts = LinkCounts()
         self._name = name
         self._settings = settings
@@ -151,7 +148,8 @@ class MavlinkLink:
         self._stands = stands
         self.pins = SenderPins(lambda: self.key is not None or stands())
         self._refused_at = -math.inf
-        self._wanted = set(_WANTED)
+        self._equipment = equipment
+        self._wanted = {*_WANTED, *(_MESSAGE_IDS[name] for name in equipment)}
         self._framers: dict[Peer, Framer] = {}
         self._lock = threading.Lock()
         self._listeners: list[tuple[frozenset[str], queue.SimpleQueue[Message]]] = []
@@ -376,7 +374,8 @@ class MavlinkLink:
 
     def _is_aboard(self, message: Message, sender: Sender, target: Sender, peer: Peer) -> bool:
         """Whether it is a word of the vehicle's own equipment, by the vehicle's own address."""
-        aboard = sender[0] == target[0] and sender[1] in _ABOARD.get(message.get_type(), ())
+        components = self._equipment.get(message.get_type(), ())
+        aboard = sender[0] == target[0] and sender[1] in components
         return aboard and peer == self.pins.pin.address
 
     def _heartbeat(self) -> Message:
