@@ -1,6 +1,6 @@
-"""Offering of an environment that is ready to start to whoever builds it without flying it.
+"""An application's file: run whole, or for the environment that it offers without flying.
 
-`aerodaas check`, `graph`, `compile` and `submit` run an application for its graph alone. Its file
+`aerodaas check`, `compile` and `submit` run an application for its graph alone. Its file
 then runs up to the call that would wait for the flight: no hook runs, nothing starts, and what
 stands after that call does not run either.
 """
@@ -8,6 +8,7 @@ stands after that call does not run either.
 from __future__ import annotations
 
 import atexit
+import runpy
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -15,6 +16,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.mission_run import MissionRun
 from aerodaas.errors import GoesOnError, GraphError
 from aerodaas.mission.commands import Command
@@ -30,7 +32,7 @@ __all__ = [
     "offer",
     "offered",
     "require_no_more",
-    "require_started",
+    "run_file",
     "the_only",
 ]
 
@@ -64,6 +66,25 @@ def offered() -> Iterator[list[Environment]]:
         _offered.reset(token)
 
 
+def run_file(application: Path, words: list[str], options: RunOptions) -> None:
+    """Run the file as `__main__`, with its folder on the path.
+
+    Args:
+        application: Path of the Python file.
+        words: Arguments that follow it in `sys.argv`.
+        options: Options of the run, current for all that the file starts.
+
+    Raises:
+        GraphError: If it starts no environment of its own.
+        Exception: The application's own.
+    """
+    current_options.set(options)
+    sys.argv = [str(application), *words]
+    sys.path.insert(0, str(application.resolve().parent))
+    with _require_started():
+        runpy.run_path(str(application), run_name="__main__")
+
+
 def note_built(environment: Environment) -> None:
     """Note an environment of the application's file; of a script, tell at its end if none flew."""
     found = _built.get()
@@ -78,7 +99,7 @@ def note_built(environment: Environment) -> None:
 
 
 @contextmanager
-def require_started() -> Iterator[None]:
+def _require_started() -> Iterator[None]:
     """Raise GraphError, with the line, if an application builds environments and starts none."""
     found: list[Environment] = []
     token = _built.set(found)

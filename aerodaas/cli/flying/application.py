@@ -33,7 +33,7 @@ def run_application(application: Path, words: list[str], options: RunOptions) ->
             raise ConfigError(f"a mission document takes no arguments of its own: {words[0]!r}")
         fly_mission(application, options)
         return
-    from aerodaas.environment.application_file import run_file  # noqa: PLC0415 - slow to load
+    from aerodaas.environment.offering import run_file  # noqa: PLC0415 - slow to load
 
     run_file(application, words, options)
 

@@ -7,11 +7,10 @@ from pathlib import Path
 from aerodaas.config.checked import checked
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
-from aerodaas.environment.application_file import run_file
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.environment import Environment
-from aerodaas.environment.offering import offered, the_only
+from aerodaas.environment.offering import offered, run_file, the_only
 from aerodaas.errors import AeroDaaSError, ConfigError, GraphError
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.reader import Recording
