@@ -135,6 +135,10 @@ class Extension:
     safety_rules: tuple[str, ...] = ()
     """`module:Class` of each `mission.safety.supervisor.SafetyRule` of every drone, made with the
     robot's limits."""
+    actions: tuple[str, ...] = ()
+    """`module:Class` of each further kind of `messages.actions.Action` of a waypoint."""
+    action_executors: tuple[str, ...] = ()
+    """`module:Class` of each `mission.action_executor.ActionExecutor` that performs them."""
     preflight_checks: tuple[str, ...] = ()
     """`module:function` of items of the list before take-off: each gets a robot's limits and its
     preflight settings, and returns a `mission.safety.checklist.PreflightCheck`."""

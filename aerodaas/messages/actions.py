@@ -29,6 +29,7 @@ import numpy as np
 from annotated_types import Ge, Le, Unit
 from typing_extensions import TypedDict
 
+from aerodaas.config.extensions import extensions, imported
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.messages.serialization.json_types import StrictlyTyped
 from aerodaas.messages.serialization.records import shared_pickle
@@ -275,10 +276,14 @@ class MoveActuator(Action):
 _KINDS = (TriggerPhotos, LookAt, AimGimbal, SetLens, TakePhoto, RecordVideo, MoveActuator)
 
 
-@cache
 def action_kinds() -> Mapping[str, type[Action]]:
-    """Classes of actions by their type in JSON, in the order in which a drone does them."""
-    return {fields(kind)[-1].default: kind for kind in _KINDS}
+    """Classes of actions by their type in JSON, in the order in which a drone does them.
+
+    Those of extensions are the last.
+    """
+    added = (place for extension in extensions().values() for place in extension.actions)
+    kinds: list[type[Any]] = [*_KINDS, *map(imported, added)]
+    return {str(fields(kind)[-1].default): kind for kind in kinds}
 
 
 class _AnyKind:

@@ -24,6 +24,7 @@ from aerodaas.messages.mission_mode import MissionModeVehicle
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
+from aerodaas.mission.action_executor import ActionRunner, added_executors
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
@@ -133,6 +134,8 @@ class Mission:
         # Once: to ask a protocol about an object looks up all its members each time.
         actuated = payload if isinstance(payload, ActuatedVehicle) else None
         self.actuation = Actuation(actuated, robot, self._log)
+        added = added_executors(payload, robot, self._log)
+        self._actions = ActionRunner((self.photographer, self.actuation, *added), self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -147,7 +150,7 @@ class Mission:
             clearance=clearance,
             command_timeout=limits.command_timeout,
             resume_after=robot.mission.resume_after,
-            objection=self.actuation.objection,
+            objection=self._actions.objection,
         )
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
@@ -397,8 +400,7 @@ class Mission:
     def _observe(self, state: VehicleState, now: int) -> None:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
-        self.photographer.poll(now)
-        self.actuation.poll(now)
+        self._actions.poll(now)
         if self.actuation.released and not self.finished:
             self._to(MissionState.ABORTED, f"the parachute {self.actuation.released} was released")
             self._log.alert(now, "parachute", self._machine.reason)
@@ -551,8 +553,7 @@ class Mission:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        busy = self.photographer.attend(stop, state.odometry, self._now)
-        busy = busy or self.actuation.attend(stop, position, self._now)
+        busy = self._actions.attend(stop, state.odometry, self._now)
         if failure := self.actuation.take_failure():
             return self._after_failure(failure, state)
         if busy and phase is LegPhase.DONE:
@@ -667,7 +668,7 @@ class Mission:
         self._machine.to(state, self._now, reason)
         self.actuation.step(self._now, home=self.finished or state in _LEAVING)
         if self.finished:
-            self.photographer.end(self._now)
+            self._actions.end(self._now)
 
     def _note_unfinished(self, reason: str) -> None:
         """Record why the drone leaves, if it does so with waypoints ahead or in its take-off."""

@@ -63,6 +63,8 @@ def _places(extension: Extension) -> Iterator[str]:
     yield from extension.routes
     yield from extension.mavlink_components
     yield from extension.safety_rules
+    yield from extension.actions
+    yield from extension.action_executors
     yield from extension.preflight_checks
     yield from extension.report_sections
     yield from extension.services.values()

@@ -14,12 +14,15 @@ from pathlib import Path
 
 import pytest
 from core_settings import check_table, documented
+from flights import add, flight
+from pydantic import TypeAdapter
 
+from aerodaas import Waypoint
 from aerodaas.config.extensions import Command, Extension, extensions, imported
 from aerodaas.config.model import validated
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.config.schema import environment_schema
-from aerodaas.errors import ConfigError, UnknownIdError
+from aerodaas.errors import ConfigError, InvalidWaypointError, UnknownIdError
 from aerodaas.testing.extension_kit import check_extension
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -111,6 +114,69 @@ def test_a_packages_extension_adds_its_plug_ins(site: Path) -> None:
     assert extensions()["gliders"].summary == "Gliders."
     assert "glider" in plugin_names("drivers")
     assert load_plugin("drivers", "glider").__name__ == "Glider"
+
+
+SPRAYING = """
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal
+from annotated_types import Ge, Unit
+from aerodaas.config.extensions import Extension
+from aerodaas.messages.actions import Action, Number
+from aerodaas.mission.action_executor import ActionExecutor
+
+@dataclass(frozen=True, slots=True)
+class Spray(Action):
+    purpose: ClassVar[str] = "sprays"
+    litres: Annotated[Number, Ge(0.0), Unit("litres")] = 1.0
+    type: Literal["spray"] = field(default="spray", repr=False)
+
+class Sprayer(ActionExecutor):
+    done = []
+    def __init__(self, vehicle, robot, log):
+        self.since = None
+    def objection(self, waypoint):
+        spray = waypoint.action(Spray)
+        return "the tank holds 5 litres" if spray and spray.litres > 5 else ""
+    def attend(self, stop, odometry, now):
+        spray = stop.waypoint.action(Spray)
+        if spray is None or not stop.arrived:
+            return False
+        if spray.litres == 3:
+            raise RuntimeError("the nozzle is blocked")
+        self.since = self.since or now
+        if now - self.since < 2e9:
+            return True
+        if stop.id not in self.done:
+            self.done.append(stop.id)
+        return False
+
+EXTENSION = Extension(
+    "spraying", "Sprays.", actions=("spraying:Spray",), action_executors=("spraying:Sprayer",)
+)
+"""
+
+
+def test_a_packages_extension_adds_an_action(site: Path) -> None:
+    """A waypoint has it in JSON, and the drone stays until its executor is done; or flies on."""
+    _install(site, "spraying", "spraying", SPRAYING)
+    spraying = importlib.import_module("spraying")
+    check_extension(spraying.EXTENSION)
+    places = [("field", 1.0), ("blocked", 3.0), ("too much", 9.0)]
+    stops = [
+        Waypoint(name, 5.0 * number, 0, 2, actions=[spraying.Spray(litres)])
+        for number, (name, litres) in enumerate(places)
+    ]
+    forms = TypeAdapter(Waypoint)
+    assert [forms.validate_json(forms.dump_json(stop)) for stop in stops] == stops
+    with pytest.raises(InvalidWaypointError, match="litres is in litres"):
+        spraying.Spray(-1.0)
+    made = flight(add(*stops))
+    made.run(until=lambda: made.mission.finished)
+    assert spraying.Sprayer.done == ["field"]
+    assert tuple(made.status.visited) == ("field", "blocked")
+    texts = [alert.text for alert in made.mission.alerts]
+    assert any("Sprayer.attend" in text and "the nozzle is blocked" in text for text in texts)
+    assert any("the tank holds 5 litres" in text for text in texts)
 
 
 @pytest.mark.parametrize("source", ["import nothing_of_this_name\n", "EXTENSION = 3\n"])

@@ -22,7 +22,9 @@ from aerodaas.errors import VehicleError, failure_line
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
+from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.action_executor import ActionExecutor
 from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
@@ -60,7 +62,7 @@ class _Release:
 
 
 @dataclass(slots=True)
-class Actuation:
+class Actuation(ActionExecutor):
     """Actuators of one mission, called by it once a turn."""
 
     vehicle: ActuatedVehicle | None
@@ -183,12 +185,12 @@ class Actuation:
             if self.robot.mission.on_actuator_failure != "continue":
                 self._failure = text
 
-    def attend(self, stop: QueuedWaypoint, position: Vector, now: int) -> bool:
+    def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, at which the drone is.
 
         Args:
             stop: The stop whose moves are carried out.
-            position: Where the drone is, ENU metres.
+            odometry: Where the drone is.
             now: Mission clock, nanoseconds.
 
         Returns:
@@ -205,7 +207,7 @@ class Actuation:
         if not task.left or not stop.arrived:
             return bool(task.left)
         try:
-            self._advance(task, position, now)
+            self._advance(task, odometry.position, now)
         except VehicleError as error:
             self._finish(task, str(error), now)
         except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight

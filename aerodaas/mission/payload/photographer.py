@@ -28,6 +28,7 @@ from aerodaas.messages.payload import (
 )
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.action_executor import ActionExecutor
 from aerodaas.mission.log import MissionLog, words
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.payload.filming import Filming
@@ -207,7 +208,7 @@ def _targets(waypoint: Waypoint) -> tuple[bool, GimbalTarget | None, LensTarget 
     )
 
 
-class Photographer:
+class Photographer(ActionExecutor):
     """Photographer of one mission, called by it once a turn."""
 
     def __init__(self, vehicle: object, log: MissionLog, timeout: float) -> None:
