@@ -84,7 +84,7 @@ class Action:
 
     @property
     def slot(self) -> str:
-        """What it takes for itself: a waypoint has one action of each slot."""
+        """Payload that the action takes for itself: a waypoint has one action of each slot."""
         return self.type
 
     @property
@@ -98,7 +98,7 @@ class Action:
         return None
 
     def moved(self, place: Place) -> Action:
-        """The same action at another place; `place` is its new x, y and z."""
+        """Return the action at another place; `place` is its new x, y and z."""
         raise NotImplementedError(f"{self.type} has no place: {place}")
 
     def __post_init__(self) -> None:
@@ -204,7 +204,7 @@ class LookAt(Action):
 
     @property
     def place(self) -> Place:
-        """What is looked at."""
+        """Point of interest: a waypoint has one."""
         return self.x, self.y, self.z
 
     def moved(self, place: Place) -> LookAt:

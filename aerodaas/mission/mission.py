@@ -185,7 +185,7 @@ class Mission:
         return self.state in TERMINAL
 
     def neighbours(self, state: VehicleState) -> list[Neighbour]:
-        """What else flies around the vehicle, by the safety rules of extensions."""
+        """Other aircraft around the vehicle, by the safety rules of extensions."""
         return self._supervisor.neighbours(state)
 
     @property

@@ -363,7 +363,7 @@ class HereRelay:
 
 
 def oversize(content: dict[str, Any], blob: bytes) -> str:
-    """What is wrong with an answer's size; empty if nothing is.
+    """Objection to an answer's size; empty if it fits.
 
     Args:
         content: JSON of the answer.

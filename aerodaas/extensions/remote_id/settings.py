@@ -106,7 +106,7 @@ class RemoteIdConfig(Strict):
 
 
 class RobotRemoteId(Strict):
-    """What a robot's Remote ID tells of operator and aircraft."""
+    """Setting of a robot: its Remote ID."""
 
     remote_id: Annotated[
         RemoteIdConfig | None, PlainSerializer(lambda _: None, return_type=None, when_used="json")
@@ -115,7 +115,7 @@ class RobotRemoteId(Strict):
 
 
 class RemoteIdLevel(Strict):
-    """What a Remote ID transmitter that is not ready means before take-off."""
+    """Setting of the list before take-off: a Remote ID transmitter that is not ready."""
 
     remote_id: PreflightLevel = "warn"
     """Whether a Remote ID transmitter says that it is ready."""

@@ -90,7 +90,7 @@ class SafetyRule(Protocol):
         ...
 
     def neighbours(self, state: VehicleState) -> list[Neighbour]:
-        """What else flies around the vehicle, to be kept away from."""
+        """Other aircraft around the vehicle, to be kept away from."""
         ...
 
 
@@ -159,7 +159,7 @@ class Supervisor:
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
 
     def neighbours(self, state: VehicleState) -> list[Neighbour]:
-        """What else flies around the vehicle, by the rules of extensions."""
+        """Other aircraft around the vehicle, by the rules of extensions."""
         return [one for rule in self._rules for one in rule.neighbours(state)]
 
     def taken_over(self, now: int) -> tuple[Fault, bool] | None:
