@@ -21,8 +21,17 @@ from aerodaas.messages.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.mission import Mission
+from aerodaas.mission.motion_requests import (
+    Fly,
+    Hold,
+    Land,
+    MotionRequest,
+    Return,
+    Supervise,
+    TakeOff,
+    Wait,
+)
 from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.neighbours import Neighbour
 from aerodaas.mission.safety.setpoint_filter import SetpointFilter
@@ -30,7 +39,7 @@ from aerodaas.mission.safety.setpoint_filter import SetpointFilter
 __all__ = ["SetpointLoop"]
 
 _REPEAT = NANOSECONDS
-"""Nanoseconds after which an action without effect is requested again."""
+"""Nanoseconds after which a request without effect is sent again."""
 
 _EXAMINED_ANEW = NANOSECONDS
 """Nanoseconds between two looks at the health of a drone whose mission has not been started."""
@@ -43,7 +52,7 @@ _DOING = {
     Land: frozenset({VehicleMode.LANDING, VehicleMode.GROUNDED}),
     Return: frozenset({VehicleMode.RETURNING, VehicleMode.LANDING, VehicleMode.GROUNDED}),
 }
-"""Vehicle modes in which an action is already being carried out."""
+"""Vehicle modes in which a request is already being carried out."""
 
 
 class SetpointLoop:
@@ -66,7 +75,7 @@ class SetpointLoop:
         self._examined_at: int | None = None
         """When the list before take-off was examined last."""
         self._before: int | None = None
-        self._last_action: type[Action] | None = None
+        self._last_request: type[MotionRequest] | None = None
         self._asked_at = 0
 
     def step(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
@@ -84,19 +93,19 @@ class SetpointLoop:
         """
         state = self._read()
         items = self._examined(state, now)
-        action = self.mission.update(state, now, refusals(items))
-        if isinstance(action, TakeOff):
+        request = self.mission.update(state, now, refusals(items))
+        if isinstance(request, TakeOff):
             for text in concerns(items):
                 self.mission.concern(text)
         try:
-            record = self._carry_out(action, state, now, neighbours)
+            record = self._carry_out(request, state, now, neighbours)
         except VehicleError as error:
             self.mission.vehicle_refused(str(error))
             record = SetpointRecord(now, None, None)
         finally:
-            self._last_action = type(action)
+            self._last_request = type(request)
             self._before = now
-        self.mission.command_sent(action, record.sent)
+        self.mission.command_sent(request, record.sent)
         return record
 
     @property
@@ -126,23 +135,23 @@ class SetpointLoop:
 
     def _carry_out(
         self,
-        action: Action,
+        request: MotionRequest,
         state: VehicleState,
         now: int,
         neighbours: Iterable[Neighbour],
     ) -> SetpointRecord:
-        if isinstance(action, Fly):
-            return self._send(action.setpoint, state, now, neighbours, action.cause)
-        if isinstance(action, Hold):
+        if isinstance(request, Fly):
+            return self._send(request.setpoint, state, now, neighbours, request.cause)
+        if isinstance(request, Hold):
             stay: Setpoint = VelocitySetpoint(np.zeros(3))
-            if action.position is not None and self.vehicle.capabilities.position_setpoints:
-                stay = PositionSetpoint(action.position)
+            if request.position is not None and self.vehicle.capabilities.position_setpoints:
+                stay = PositionSetpoint(request.position)
             return self._send(stay, state, now, neighbours)
         self.guard.forget()
-        if isinstance(action, Supervise):
+        if isinstance(request, Supervise):
             return self._supervise(state, now, neighbours)
-        if not isinstance(action, Wait):
-            self._ask(action, state, now)
+        if not isinstance(request, Wait):
+            self._ask(request, state, now)
         return SetpointRecord(now, None, None)
 
     def _supervise(
@@ -159,16 +168,16 @@ class SetpointLoop:
     def _around(self, state: VehicleState, neighbours: Iterable[Neighbour]) -> list[Neighbour]:
         return [*neighbours, *self.mission.neighbours(state)]
 
-    def _ask(self, action: TakeOff | Land | Return, state: VehicleState, now: int) -> None:
-        """Request the action once, then every second while the vehicle's mode does not show it."""
-        new = self._last_action is not type(action)
-        overdue = state.mode not in _DOING[type(action)] and now - self._asked_at >= _REPEAT
+    def _ask(self, request: TakeOff | Land | Return, state: VehicleState, now: int) -> None:
+        """Send the request once, then every second while the vehicle's mode does not show it."""
+        new = self._last_request is not type(request)
+        overdue = state.mode not in _DOING[type(request)] and now - self._asked_at >= _REPEAT
         if not (new or overdue):
             return
         self._asked_at = now
-        if isinstance(action, TakeOff):
-            self.vehicle.take_off(action.height)
-        elif isinstance(action, Return):
+        if isinstance(request, TakeOff):
+            self.vehicle.take_off(request.height)
+        elif isinstance(request, Return):
             self.vehicle.return_home()
         else:
             self.vehicle.land()

@@ -1,4 +1,4 @@
-"""The mission of one drone: commands and vehicle states in, one action per turn out.
+"""The mission of one drone: commands and vehicle states in, one request of motion a turn out.
 
 A mission is pure: it reads no clock, never sleeps and starts no thread, so that the drone's node,
 a test and a study all fly it with the same result. Long computations, such as plans, are submitted
@@ -25,7 +25,6 @@ from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
 from aerodaas.mission.action_executor import ActionRunner, added_executors
-from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, Supervise, TakeOff, Wait
 from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
     Actuate,
@@ -52,6 +51,16 @@ from aerodaas.mission.commands import (
 from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.handover.handover import HANDED_OVER, Handover
 from aerodaas.mission.log import MissionLog
+from aerodaas.mission.motion_requests import (
+    Fly,
+    Hold,
+    Land,
+    MotionRequest,
+    Return,
+    Supervise,
+    TakeOff,
+    Wait,
+)
 from aerodaas.mission.navigation.cornering import Cornering
 from aerodaas.mission.navigation.leg import (
     Leg,
@@ -94,9 +103,9 @@ class Mission:
 
     The drone's node calls `update` 20 times a second::
 
-        action = mission.update(vehicle.read(), clock.now())
+        request = mission.update(vehicle.read(), clock.now())
 
-    and carries the action out (`aerodaas.mission.loop.SetpointLoop` does both). Commands may be
+    and carries the request out (`aerodaas.mission.loop.SetpointLoop` does both). Commands may be
     handled between turns, by the same thread.
     """
 
@@ -343,8 +352,10 @@ class Mission:
             self._to(state, reason, commanded=True)
         return DONE
 
-    def update(self, state: VehicleState, now: int, objections: Sequence[str] = ()) -> Action:
-        """Take one turn of the loop and return the action to carry out.
+    def update(
+        self, state: VehicleState, now: int, objections: Sequence[str] = ()
+    ) -> MotionRequest:
+        """Take one turn of the loop and return the request to carry out.
 
         Args:
             state: The vehicle's state.
@@ -373,22 +384,22 @@ class Mission:
         }
         return turns.get(self.state, self._fly)(state)
 
-    def command_sent(self, action: Action, setpoint: Setpoint | None) -> None:
-        """Compare the motion with `action` from now on.
+    def command_sent(self, request: MotionRequest, setpoint: Setpoint | None) -> None:
+        """Compare the motion with `request` from now on.
 
         Args:
-            action: The action that was carried out.
+            request: The request that was carried out.
             setpoint: The setpoint as which it was sent; None if as none.
         """
         if self._obeyed:
-            self._supervisor.motion.command(action, setpoint)
+            self._supervisor.motion.command(request, setpoint)
 
     def use_planner(self, planner: Planner) -> None:
         """Plan with `planner` from now on, beginning with the whole queue."""
         self._navigator.use_planner(planner)
 
     def vehicle_refused(self, text: str) -> None:
-        """Record that the vehicle refused an action; `text` is the vehicle's message."""
+        """Record that the vehicle refused a request; `text` is the vehicle's message."""
         if self.state is MissionState.TAKING_OFF:
             self._to(MissionState.ABORTED, f"the vehicle refused to take off: {text}")
         self._log.alert(self._now, "refused", text)
@@ -436,7 +447,7 @@ class Mission:
             self._log.alert(self._now, "vehicle_lost", reason)
         return bool(reason)
 
-    def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
+    def _preflight(self, state: VehicleState, objections: Sequence[str]) -> MotionRequest:
         self._planning.plan(state, self._now)
         self._forecast_battery(state)
         reasons = self._supervisor.objections(state)
@@ -483,7 +494,7 @@ class Mission:
             self.take_back(self._machine.reason)
         return True
 
-    def _take_off(self, state: VehicleState) -> Action:
+    def _take_off(self, state: VehicleState) -> MotionRequest:
         self._planning.plan(state, self._now)
         tolerance = max(self.limits.arrival_radius, 0.1 * self.limits.takeoff_height)
         height = state.odometry.height - float(self.home[2])
@@ -496,7 +507,7 @@ class Mission:
             return Land()
         return TakeOff(self.limits.takeoff_height)
 
-    def _fly(self, state: VehicleState) -> Action:
+    def _fly(self, state: VehicleState) -> MotionRequest:
         if self._paused:
             self._to(MissionState.PAUSED)
             return self._stay(state)
@@ -519,7 +530,7 @@ class Mission:
             return self._follow(served, state)
         return self._idle(state)
 
-    def _stay(self, state: VehicleState) -> Action:
+    def _stay(self, state: VehicleState) -> MotionRequest:
         """Hover, unless somebody flies by hand."""
         self._to(MissionState.PAUSED, self._manual.reason(self._now))
         self._forecast_battery(state)
@@ -529,7 +540,7 @@ class Mission:
         self._leg = self._anchor = None
         return Fly(velocity_setpoint(velocity, state))
 
-    def _supervise(self, state: VehicleState) -> Action:
+    def _supervise(self, state: VehicleState) -> MotionRequest:
         self._leg = self._anchor = None
         for stop in self.handover.follow(state, self._now, self._elapsed):
             self._finish(stop, LegPhase.DONE)
@@ -539,7 +550,7 @@ class Mission:
         self._to(*self.handover.situation(head))
         return Supervise()
 
-    def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
+    def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> MotionRequest:
         holds = self.state is MissionState.HOLDING
         if self._planning.awaited(stop, self._machine.since if holds else None, self._now):
             self._to(MissionState.HOLDING, "waiting for a plan")
@@ -571,8 +582,8 @@ class Mission:
         flown = self._leg.setpoint(place, position, limits.cruise_speed, heading, passing)
         return Fly(flown, stop.cause)
 
-    def _after_failure(self, failure: str, state: VehicleState) -> Action:
-        """Action after the failure of an actuator, where the flight is not to go on."""
+    def _after_failure(self, failure: str, state: VehicleState) -> MotionRequest:
+        """Request after the failure of an actuator, where the flight is not to go on."""
         if self._options.on_actuator_failure == "pause":
             self._paused = True
             return self._stay(state)
@@ -588,7 +599,7 @@ class Mission:
             self._unfinished = self._unfinished or why
         self._navigator.finish(stop)
 
-    def _follow(self, live: LiveCommand, state: VehicleState) -> Action:
+    def _follow(self, live: LiveCommand, state: VehicleState) -> MotionRequest:
         waiting = len(self._navigator.queue) > 0
         if self._now >= live.expires:
             self._to(MissionState.DIVERTED if waiting else MissionState.HOLDING, "no fresh command")
@@ -597,7 +608,7 @@ class Mission:
         self._anchor = None
         return Fly(velocity_setpoint(live.command, state), live.cause)
 
-    def _idle(self, state: VehicleState) -> Action:
+    def _idle(self, state: VehicleState) -> MotionRequest:
         options, limits = self._options, self.limits
         if self._command_handler.is_fed:
             quiet = seconds(self._now - self._command_handler.last_received)
@@ -616,7 +627,7 @@ class Mission:
         self._to(MissionState.HOLDING, ending)
         return self._hover(state)
 
-    def _hover(self, state: VehicleState) -> Action:
+    def _hover(self, state: VehicleState) -> MotionRequest:
         self._leg = None
         if not has_position(state):
             return Hold(None)
@@ -627,7 +638,7 @@ class Mission:
             )
         return Hold(self._anchor)
 
-    def _return(self, state: VehicleState) -> Action:
+    def _return(self, state: VehicleState) -> MotionRequest:
         self._leg = None
         lost = state.mode is VehicleMode.LOST or not has_position(state)
         if lost and self._assessment.action in {FailsafeAction.HOLD, FailsafeAction.RETURN}:
@@ -652,7 +663,7 @@ class Mission:
             return Land()
         return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
 
-    def _land(self, _: VehicleState) -> Action:
+    def _land(self, _: VehicleState) -> MotionRequest:
         self._leg = None
         return Land()
 

@@ -23,7 +23,7 @@ from aerodaas.messages.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.mission.actions import Action, Land, TakeOff
+from aerodaas.mission.motion_requests import Land, MotionRequest, TakeOff
 
 __all__ = ["STANDS_AFTER", "MotionWatch"]
 
@@ -65,18 +65,18 @@ class MotionWatch:
         self._stood_at: Vector = np.zeros(3)
         self._now = 0
 
-    def command(self, action: Action, setpoint: Setpoint | None) -> None:
-        """Compare the motion with `action` from now on.
+    def command(self, request: MotionRequest, setpoint: Setpoint | None) -> None:
+        """Compare the motion with `request` from now on.
 
         Args:
-            action: What the vehicle is asked to do.
+            request: What the vehicle is asked to do.
             setpoint: The setpoint as which it was sent; None if it was not sent as one.
         """
-        if isinstance(action, Land) is not self._lands:
+        if isinstance(request, Land) is not self._lands:
             self._lands, self._stands_since = not self._lands, None
         if self._lands:
             setpoint = VelocitySetpoint(np.array([0.0, 0.0, -self._limits.max_climb]))
-        elif isinstance(action, TakeOff):
+        elif isinstance(request, TakeOff):
             setpoint = VelocitySetpoint(np.zeros(3))
         self._setpoint = setpoint
 

@@ -25,10 +25,10 @@ from aerodaas.messages.mission import MissionState as S
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.actions import Fly
 from aerodaas.mission.commands import ReturnHome, Start
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
+from aerodaas.mission.motion_requests import Fly
 from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.mission.safety.motion import MotionWatch
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler

@@ -14,7 +14,7 @@ from aerodaas.config.model import GeofenceConfig, LimitsConfig
 from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.mission.actions import Fly
+from aerodaas.mission.motion_requests import Fly
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import CALM, Supervisor

@@ -1,4 +1,4 @@
-"""Actions that a mission requests from the setpoint loop in one turn."""
+"""Requests of motion by a mission to the setpoint loop, one a turn."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from aerodaas.geometry.frames import Vector
 from aerodaas.messages.frames import Header
 from aerodaas.messages.vehicle import Setpoint
 
-__all__ = ["Action", "Fly", "Hold", "Land", "Return", "Supervise", "TakeOff", "Wait"]
+__all__ = ["Fly", "Hold", "Land", "MotionRequest", "Return", "Supervise", "TakeOff", "Wait"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,4 +55,4 @@ class Land:
     """Land at the current position."""
 
 
-Action: TypeAlias = Wait | TakeOff | Fly | Hold | Supervise | Return | Land
+MotionRequest: TypeAlias = Wait | TakeOff | Fly | Hold | Supervise | Return | Land
