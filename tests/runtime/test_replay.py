@@ -154,6 +154,7 @@ def test_a_mission_that_goes_elsewhere_ends_with_the_recording(surveyed: Run, fl
 
 
 @pytest.mark.slow
+@pytest.mark.wall_clock
 def test_a_flight_by_the_clock_is_seen_again(flyer: Flyer) -> None:
     """Frames come at odd times and some are missed: all pass again, and are found to hold the same.
 
