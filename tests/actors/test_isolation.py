@@ -109,6 +109,7 @@ def refused(
     flyer.fly(build, {**FLAT, "runtime_env": in_file or {}}, speed=5.0)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_provided_is_refused_before_take_off(
     flyer: Flyer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

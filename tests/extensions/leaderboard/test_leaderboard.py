@@ -79,6 +79,7 @@ def test_the_better_stands_above_and_the_same_share_a_place(board: Leaderboard) 
     assert (last.utility.value, last.completion.value) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_standing_is_the_mean_of_what_the_lab_says(board: Leaderboard) -> None:
     """Case by case, as `aerodaas lab run` gives it with the words of the case."""
     first = board.standings[0]
