@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ from aerodaas.mission.commands import Answer, Command
 from aerodaas.service.own.flight import OwnFlight
 from aerodaas.service.own.server import FlightServer
 
-__all__ = ["Run", "ask", "console", "token_of"]
+__all__ = ["Run", "ask", "console", "token_of", "watched_console"]
 
 ENVIRONMENT = {
     "name": "field",
@@ -124,3 +125,12 @@ def ask(
         status, known, content = error.code, error.headers, error.read()
     found = json.loads(content) if known.get_content_type() == "application/json" else content
     return status, {key.lower(): value for key, value in known.items()}, found
+
+
+@contextmanager
+def watched_console(**environment: Any) -> Iterator[tuple[FlightServer, Run]]:  # noqa: ANN401 - any of its fields
+    """The console of `console`, whose drone's status is known."""
+    with console(**environment) as (server, run):
+        while not ask(server.address(), "/v1/missions/own")[2]["status"]:
+            time.sleep(0.05)
+        yield server, run

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, cast
 
 import pytest
 from fastapi import WebSocket
-from hovering import Run, ask, console, token_of
+from hovering import Run, ask, token_of, watched_console
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -34,10 +34,8 @@ pytestmark = pytest.mark.wall_clock
 @pytest.fixture(scope="module")
 def watched() -> Iterator[tuple[FlightServer, Run]]:
     """A drone on its way to one waypoint, whose status is known."""
-    with console() as (server, run):
-        while not ask(server.address(), "/v1/missions/own")[2]["status"]:
-            time.sleep(0.05)
-        yield server, run
+    with watched_console() as both:
+        yield both
 
 
 @pytest.fixture

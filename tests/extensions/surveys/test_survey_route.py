@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from hovering import Run, ask, console
+from hovering import Run, ask, watched_console
 
 from aerodaas.errors import SchedulerError
 from aerodaas.extensions.surveys import service
@@ -24,10 +24,8 @@ SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"
 @pytest.fixture(scope="module")
 def watched() -> Iterator[tuple[FlightServer, Run]]:
     """A drone on its way to one waypoint, whose status is known."""
-    with console() as (server, run):
-        while not ask(server.address(), "/v1/missions/own")[2]["status"]:
-            time.sleep(0.05)
-        yield server, run
+    with watched_console() as both:
+        yield both
 
 
 @pytest.fixture
@@ -71,9 +69,7 @@ def mapper() -> Iterator[FlightServer]:
         {"id": "map", "type": "camera", "settings": hung},
         {"id": "front", "type": "camera", "driver": "tello"},
     ]
-    with console(robots=[{"id": "drone", "sensors": sensors}]) as (server, _):
-        while not ask(server.address(), "/v1/missions/own")[2]["status"]:
-            time.sleep(0.05)
+    with watched_console(robots=[{"id": "drone", "sensors": sensors}]) as (server, _):
         yield server
 
 
