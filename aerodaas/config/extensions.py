@@ -21,11 +21,13 @@ from aerodaas.errors import ConfigError
 __all__ = [
     "Command",
     "Extension",
+    "Hook",
     "LiveView",
     "PluginKind",
     "SettingsSection",
     "VehicleDiscovery",
     "VehicleKind",
+    "added",
     "extensions",
     "imported",
     "live_views",
@@ -39,6 +41,16 @@ _log = logging.getLogger(__name__)
 PluginKind = Literal[
     "drivers", "cameras", "analytics", "trajectory_schedulers", "analytics_schedulers"
 ]
+Hook = Literal[
+    "actions",
+    "action_executors",
+    "mavlink_components",
+    "preflight_checks",
+    "report_sections",
+    "routes",
+    "safety_rules",
+]
+"""A field of `Extension` that names code which the core calls for every flight or server."""
 SettingsSection = Literal["environment", "robot", "limits", "mission", "preflight"]
 """A part of an environment file to which extensions add: the whole file, a robot, or a part of a
 robot."""
@@ -128,7 +140,7 @@ class Extension:
     recorded_settings: tuple[str, ...] = ()
     """Dotted names of those settings that a replay reads of a recording, a stranger's data: numbers
     and words that describe the flight. `[]` follows the name of a list, `*` is any key:
-    `robots[].limits.traffic.distance`."""
+    `robots[].limits.towing.rope`."""
     mavlink_components: tuple[str, ...] = ()
     """`module:Class` of each `drivers.mavlink.component.MavlinkComponent` of every MAVLink
     vehicle: equipment beside its autopilot, by its own messages."""
@@ -198,6 +210,13 @@ def extensions() -> Mapping[str, Extension]:
 def live_views() -> dict[str, LiveView]:
     """Live views that extensions add, by name."""
     return {view.name: view for extension in extensions().values() for view in extension.views}
+
+
+def added(hook: Hook) -> list[Any]:
+    """Import what all extensions name in one field, in the order of the extensions."""
+    return [
+        imported(place) for extension in extensions().values() for place in getattr(extension, hook)
+    ]
 
 
 def section_models(section: SettingsSection) -> dict[str, Any]:

@@ -29,7 +29,7 @@ import numpy as np
 from annotated_types import Ge, Le, Unit
 from typing_extensions import TypedDict
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.messages.serialization.json_types import StrictlyTyped
 from aerodaas.messages.serialization.records import shared_pickle
@@ -281,8 +281,7 @@ def action_kinds() -> Mapping[str, type[Action]]:
 
     Those of extensions are the last.
     """
-    added = (place for extension in extensions().values() for place in extension.actions)
-    kinds: list[type[Any]] = [*_KINDS, *map(imported, added)]
+    kinds: list[type[Any]] = [*_KINDS, *added("actions")]
     return {str(fields(kind)[-1].default): kind for kind in kinds}
 
 

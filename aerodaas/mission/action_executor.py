@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import failure_line
 from aerodaas.messages.odometry import Odometry
@@ -58,11 +58,7 @@ def added_executors(vehicle: object, robot: RobotConfig, log: MissionLog) -> lis
         robot: Its section of the environment file.
         log: The mission's log.
     """
-    return [
-        imported(place)(vehicle, robot, log)
-        for extension in extensions().values()
-        for place in extension.action_executors
-    ]
+    return [executor(vehicle, robot, log) for executor in added("action_executors")]
 
 
 class ActionRunner(ActionExecutor):

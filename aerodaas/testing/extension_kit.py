@@ -11,10 +11,11 @@ In the extension's own tests::
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import get_args
 
 from aerodaas.cli.app import commands
 from aerodaas.cli.recordings.export import formats
-from aerodaas.config.extensions import Command, Extension, imported
+from aerodaas.config.extensions import Command, Extension, Hook, imported
 from aerodaas.config.plugins import is_built_in
 from aerodaas.errors import ConfigError
 
@@ -52,7 +53,7 @@ def _places(extension: Extension) -> Iterator[str]:
     """Every `module:attribute` that an extension names."""
     for plugins in extension.plugins.values():
         yield from plugins.values()
-    for command in (*extension.commands, *extension.exports):
+    for command in (*extension.commands, *extension.exports, *extension.lab):
         yield command.place
     for kind in extension.vehicles:
         yield from [kind.find] if kind.find else []
@@ -60,13 +61,8 @@ def _places(extension: Extension) -> Iterator[str]:
         yield from (view.prepare, view.open)
     yield from extension.settings.values()
     yield from extension.elevation_formats.values()
-    yield from extension.routes
-    yield from extension.mavlink_components
-    yield from extension.safety_rules
-    yield from extension.actions
-    yield from extension.action_executors
-    yield from extension.preflight_checks
-    yield from extension.report_sections
+    for hook in get_args(Hook):
+        yield from getattr(extension, hook)
     yield from extension.services.values()
     yield from extension.decoders.values()
 

@@ -93,6 +93,8 @@ def test_the_published_schema_is_current() -> None:
         (Extension("mine", "Some.", settings={"limits": "json:A"}), "cannot be imported"),
         (Extension("mine", "Some.", {"drivers": {"mavlink": "json:loads"}}), "project's own"),
         (Extension("mine", "Some.", commands=(Command("run", "json:loads", "Run."),)), "'run'"),
+        (Extension("mine", "Some.", lab=(Command("a", "nothing_there:A", "A."),)), "nothing_there"),
+        (Extension("mine", "Some.", safety_rules=("nothing_there:A",)), "nothing_there"),
         (Extension("mine", "Some.", exports=(Command("csv", "json:loads", "C."),)), "'csv'"),
     ],
 )

@@ -19,7 +19,6 @@ from aerodaas.errors import RecordingError
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report import section
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
 from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
@@ -91,7 +90,7 @@ def test_an_extension_adds_a_section(
     """With a table and a note, and its plot beside those of the flight."""
     place = f"{__name__}:lift_sections"
     gliders = Extension("gliders", "Gliders.", report_sections=(place,))
-    monkeypatch.setattr(section, "extensions", lambda: {"gliders": gliders})
+    monkeypatch.setattr("aerodaas.config.extensions.extensions", lambda: {"gliders": gliders})
     files = write_report(recorded, tmp_path)
     page = files.page.read_text()
     for shown in ("<h2>Gliding</h2>", "</code> topics</p>", "<th>&lt;b&gt;</th>", "<p>Calm.</p>"):

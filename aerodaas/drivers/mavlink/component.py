@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -84,8 +84,4 @@ class MavlinkComponent:
 
 def mavlink_components(context: ComponentContext) -> list[MavlinkComponent]:
     """The components that extensions bring for a vehicle."""
-    return [
-        imported(place)(context)
-        for extension in extensions().values()
-        for place in extension.mavlink_components
-    ]
+    return [component(context) for component in added("mavlink_components")]

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.config.model import LimitsConfig
 from aerodaas.config.sections.preflight import PreflightConfig, PreflightLevel
 from aerodaas.errors import VehicleError
@@ -114,9 +114,7 @@ class Checklist:
         self._policy = policy
         self._fence = Geofence(limits.geofence)
         self._checks: list[PreflightCheck] = [
-            imported(place)(limits, policy)
-            for extension in extensions().values()
-            for place in extension.preflight_checks
+            check(limits, policy) for check in added("preflight_checks")
         ]
         self._subjects = _SUBJECTS | {one.subject: one.name for one in self._checks}
         self._remedies = _REMEDIES | {one.name: one.remedy for one in self._checks}

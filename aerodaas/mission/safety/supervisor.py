@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.config.model import LimitsConfig
 from aerodaas.geometry.energy import EnergyMeter
 from aerodaas.geometry.frames import Vector, is_finite, length
@@ -114,11 +114,7 @@ class Supervisor:
         self._home = home
         self._fence = fence
         self._meter = meter
-        self._rules: list[SafetyRule] = [
-            imported(place)(limits)
-            for extension in extensions().values()
-            for place in extension.safety_rules
-        ]
+        self._rules: list[SafetyRule] = [rule(limits) for rule in added("safety_rules")]
         self.motion = MotionWatch(limits)
         """Told by the setpoint loop what the drone follows."""
         self._taken: Fault | None = None

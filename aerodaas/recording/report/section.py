@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -45,9 +45,4 @@ class ReportSection:
 
 def extension_sections(recording: Recording) -> list[ReportSection]:
     """Sections that the installed extensions add to the report of a recording."""
-    return [
-        section
-        for extension in extensions().values()
-        for place in extension.report_sections
-        for section in imported(place)(recording)
-    ]
+    return [section for sections in added("report_sections") for section in sections(recording)]

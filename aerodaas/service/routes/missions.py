@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi import APIRouter, BackgroundTasks, Request
 
-from aerodaas.config.extensions import extensions, imported
+from aerodaas.config.extensions import added
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
 from aerodaas.protocol.scenery import SceneryOut
@@ -25,11 +25,7 @@ def extension_routers(missions: Missions, admission: Admission) -> list[APIRoute
         missions: Missions that they are about.
         admission: Access to them.
     """
-    return [
-        imported(place)(missions, admission)
-        for extension in extensions().values()
-        for place in extension.routes
-    ]
+    return [router(missions, admission) for router in added("routes")]
 
 
 class MissionRoutes:
