@@ -99,7 +99,7 @@ class PreflightCheck:
     level: PreflightLevel | None = None
     """What a finding means; None: the verdict of `examine` stands."""
     subject: str = ""
-    """First words, up to a colon, of the vehicle's faults that belong to the item."""
+    """First words, up to a colon, of the vehicle's faults that belong to the item; empty: none."""
 
 
 class Checklist:
@@ -116,7 +116,7 @@ class Checklist:
         self._checks: list[PreflightCheck] = [
             check(limits, policy) for check in added("preflight_checks")
         ]
-        self._subjects = _SUBJECTS | {one.subject: one.name for one in self._checks}
+        self._subjects = _SUBJECTS | {one.subject: one.name for one in self._checks if one.subject}
         self._remedies = _REMEDIES | {one.name: one.remedy for one in self._checks}
 
     def examine(self, state: VehicleState) -> list[HealthItem]:

@@ -196,12 +196,13 @@ def test_what_the_vehicle_says_of_an_item_counts_most(fault: str, name: str) -> 
     assert item.value == fault.partition(": ")[2]
 
 
-def test_other_faults_are_listed() -> None:
-    """Under their own name."""
+@pytest.mark.parametrize("fault", ["gyroscope: unhealthy", ": unhealthy", "unhealthy"])
+def test_other_faults_are_listed(fault: str) -> None:
+    """Under their own name, whatever comes before the colon."""
     vehicle = Measured()
-    vehicle.faults = ("gyroscope: unhealthy",)
+    vehicle.faults = (fault,)
     item = listed(vehicle)["faults"]
-    assert (item.value, item.verdict) == ("gyroscope: unhealthy", Verdict.WARNING)
+    assert (item.value, item.verdict) == (fault, Verdict.WARNING)
 
 
 def test_battery_fence_and_the_vehicle_itself_are_no_matter_of_policy() -> None:
