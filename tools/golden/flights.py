@@ -26,14 +26,17 @@ _LONGEST = 900
 """Seconds of the clock that one flight may take."""
 _HERE = Path(__file__).parent
 _ROOT = _HERE.parents[1]
-_SIX = (
-    "disaster_survey",
-    "farm_survey",
-    "search_and_rescue",
-    "situation_awareness",
-    "tower_inspection",
-    "vehicle_tracking",
-)
+_BY_PROCESSOR, _BY_CLOCK = 0.5, 1.5
+"""Metres by which flights may differ: those that a network steers, whose last digits depend on the
+processor (onnxruntime chooses its kernels by it), and those that go by the wall clock."""
+_SIX = {
+    "disaster_survey": 0.0,
+    "farm_survey": 0.0,
+    "search_and_rescue": _BY_PROCESSOR,
+    "situation_awareness": _BY_PROCESSOR,
+    "tower_inspection": _BY_PROCESSOR,
+    "vehicle_tracking": _BY_PROCESSOR,
+}
 
 
 class FlightFailedError(Exception):
@@ -47,8 +50,13 @@ class GoldenFlight:
     name: str
     fly: Callable[[Path], dict[str, Any]]
     """Flies in an empty folder and returns the summary."""
-    alike: bool = False
-    """Whether it goes by the wall clock, so that only its milestones are compared."""
+    near: float = 0.0
+    """Metres by which it may differ from the one that is kept, where it is not equal."""
+
+    @property
+    def by_clock(self) -> bool:
+        """Whether it goes by the wall clock, so that only its milestones are compared."""
+        return self.near == _BY_CLOCK
 
 
 def _flown(folder: Path, application: str | Path, *options: str) -> dict[str, Any]:
@@ -161,19 +169,19 @@ def _service(folder: Path) -> Iterator[tuple[str, str]]:
 
 def _all() -> Sequence[GoldenFlight]:
     exact = [
-        GoldenFlight(f"{name}-{seed}", _application(name, seed))
-        for name in _SIX
+        GoldenFlight(f"{name}-{seed}", _application(name, seed), near)
+        for name, near in _SIX.items()
         for seed in range(5)
     ]
     return (
         *exact,
         GoldenFlight("fleet_survey-0", _application("fleet_survey", 0)),
         GoldenFlight("own", _own),
-        GoldenFlight("execution_times", _with_execution_times),
-        GoldenFlight("replay", _replayed),
+        GoldenFlight("execution_times", _with_execution_times, _BY_PROCESSOR),
+        GoldenFlight("replay", _replayed, _BY_PROCESSOR),
         GoldenFlight("rehearsal", _rehearsed),
-        GoldenFlight("emulated_px4", _emulated("px4"), alike=True),
-        GoldenFlight("emulated_ardupilot", _emulated("ardupilot"), alike=True),
+        GoldenFlight("emulated_px4", _emulated("px4"), _BY_CLOCK),
+        GoldenFlight("emulated_ardupilot", _emulated("ardupilot"), _BY_CLOCK),
     )
 
 

@@ -25,8 +25,8 @@ _LOGS = ("/alerts", "/log")
 """Topics whose messages are compared themselves, less stalls."""
 _PLANNING = "waiting for a plan"
 """A state that a fast machine may not show."""
-_NEAR, _ALIKE = 1.5, 0.15
-"""Metres and shares within which flights in real time are alike."""
+_SHARE = 0.1
+"""Share of a number, for each metre of tolerance, by which it may differ."""
 
 
 def summary(path: Path) -> dict[str, Any]:
@@ -89,13 +89,14 @@ def milestones(whole: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def differences(golden: Any, flown: Any, *, alike: bool = False, at: str = "") -> Iterable[str]:  # noqa: ANN401 - JSON
+def differences(golden: Any, flown: Any, *, near: float = 0, at: str = "") -> Iterable[str]:  # noqa: ANN401 - JSON
     """Tell where two summaries differ, a line each.
 
     Args:
         golden: The summary that is kept.
         flown: The summary of a new flight.
-        alike: Whether numbers need only be near each other, as between flights in real time.
+        near: Metres within which places are equal; a greater number may differ by 10 % for each
+            metre of it, and digests do not count. 0 compares to the last digit.
         at: Path of both within the whole.
 
     Yields:
@@ -103,12 +104,13 @@ def differences(golden: Any, flown: Any, *, alike: bool = False, at: str = "") -
     """
     if isinstance(golden, dict) and isinstance(flown, dict):
         for key in sorted(golden.keys() | flown.keys()):
-            yield from differences(golden.get(key), flown.get(key), alike=alike, at=f"{at}/{key}")
+            if key != "digest" or not near:
+                yield from differences(golden.get(key), flown.get(key), near=near, at=f"{at}/{key}")
     elif isinstance(golden, list) and isinstance(flown, list) and len(golden) == len(flown):
         for number, (kept, new) in enumerate(zip(golden, flown, strict=True)):
-            yield from differences(kept, new, alike=alike, at=f"{at}/{number}")
-    elif alike and isinstance(golden, int | float) and isinstance(flown, int | float):
-        if abs(golden - flown) > max(_NEAR, _ALIKE * abs(golden)):
+            yield from differences(kept, new, near=near, at=f"{at}/{number}")
+    elif near and isinstance(golden, int | float) and isinstance(flown, int | float):
+        if abs(golden - flown) > near * max(1, _SHARE * abs(golden)):
             yield f"{at}: {golden} -> {flown}"
     elif golden != flown:
         yield f"{at}: {_short(golden)} -> {_short(flown)}"
