@@ -29,5 +29,5 @@ EXTENSION = Extension(
             open="aerodaas.extensions.ros2.bags.live:RosGraph",
         ),
     ),
-    decoders={"cdr": "aerodaas.extensions.ros2.bags.typestore:decoder_of"},
+    decoders={"cdr": "aerodaas.extensions.ros2.topics.types:decoder_of"},
 )

@@ -10,48 +10,41 @@ import math
 import threading
 import time
 from types import TracebackType
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from typing_extensions import Self
 
-from aerodaas.extensions.ros2.topics import messages as ros
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.link import RosLink
 from aerodaas.geometry.frames import rotation_from_rpy
 from aerodaas.simulation.airframe import Airframe, Wind
 from aerodaas.simulation.dynamics import STEP, KinematicState, Multirotor
 
-__all__ = ["RosDrone", "odometry_message", "quaternion"]
+__all__ = ["RosDrone", "odometry_message"]
 
 _STEPS = 2
 """Steps of the simulator between odometry messages: 50 Hz."""
 
 
-def quaternion(roll: float, pitch: float, yaw: float) -> ros.Quaternion:
-    """By z-y-x angles in radians, written out as textbooks have it."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return ros.Quaternion(
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-
-
-def odometry_message(motion: KinematicState, stamp: int) -> ros.Odometry:
+def odometry_message(motion: KinematicState, stamp: int) -> Any:  # noqa: ANN401 - a type made at run time
     """Of a state of motion; the twist is in the body's axes."""
     attitude = rotation_from_rpy(motion.roll, motion.pitch, motion.yaw)
-    linear = attitude.T @ np.array(motion.velocity)
-    angular = attitude.T @ np.array([0.0, 0.0, motion.yaw_rate])
-    pose = ros.Pose(ros.Point(*motion.position), quaternion(motion.roll, motion.pitch, motion.yaw))
-    twist = ros.Twist(ros.Vector3(*map(float, linear)), ros.Vector3(*map(float, angular)))
-    return ros.Odometry(
-        ros.Header(ros.Time(*divmod(stamp, 1_000_000_000)), "x3/odom"),
-        "x3/base_footprint",
-        ros.PoseWithCovariance(pose),
-        ros.TwistWithCovariance(twist),
-    )
+    message = types.ros_message(types.ODOMETRY, child_frame_id="x3/base_footprint")
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    message.header.frame_id = "x3/odom"
+    pose, twist = message.pose.pose, message.twist.twist
+    quaternion = Rotation.from_euler("ZYX", [motion.yaw, motion.pitch, motion.roll]).as_quat()
+    for target, values in (
+        (pose.position, motion.position),
+        (pose.orientation, quaternion),
+        (twist.linear, attitude.T @ np.array(motion.velocity)),
+        (twist.angular, attitude.T @ np.array([0.0, 0.0, motion.yaw_rate])),
+    ):
+        for axis, value in zip("xyzw", values, strict=False):
+            setattr(target, axis, float(value))
+    return message
 
 
 class RosDrone:
@@ -72,14 +65,14 @@ class RosDrone:
             Airframe(), wind, max_acceleration=4.0, max_yaw_rate=2.0, start=start, yaw=yaw
         )
         self._simulated = simulated_time
-        self._odometry = link.publisher(f"{prefix}/odometry", ros.Odometry)
-        self._battery = link.publisher(f"{prefix}/battery", ros.BatteryState)
-        link.subscribe(f"{prefix}/cmd_vel", ros.Twist, self._take)
-        link.subscribe(f"{prefix}/enable", ros.Bool, self._switch)
+        self._odometry = link.publisher(f"{prefix}/odometry", types.ODOMETRY)
+        self._battery = link.publisher(f"{prefix}/battery", types.BATTERY)
+        link.subscribe(f"{prefix}/cmd_vel", types.TWIST, self._take)
+        link.subscribe(f"{prefix}/enable", types.BOOL, self._switch)
         self._lock = threading.Lock()
-        self._twist = ros.Twist()
+        self._twist = types.ros_message(types.TWIST)
         self.enabled = False
-        self.heard: list[ros.Twist] = []
+        self.heard: list[Any] = []
         """All velocities, as they came."""
         self.switched: list[bool] = []
         """Every `enable`."""
@@ -98,7 +91,7 @@ class RosDrone:
             return self._rotor.motion()
 
     @property
-    def velocity(self) -> ros.Vector3:
+    def velocity(self) -> Any:  # noqa: ANN401
         """The linear velocity that it heard last."""
         with self._lock:
             return self._twist.linear
@@ -116,12 +109,12 @@ class RosDrone:
         self._stopping.set()
         self._thread.join()
 
-    def _take(self, message: ros.Twist) -> None:
+    def _take(self, message: Any) -> None:  # noqa: ANN401
         with self._lock:
             self._twist = message
             self.heard.append(message)
 
-    def _switch(self, message: ros.Bool) -> None:
+    def _switch(self, message: Any) -> None:  # noqa: ANN401
         with self._lock:
             self.enabled = message.data
             self.switched.append(message.data)
@@ -153,4 +146,6 @@ class RosDrone:
         if not self.silent:
             self._odometry.publish(message)
         if steps % 50 == 0:
-            self._battery.publish(ros.BatteryState(voltage=15.2, percentage=self.charge))
+            self._battery.publish(
+                types.ros_message(types.BATTERY, voltage=15.2, percentage=self.charge)
+            )

@@ -16,8 +16,8 @@ from aerodaas.cameras.images import picture_bytes
 from aerodaas.cameras.picture_size import picture_fits, picture_size
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import RecordingError
-from aerodaas.extensions.ros2.bags import typestore
 from aerodaas.extensions.ros2.bags.bag import BagMessage, RosBag
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.incoming import (
     battery_of,
     euler_of,
@@ -32,11 +32,11 @@ from aerodaas.recording.reader import Topic
 __all__ = ["BagPreview", "BagTopics", "Taken", "use_of"]
 
 _TYPES = {
-    "camera": (typestore.COMPRESSED_IMAGE, typestore.IMAGE),
-    "odometry": (typestore.ODOMETRY,),
-    "gps": (typestore.NAV_SAT_FIX,),
-    "battery": (typestore.BATTERY,),
-    "detections": (typestore.DETECTIONS,),
+    "camera": (types.COMPRESSED_IMAGE, types.IMAGE),
+    "odometry": (types.ODOMETRY,),
+    "gps": (types.NAV_SAT_FIX,),
+    "battery": (types.BATTERY,),
+    "detections": (types.DETECTIONS,),
 }
 """Types that a topic may have, by its use."""
 _SINGLE = ("odometry", "gps", "battery")
@@ -111,7 +111,7 @@ class BagTopics:
 
 def use_of(schema: str) -> str:
     """Option of `aerodaas import` that fits topics of this type; empty if none does."""
-    return next((use for use, types in _TYPES.items() if schema in types), "")
+    return next((use for use, fitting in _TYPES.items() if schema in fitting), "")
 
 
 class Place(NamedTuple):
@@ -228,22 +228,22 @@ class BagPreview:
         self._places: dict[str, Place] = {}
         known = bag.topics
         wanted = {one.topic for one in topics.taken()}
-        types = {name: known[name].schema for name in wanted}
-        further = {info_topic(topic): typestore.CAMERA_INFO for topic in topics.camera.values()}
-        further[_STATIC] = typestore.TRANSFORMS
-        types |= {
+        schemas = {name: known[name].schema for name in wanted}
+        further = {info_topic(topic): types.CAMERA_INFO for topic in topics.camera.values()}
+        further[_STATIC] = types.TRANSFORMS
+        schemas |= {
             name: kind
             for name, kind in further.items()
             if name in known and known[name].schema == kind
         }
         end = None
-        for message in bag.messages(types.keys()):
+        for message in bag.messages(schemas.keys()):
             end = end or message.time + _LENGTH
             if message.time > end:
                 break
             # What is no place, size or fix tells nothing here; the import counts it.
             with suppress(ValueError):
-                self._inspect(message, types[message.topic])
+                self._inspect(message, schemas[message.topic])
         stamps = [one for topic in wanted for one in self._stamps[topic]]
         self.epoch_ns = min(stamps, default=0)
         """Time of the earliest message taken, nanoseconds since 1970."""
@@ -268,12 +268,11 @@ class BagPreview:
         Raises:
             ValueError: If the two are too far apart to be believed.
         """
-        stamp = stamp_of(message.value) or message.time - message.shift
+        stamp = stamp_of(message.value) or message.time
         if self._offset is None:
-            apart = message.time - message.shift - stamp
-            self._offset = message.time - stamp if abs(apart) > _ONE_CLOCK else 0
-        # By one clock with the recording, the stamp leaps as that does.
-        captured = stamp + (self._offset or message.shift)
+            apart = message.time - stamp
+            self._offset = apart if abs(apart) > _ONE_CLOCK else 0
+        captured = stamp + self._offset
         if abs(captured - message.time) > (_DRIFT if self._offset else _ONE_CLOCK):
             raise ValueError("its stamp is too far from the time of its recording")
         # Clocks of two machines may differ by a little; nothing is recorded before it was.
@@ -305,25 +304,25 @@ class BagPreview:
 
     def _inspect(self, message: BagMessage, kind: str) -> None:
         value, topic = message.value, message.topic
-        if kind == typestore.TRANSFORMS:
+        if kind == types.TRANSFORMS:
             for transform in value.transforms:
                 self._places[transform.child_frame_id] = place_of(transform)
             return
-        if kind == typestore.CAMERA_INFO:
+        if kind == types.CAMERA_INFO:
             self._infos.setdefault(topic, value)
             return
         self._stamps[topic].append(self.times(message)[0])
-        if kind == typestore.ODOMETRY and self._odometry is None:
+        if kind == types.ODOMETRY and self._odometry is None:
             self._odometry, self._body = odometry_of(value), value.child_frame_id
-        elif kind == typestore.NAV_SAT_FIX and self.fix is None:
+        elif kind == types.NAV_SAT_FIX and self.fix is None:
             self.fix = fix_of(value)
-        elif kind == typestore.BATTERY and math.isnan(self.battery.fraction):
+        elif kind == types.BATTERY and math.isnan(self.battery.fraction):
             self.battery = battery_of(value)
-        elif kind in {typestore.IMAGE, typestore.COMPRESSED_IMAGE} and topic not in self._sizes:
+        elif kind in {types.IMAGE, types.COMPRESSED_IMAGE} and topic not in self._sizes:
             self._frames[topic] = value.header.frame_id
             size = (
                 (value.width, value.height)
-                if kind == typestore.IMAGE
+                if kind == types.IMAGE
                 else picture_size(picture_bytes(value))
             )
             if size is not None and picture_fits(*size):

@@ -7,19 +7,17 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from aerodaas.errors import RecordingError
-from aerodaas.extensions.ros2.bags import typestore
-from aerodaas.extensions.ros2.bags.outgoing import MessageBuilder
+from aerodaas.extensions.ros2.bags.outgoing import Lens, MessageBuilder, Outgoing
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.names import permitted_topic
-from aerodaas.geometry.frames import is_finite
 from aerodaas.recording.new_file import new_file
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, RecordedImage, shots
 from aerodaas.recording.reader import Record, Recording
-from aerodaas.recording.reference_frames import MAP_FRAME, base_link, from_rpy
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection, Qos
@@ -33,12 +31,6 @@ _STATE = "aerodaas.VehicleState"
 _CALIBRATION = "foxglove.CameraCalibration"
 _TRANSFORM = "foxglove.FrameTransform"
 _MOUNT = "/mount"
-
-
-class _Message(NamedTuple):
-    topic: str
-    type: str
-    value: Any
 
 
 def write_bag(recording: Recording, folder: Path, storage: str = "mcap") -> Path:
@@ -61,11 +53,11 @@ def write_bag(recording: Recording, folder: Path, storage: str = "mcap") -> Path
             the bag exists or cannot be written.
         ConfigError: If the extra `ros` is not installed.
     """
-    types = typestore.ros_types()
+    store = types.ros_types()
     from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: PLC0415 - an extra
 
     path = new_file(folder / f"{recording.path.stem}_{storage}")
-    conversion = _Conversion(MessageBuilder(types.types, recording.epoch_ns))
+    conversion = _Conversion(recording.epoch_ns)
     plugin = StoragePlugin[storage.upper()]
     topics = _Topics()
     try:
@@ -73,7 +65,7 @@ def write_bag(recording: Recording, folder: Path, storage: str = "mcap") -> Path
             for record, messages in conversion.all(recording):
                 for message in messages:
                     connection = topics.connection(writer, message)
-                    data = types.serialize_cdr(message.value, message.type)
+                    data = store.serialize_cdr(message.make(), message.type)
                     writer.write(connection, recording.epoch_ns + record.stamp, data)
             if not topics.known:
                 raise RecordingError(
@@ -98,14 +90,14 @@ class _Topics:
     def __init__(self) -> None:
         self.known: dict[str, tuple[str, Connection]] = {}
 
-    def connection(self, writer: Writer, message: _Message) -> Connection:
+    def connection(self, writer: Writer, message: Outgoing) -> Connection:
         topic = permitted_topic(message.topic)
         owner, connection = self.known.get(topic, ("", None))
         if connection is None:
             connection = writer.add_connection(
                 topic,
                 message.type,
-                typestore=typestore.ros_types(),
+                typestore=types.ros_types(),
                 offered_qos_profiles=[_qos(latched=topic == "/tf_static")],
             )
             self.known[topic] = message.topic, connection
@@ -119,20 +111,18 @@ class _Topics:
 class _Conversion:
     """Converts records in the order of recording, as far as ROS 2 has messages for them."""
 
-    def __init__(self, builder: MessageBuilder) -> None:
-        self._build = builder
-        self._newest: dict[str, int] = {}
-        """Stamp of the newest state by robot."""
-        self._lenses: dict[str, tuple[tuple[int, int], list[float]]] = {}
-        """Size and matrix of each stream's camera."""
-        self._converters: dict[str, Callable[[Record], Iterator[_Message]]] = {
-            _STATE: self._state,
+    def __init__(self, epoch_ns: int) -> None:
+        self._build = MessageBuilder(epoch_ns)
+        self._lenses: dict[str, Lens] = {}
+        """Lens of each stream's camera."""
+        self._converters: dict[str, Callable[[Record], Iterator[Outgoing]]] = {
+            _STATE: lambda record: self._build.state(record.value, record.labels.robot),
             _CALIBRATION: self._calibration,
             _TRANSFORM: self._mount,
             DETECTIONS_SCHEMA: self._detections,
         }
 
-    def all(self, recording: Recording) -> Iterator[tuple[Record, Iterator[_Message]]]:
+    def all(self, recording: Recording) -> Iterator[tuple[Record, Iterator[Outgoing]]]:
         records = (
             (record, self._converters[record.schema](record))
             for record in recording.records(schemas=self._converters)
@@ -140,68 +130,40 @@ class _Conversion:
         pictures = ((shot.record, self._picture(shot)) for shot in shots(recording))
         return heapq.merge(records, pictures, key=lambda pair: pair[0].stamp)
 
-    def _state(self, record: Record) -> Iterator[_Message]:
-        robot, state = record.labels.robot, record.value
-        odometry, stamp = state.odometry, state.stamp
-        # Readers of transforms refuse one that is not newer than the one before.
-        if stamp <= self._newest.get(robot, stamp - 1) or not is_finite(odometry.position):
-            return
-        self._newest[robot] = stamp
-        build = self._build
-        # Before the odometry, so that who reads on has all of the moment by then.
-        value = build.battery(state.battery, stamp, robot)
-        yield _Message(f"/{robot}/battery", typestore.BATTERY, value)
-        if state.gps is not None:
-            value = build.fix(state.gps, stamp, robot)
-            yield _Message(f"/{robot}/fix", typestore.NAV_SAT_FIX, value)
-        value = build.odometry(odometry, stamp, robot)
-        yield _Message(f"/{robot}/odometry", typestore.ODOMETRY, value)
-        attitude = from_rpy(odometry.roll, odometry.pitch, odometry.yaw)
-        value = build.transform(stamp, MAP_FRAME, base_link(robot), odometry.position, attitude)
-        yield _Message("/tf", typestore.TRANSFORMS, value)
-
-    def _calibration(self, record: Record) -> Iterator[_Message]:
+    def _calibration(self, record: Record) -> Iterator[Outgoing]:
         value = record.value
         matrix = [float(one) for one in value.K]
         if len(matrix) == 9:  # noqa: PLR2004 - three by three
             stream = record.topic.rpartition("/")[0]
-            self._lenses[stream] = (value.width, value.height), matrix
+            self._lenses[stream] = Lens((value.width, value.height), matrix)
         return iter(())
 
-    def _mount(self, record: Record) -> Iterator[_Message]:
+    def _mount(self, record: Record) -> Iterator[Outgoing]:
         if not record.topic.endswith(_MOUNT):
             return
         value = record.value
         place, turn = value.translation, value.rotation
-        message = self._build.transform(
+        transform = self._build.transform(
             record.captured,
             value.parent_frame_id,
             value.child_frame_id,
             np.array([place.x, place.y, place.z]),
             (turn.x, turn.y, turn.z, turn.w),
         )
-        yield _Message("/tf_static", typestore.TRANSFORMS, message)
+        yield Outgoing("/tf_static", types.TRANSFORMS, lambda: self._build.transforms(transform))
 
-    def _picture(self, shot: RecordedImage) -> Iterator[_Message]:
+    def _picture(self, shot: RecordedImage) -> Iterator[Outgoing]:
         stream = shot.record.topic.removesuffix("/image")
-        stamp, frame = shot.header.stamp, shot.header.source
         # ROS 2 has no message of its own for videos: their frames are files, too.
         picture = shot.file()
         if picture is None:
             return
-        image = self._build.compressed_image(picture.data, picture.format, stamp, frame)
-        yield _Message(f"{stream}/image/compressed", typestore.COMPRESSED_IMAGE, image)
-        if stream in self._lenses:
-            info = self._build.camera_info(*self._lenses[stream], stamp, frame)
-            yield _Message(f"{stream}/camera_info", typestore.CAMERA_INFO, info)
-        depth = shot.depth()
-        if depth is not None:
-            measured = self._build.depth_image(depth, stamp, frame)
-            yield _Message(f"{stream}/aligned_depth", typestore.IMAGE, measured)
+        lens, depth = self._lenses.get(stream), shot.depth()
+        file = picture.data, picture.format
+        yield from self._build.picture(stream, shot.header, lambda: file, lens, depth)
 
-    def _detections(self, record: Record) -> Iterator[_Message]:
-        value = self._build.detections(record.value)
-        yield _Message(record.topic, typestore.DETECTIONS, value)
+    def _detections(self, record: Record) -> Iterator[Outgoing]:
+        yield Outgoing(record.topic, types.DETECTIONS, lambda: self._build.detections(record.value))
 
 
 def _qos(*, latched: bool) -> Qos:

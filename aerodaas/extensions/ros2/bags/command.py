@@ -30,7 +30,7 @@ Taken = Annotated[
 def import_bag(
     bag: Annotated[
         Path,
-        typer.Argument(help="A ROS 2 bag: its folder, or its .mcap or .db3.", show_default=False),
+        typer.Argument(help="A ROS 2 bag: its folder, or its .mcap file.", show_default=False),
     ],
     camera: Taken = None,
     odometry: Taken = None,
@@ -124,8 +124,6 @@ def _told(done: ImportedBag) -> list[str]:
         lines.append(printable(f"skipped {count} of {topic}, the first because {reason}"))
     if not done.complete:
         lines.append("the bag was cut off at its end: what was recorded after that is missing")
-    if done.leaps:
-        lines.append("the bag's clock was set while it was recorded; times go on without the leap")
     if done.damaged:
         lines.append(f"skipped {done.damaged} broken messages or chunks")
     for camera, known in done.lenses.items():

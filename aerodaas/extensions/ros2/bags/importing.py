@@ -24,9 +24,9 @@ from aerodaas.config.model import (
 )
 from aerodaas.config.redaction import public_document
 from aerodaas.errors import AeroDaaSError, RecordingError, SourceError
-from aerodaas.extensions.ros2.bags import typestore
 from aerodaas.extensions.ros2.bags.bag import BagMessage, RosBag
 from aerodaas.extensions.ros2.bags.bag_preview import BagPreview, BagTopics
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.incoming import (
     battery_of,
     detection_items,
@@ -68,8 +68,6 @@ class ImportedBag:
     """Messages and chunks of the bag that could not be read."""
     complete: bool
     """Whether the bag's files were closed properly, and not cut off."""
-    leaps: int
-    """How often the bag's clock was set while it was recorded."""
     lenses: Mapping[str, bool]
     """Whether the bag told of each camera's lens, by the camera's id."""
 
@@ -98,7 +96,7 @@ def import_bag(
             can be read, or the file exists or cannot be written.
         ConfigError: If the extra `ros` is not installed, or an id is none.
     """
-    typestore.ros_types()
+    types.ros_types()
     if not bag.topics:
         raise RecordingError(f"{bag.path} holds no whole message: it is empty, or was cut off")
     topics.check(bag.topics)
@@ -127,7 +125,7 @@ def import_bag(
     lenses = {
         camera: "horizontal_fov" in preview.camera(topic) for camera, topic in topics.camera.items()
     }
-    return ImportedBag(summary, work.skipped, bag.damaged, bag.complete, bag.leaps, lenses)
+    return ImportedBag(summary, work.skipped, bag.damaged, bag.complete, lenses)
 
 
 def _why(bag: RosBag, work: _Import) -> str:
@@ -230,7 +228,7 @@ class _Import:
                 raise ValueError(f"no JPEG, PNG or WebP of a bearable size ({value.format!r:.40})")
             camera = self._model(message.topic, *size)
             return EncodedFrame(header, data, kind, *size, camera, self._odometry)
-        image = decode_image(typestore.IMAGE, value)
+        image = decode_image(types.IMAGE, value)
         if image is None:
             raise ValueError("a broken picture, or one of unbearable size")
         camera = self._model(message.topic, image.shape[1], image.shape[0])

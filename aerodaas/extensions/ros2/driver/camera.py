@@ -21,6 +21,7 @@ from aerodaas.extensions.ros2.driver.settings import Ros2CameraSettings, ros2_ca
 from aerodaas.extensions.ros2.topics.incoming import stamp_of
 from aerodaas.extensions.ros2.topics.link import RosLink, domain_of, require_dds
 from aerodaas.extensions.ros2.topics.stamps import MessageClock
+from aerodaas.extensions.ros2.topics.types import COMPRESSED_IMAGE, IMAGE
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 
@@ -56,8 +57,7 @@ class Ros2Camera:
         self._domain = domain_of(settings.domain)
         named = settings.topic.endswith(_COMPRESSED)
         compressed = named if settings.compressed is None else settings.compressed
-        kind = "CompressedImage" if compressed else "Image"
-        self._kind, self._schema = kind, f"sensor_msgs/msg/{kind}"
+        self._schema = COMPRESSED_IMAGE if compressed else IMAGE
         self._lock = threading.Lock()
         self._clock = MessageClock(settings.stamps)
         self._link: RosLink | None = None
@@ -79,12 +79,10 @@ class Ros2Camera:
 
     def open(self) -> None:
         """Join the domain and wait for a picture; raises SourceError without one."""
-        from aerodaas.extensions.ros2.topics import messages  # noqa: PLC0415 - needs an extra
-
         self.close()
         self._link = link = RosLink(self._domain)
         try:
-            link.subscribe(self._settings.topic, getattr(messages, self._kind), self._on_image)
+            link.subscribe(self._settings.topic, self._schema, self._on_image)
             deadline = time.monotonic() + _FIRST_PICTURE
             while not self._first():
                 self._wait(link, deadline)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.extensions.ros2.driver.frames import Alignment, velocity_in
 from aerodaas.extensions.ros2.driver.settings import Ros2Settings
 from aerodaas.extensions.ros2.topics.link import RosLink
+from aerodaas.extensions.ros2.topics.types import BOOL, TWIST, TWIST_STAMPED, ros_message
 from aerodaas.geometry.frames import is_finite
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import VelocitySetpoint
@@ -24,20 +24,16 @@ _ENABLE_AGAIN = 1.0
 class Steering:
     """Publishers of one drone's velocity, and of its `enable` where it has one."""
 
-    def __init__(self, link: RosLink, settings: Ros2Settings, robot: str) -> None:
+    def __init__(self, link: RosLink, settings: Ros2Settings) -> None:
         """Make the publishers on `link`."""
-        from aerodaas.extensions.ros2.topics import messages  # noqa: PLC0415 - needs an extra
-
-        self._messages = messages
         self._settings = settings
-        self._robot = robot
-        stamped = settings.velocity_type == "twist_stamped"
-        kind: Any = messages.TwistStamped if stamped else messages.Twist
-        self._stamped = stamped
-        self._velocity = link.publisher(settings.velocity, kind)
+        self._stamped = settings.velocity_type == "twist_stamped"
+        self._velocity = link.publisher(
+            settings.velocity, TWIST_STAMPED if self._stamped else TWIST
+        )
         self._enable = None
         if settings.enable is not None:
-            self._enable = link.publisher(settings.enable, messages.Bool)
+            self._enable = link.publisher(settings.enable, BOOL)
         self._enabled_at = -math.inf
 
     @property
@@ -67,25 +63,26 @@ class Steering:
         rate = float(setpoint.yaw_rate)
         if not (is_finite(velocity) and math.isfinite(rate)):
             velocity, rate = np.zeros(3), 0.0
-        make = self._messages
-        x, y, z = map(float, velocity)
-        twist = make.Twist(make.Vector3(x, y, z), make.Vector3(0.0, 0.0, rate))
+        twist = ros_message(TWIST)
+        twist.linear.x, twist.linear.y, twist.linear.z = map(float, velocity)
+        twist.angular.z = rate
         if not self._stamped:
             self._velocity.publish(twist)
             return
         world, body = frames
-        name = self._settings.frame_id or (world if frame == "world" else body)
-        stamp = make.Time(*divmod(host_time_ns(), NANOSECONDS))
-        self._velocity.publish(make.TwistStamped(make.Header(stamp, name), twist))
+        message = ros_message(TWIST_STAMPED, twist=twist)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(host_time_ns(), NANOSECONDS)
+        message.header.frame_id = self._settings.frame_id or (world if frame == "world" else body)
+        self._velocity.publish(message)
 
     def motors_on(self, now: float) -> None:
         """Switch the motors on, once a second at most; `now` is the time in seconds."""
         if self._enable is not None and now - self._enabled_at >= _ENABLE_AGAIN:
             self._enabled_at = now
-            self._enable.publish(self._messages.Bool(data=True))
+            self._enable.publish(ros_message(BOOL, data=True))
 
     def motors_off(self) -> None:
         """Switch the motors off: a flight has ended."""
         self._enabled_at = -math.inf
         if self._enable is not None:
-            self._enable.publish(self._messages.Bool(data=False))
+            self._enable.publish(ros_message(BOOL, data=False))

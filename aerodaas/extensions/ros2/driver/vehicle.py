@@ -20,6 +20,7 @@ from aerodaas.extensions.ros2.driver.frames import Alignment
 from aerodaas.extensions.ros2.driver.loop import STANDS_STILL, Limits, VelocityLoop
 from aerodaas.extensions.ros2.driver.settings import Ros2Settings, ros2_settings
 from aerodaas.extensions.ros2.driver.steering import Steering
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.link import RosLink, domain_of, require_dds
 from aerodaas.messages.health import HealthReadings
 from aerodaas.messages.odometry import Odometry
@@ -117,7 +118,7 @@ class Ros2Vehicle:
         try:
             self._subscribe(link)
             if not self._settings.observe:
-                self._steering = Steering(link, self._settings, self._name)
+                self._steering = Steering(link, self._settings)
             deadline = time.monotonic() + timeout
             while self._feed.odometry is None:
                 self._await_odometry(link, deadline)
@@ -129,14 +130,12 @@ class Ros2Vehicle:
         threading.Thread(target=self._run, name="ros2-loop", daemon=True).start()
 
     def _subscribe(self, link: RosLink) -> None:
-        from aerodaas.extensions.ros2.topics import messages  # noqa: PLC0415 - needs an extra
-
         settings, feed = self._settings, self._feed
-        link.subscribe(settings.odometry, messages.Odometry, feed.take_odometry)
+        link.subscribe(settings.odometry, types.ODOMETRY, feed.take_odometry)
         if settings.battery is not None:
-            link.subscribe(settings.battery, messages.BatteryState, feed.take_battery)
+            link.subscribe(settings.battery, types.BATTERY, feed.take_battery)
         if settings.fix is not None:
-            link.subscribe(settings.fix, messages.NavSatFix, feed.take_fix)
+            link.subscribe(settings.fix, types.NAV_SAT_FIX, feed.take_fix)
 
     def _await_odometry(self, link: RosLink, deadline: float) -> None:
         if time.monotonic() < deadline:
@@ -147,7 +146,7 @@ class Ros2Vehicle:
             raise VehicleError(f"{self._name}: {topic}: {self._feed.refusal}")
         found = link.published()
         other = f", where {topic} is {found[topic]}" if topic in found else ""
-        fitting = [name for name, kind in found.items() if kind == "nav_msgs/msg/Odometry"]
+        fitting = [name for name, kind in found.items() if kind == types.ODOMETRY]
         there = f"odometry is on {', '.join(fitting)}" if fitting else "there is no odometry at all"
         raise VehicleError(
             f"{self._name}: no odometry on {topic} in the ROS 2 domain {self._domain}{other}; "

@@ -7,17 +7,16 @@ import logging
 import os
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.extensions.ros2.topics.names import dds_topic, ros_topic, ros_type
+from aerodaas.extensions.ros2.topics.types import dds_type
 
 if TYPE_CHECKING:
     from cyclonedds.pub import DataWriter
 
 __all__ = ["RosLink", "RosPublisher", "domain_of", "require_dds"]
-
-M = TypeVar("M")
 
 _log = logging.getLogger(__name__)
 _LAST_DOMAIN = 232
@@ -54,9 +53,10 @@ def domain_of(setting: int | None) -> int:
 class RosPublisher:
     """Publishes messages of one type on one topic; any thread may use it."""
 
-    def __init__(self, writer: DataWriter[Any]) -> None:
-        """Publish by `writer`."""
+    def __init__(self, writer: DataWriter[Any], encoded: Callable[[Any], Any]) -> None:
+        """Publish by `writer` what `encoded` makes of messages."""
         self._writer: DataWriter[Any] | None = writer
+        self._encoded = encoded
 
     @property
     def listeners(self) -> int:
@@ -72,7 +72,7 @@ class RosPublisher:
         if writer is None:
             return False
         try:
-            writer.write(message)
+            writer.write(self._encoded(message))
         except DDSException as error:
             _log.debug("not published: %s", error)
             return False
@@ -117,11 +117,15 @@ class RosLink:
         self._thread = threading.Thread(target=self._listen, name="ros2", daemon=True)
         self._thread.start()
 
-    def subscribe(self, topic: str, message: type[M], take: Callable[[M], None]) -> None:
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> None:
         """Call `take` with the newest message of `topic`, in the link's thread, as they come.
 
-        Best effort, which any publisher's quality of service satisfies. `message` is a type of
-        `aerodaas.extensions.ros2.topics.messages`.
+        Best effort, which any publisher's quality of service satisfies.
+
+        Args:
+            topic: Name of the topic.
+            kind: Name of its type, such as `nav_msgs/msg/Odometry`.
+            take: Is called with messages of that type.
         """
         from cyclonedds.core import (  # noqa: PLC0415
             InstanceState,
@@ -134,8 +138,7 @@ class RosLink:
         from cyclonedds.topic import Topic  # noqa: PLC0415
 
         qos = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(1))
-        kind: Any = message
-        described: Any = Topic(self._participant, dds_topic(topic), kind)
+        described: Any = Topic(self._participant, dds_topic(topic), dds_type(kind))
         reader = DataReader(self._participant, described, qos=qos)
         fresh = ReadCondition(reader, ViewState.Any | InstanceState.Alive | SampleState.NotRead)
 
@@ -153,11 +156,14 @@ class RosLink:
         self._waiting.attach(fresh)
         self._bell.set(True)
 
-    def publisher(self, topic: str, message: type, *, latched: bool = False) -> RosPublisher:
-        """A reliable publisher of `topic`, which every subscriber can hear.
+    def publisher(self, topic: str, kind: str, *, latched: bool = False) -> RosPublisher:
+        """A reliable publisher of a topic, which every subscriber can hear.
 
-        With `latched`, its newest message is kept for those who subscribe later (ROS 2's
-        transient local).
+        Args:
+            topic: Name of the topic.
+            kind: Name of its type, such as `nav_msgs/msg/Odometry`.
+            latched: Keep the newest message for those who subscribe later (ROS 2's transient
+                local).
         """
         from cyclonedds.pub import DataWriter  # noqa: PLC0415
         from cyclonedds.qos import Policy, Qos  # noqa: PLC0415
@@ -169,8 +175,9 @@ class RosLink:
             Policy.History.KeepLast(1),
             durability,
         )
-        described: Any = Topic(self._participant, dds_topic(topic), message)
-        made = RosPublisher(DataWriter(self._participant, described, qos=qos))
+        encoded = dds_type(kind)
+        described: Any = Topic(self._participant, dds_topic(topic), encoded)
+        made = RosPublisher(DataWriter(self._participant, described, qos=qos), encoded)
         self._publishers.append(made)
         return made
 

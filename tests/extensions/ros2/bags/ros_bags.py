@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from aerodaas.extensions.ros2.bags.outgoing import MessageBuilder
-from aerodaas.extensions.ros2.bags.typestore import ros_types
+from aerodaas.extensions.ros2.topics.types import ros_types
 from aerodaas.messages.odometry import Odometry
 
 EPOCH = 1_750_000_000_000_000_000
@@ -29,14 +29,9 @@ class Sent(NamedTuple):
     kind: str = ""
 
 
-def write(
-    path: Path, sent: Iterable[Sent], storage: str = "MCAP", *, compress: bool = False
-) -> Path:
+def write(path: Path, sent: Iterable[Sent], storage: str = "MCAP") -> Path:
     """Write a bag."""
-    with_compression = Writer(path, version=8, storage_plugin=StoragePlugin[storage])
-    if compress:
-        with_compression.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
-    with with_compression as writer:
+    with Writer(path, version=8, storage_plugin=StoragePlugin[storage]) as writer:
         connections: dict[str, Any] = {}
         for one in sent:
             kind = one.kind or one.value.__msgtype__
@@ -61,6 +56,6 @@ def odometry(index: int, *, frame: str = "map", late: int = 0) -> Sent:
     """A vehicle that climbs at 1 m/s, ten times a second."""
     stamp = index * SECOND // 10
     value = Odometry(np.array([1.0, 2.0, index / 10]), np.array([0.0, 0.0, 1.0]), 0.5)
-    message = MessageBuilder(TYPES.types, EPOCH).odometry(value, stamp, "drone")
+    message = MessageBuilder(EPOCH).odometry(value, stamp, "drone")
     message.header.frame_id = frame
     return Sent("/odom", EPOCH + stamp + late, message)

@@ -63,7 +63,7 @@ def test_an_analysis_says_the_same_of_a_flight_and_of_its_bag(flyer: Flyer) -> N
     run = flyer.fly(application, content, record=flyer.folder / "first")
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
-        bag = write_bag(recording, flyer.folder, "sqlite3")
+        bag = write_bag(recording, flyer.folder)
     topics = BagTopics(
         camera={"cam": "/drone/cam/image/compressed"},
         odometry={"odometry": "/drone/odometry"},

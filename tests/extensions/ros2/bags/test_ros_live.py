@@ -17,7 +17,7 @@ from ros_domain import DOMAIN, wait_for
 
 from aerodaas.cameras.images import decode_depth, decode_image
 from aerodaas.extensions.ros2.bags.live import RosGraph
-from aerodaas.extensions.ros2.topics import messages as ros
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.incoming import (
     battery_of,
     detection_items,
@@ -45,7 +45,7 @@ class Ears:
         self._link = link
         self.heard: dict[str, list[Any]] = defaultdict(list)
 
-    def listen(self, **topics: type) -> None:
+    def listen(self, **topics: str) -> None:
         """Subscribe to topics, named with two underscores for each slash."""
         for name, kind in topics.items():
             topic = "/" + name.replace("__", "/")
@@ -93,10 +93,10 @@ def picture() -> NDArray[np.uint8]:
 def test_a_state_is_odometry_transform_battery_and_fix(graph: RosGraph, ears: Ears) -> None:
     """By the frames and units of ROS 2, with the time of measurement."""
     ears.listen(
-        d_1__odometry=ros.Odometry,
-        d_1__battery=ros.BatteryState,
-        d_1__fix=ros.NavSatFix,
-        tf=ros.TFMessage,
+        d_1__odometry=types.ODOMETRY,
+        d_1__battery=types.BATTERY,
+        d_1__fix=types.NAV_SAT_FIX,
+        tf=types.TRANSFORMS,
     )
     number = iter(range(1000))
 
@@ -126,10 +126,10 @@ def test_a_state_is_odometry_transform_battery_and_fix(graph: RosGraph, ears: Ea
 def test_a_frame_is_a_picture_with_its_lens_and_depth(graph: RosGraph, ears: Ears) -> None:
     """And detections have its stamp."""
     ears.listen(
-        d__eye__image__compressed=ros.CompressedImage,
-        d__eye__aligned_depth=ros.Image,
-        d__eye__camera_info=ros.CameraInfo,
-        d__vest__detections=ros.Detection2DArray,
+        d__eye__image__compressed=types.COMPRESSED_IMAGE,
+        d__eye__aligned_depth=types.IMAGE,
+        d__eye__camera_info=types.CAMERA_INFO,
+        d__vest__detections=types.DETECTIONS,
     )
     depth = np.arange(32 * 48, dtype=np.uint16).reshape(32, 48)
     box = Detection((4.0, 6.0, 20.0, 30.0), "person", 0.75, track_id=7)
@@ -163,7 +163,7 @@ def test_where_a_camera_is_mounted_is_kept(graph: RosGraph) -> None:
     # As ROS 2's own listener of transforms subscribes.
     participant = DomainParticipant(DOMAIN)
     qos = Qos(Policy.Reliability.Reliable(10**8), Policy.Durability.TransientLocal)
-    topic: Any = Topic(participant, "rt/tf_static", ros.TFMessage)
+    topic: Any = Topic(participant, "rt/tf_static", types.dds_type(types.TRANSFORMS))
     reader = DataReader(participant, topic, qos=qos)
     heard: list[Any] = []
 
@@ -176,7 +176,8 @@ def test_where_a_camera_is_mounted_is_kept(graph: RosGraph) -> None:
     assert [one.child_frame_id for one in transforms] == ["d/eye", "d/back"]
     transform = transforms[0].transform
     assert transforms[0].header.frame_id == "d/base_link"
-    assert transform.translation == ros.Vector3(0.1, 0.0, 0.08)
+    place = transform.translation
+    assert (place.x, place.y, place.z) == (0.1, 0.0, 0.08)
     x, y, z, w = (getattr(transform.rotation, axis) for axis in "xyzw")
     # The third column of a quaternion's matrix: where the lens looks.
     looks = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from ros_drone import odometry_message
 
 from aerodaas.extensions.ros2.driver.feed import RosFeed
 from aerodaas.extensions.ros2.driver.frames import Alignment
-from aerodaas.extensions.ros2.topics import messages as ros
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.simulation.dynamics import KinematicState
 
 SECOND = 1_000_000_000
@@ -29,7 +30,7 @@ class Host:
         return self.now
 
 
-def told(x: float = 1.0, stamp: int = SECOND) -> ros.Odometry:
+def told(x: float = 1.0, stamp: int = SECOND) -> Any:  # noqa: ANN401
     """Odometry at `x`."""
     motion = KinematicState((x, 2.0, 3.0), (0.0, 0.0, 0.0), 0.1, 0.2, 0.3, 0.0)
     return odometry_message(motion, stamp)
@@ -93,18 +94,21 @@ def test_what_nobody_could_fly_by_is_refused(
 def test_a_battery_and_a_fix_are_forgotten(feed: RosFeed, host: Host) -> None:
     """After a while without news; a charge that is none is unknown."""
     assert math.isnan(feed.battery.fraction)
-    feed.take_battery(ros.BatteryState(percentage=0.5, voltage=11.0, current=-3.0))
+    battery = types.ros_message(types.BATTERY, percentage=0.5, voltage=11.0, current=-3.0)
+    feed.take_battery(battery)
     assert (feed.battery.fraction, feed.battery.voltage, feed.battery.current) == (0.5, 11.0, 3.0)
-    feed.take_fix(ros.NavSatFix(latitude=48.1, longitude=11.6, altitude=520.0))
+    feed.take_fix(
+        types.ros_message(types.NAV_SAT_FIX, latitude=48.1, longitude=11.6, altitude=520.0)
+    )
     fix = feed.fix
     assert fix is not None
     assert (fix.latitude, fix.longitude, fix.altitude) == (48.1, 11.6, 520.0)
     host.now += 60 * SECOND
     assert math.isnan(feed.battery.fraction)
     assert feed.fix is None
-    feed.take_battery(ros.BatteryState(percentage=math.nan))
+    feed.take_battery(types.ros_message(types.BATTERY, percentage=math.nan))
     assert math.isnan(feed.battery.fraction)
-    feed.take_fix(ros.NavSatFix(latitude=91.0))
+    feed.take_fix(types.ros_message(types.NAV_SAT_FIX, latitude=91.0))
     assert feed.fix is None
     assert "fix refused" in feed.refusal
 

@@ -20,7 +20,7 @@ from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.extensions.ros2.driver.camera import Ros2Camera
 from aerodaas.extensions.ros2.driver.vehicle import Ros2Vehicle
-from aerodaas.extensions.ros2.topics import messages as ros
+from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.link import RosLink
 from aerodaas.messages.vehicle import FlightEnd, PositionSetpoint, VehicleMode
 from aerodaas.simulation.dynamics import KinematicState
@@ -142,21 +142,27 @@ def test_it_hears_what_we_publish(ros_link: RosLink, drone: FastDrone, topics: s
     """Odometry, raw and compressed pictures, figure by figure."""
     motion = KinematicState((1.25, -2.5, 3.75), (0.5, -0.25, 0.125), 0.0, 0.0, 0.0, 0.0)
     raw = bytes(index % 241 for index in range(320 * 240 * 3))
-    header = ros.Header(ros.Time(7, 8), "eye")
-    jpeg = cv2.imencode(".jpg", np.frombuffer(raw, np.uint8).reshape(240, 320, 3))[1].tobytes()
+    header = types.ros_message("std_msgs/msg/Header", frame_id="eye")
+    header.stamp.sec, header.stamp.nanosec = 7, 8
+    pixels = np.frombuffer(raw, np.uint8)
+    jpeg = cv2.imencode(".jpg", pixels.reshape(240, 320, 3))[1].reshape(-1)
+    image = types.ros_message(
+        types.IMAGE, header=header, height=240, width=320, encoding="bgr8", step=960, data=pixels
+    )
+    compressed = types.ros_message(types.COMPRESSED_IMAGE, header=header, format="jpeg", data=jpeg)
     messages = {
         "odometry": odometry_message(motion, 12_000_000_034),
-        "image": ros.Image(header, 240, 320, "bgr8", 0, 960, raw),
-        "image/compressed": ros.CompressedImage(header, "jpeg", jpeg),
+        "image": image,
+        "image/compressed": compressed,
     }
     told = {
         "odometry": "x3/odom x3/base_footprint 12.000000034 1.250000 -2.500000 3.750000 "
         "0.500000 -0.250000 0.125000",
         "image": f"eye 320x240 bgr8 {len(raw)} {sum(raw)}",
-        "compressed": f"eye jpeg {len(jpeg)} {sum(jpeg)}",
+        "compressed": f"eye jpeg {len(jpeg)} {sum(jpeg.tolist())}",
     }
     for name, message in messages.items():
-        publisher = ros_link.publisher(f"{topics}/heard/{name}", type(message))
+        publisher = ros_link.publisher(f"{topics}/heard/{name}", message.__msgtype__)
         wait_for(partial(getattr, publisher, "listeners"))
         publisher.publish(message)
     wait_for(lambda: all(drone.said(kind) for kind in told))

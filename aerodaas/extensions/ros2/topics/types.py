@@ -1,4 +1,4 @@
-"""ROS 2's message types: their definitions, and decoding by them.
+"""ROS 2's message types, for bags and live topics: definitions, making, decoding, types of DDS.
 
 The definitions are those of ROS 2 Humble, which later releases share for all types used here. Those
 in a bag are never used: a stranger's could hold an array of empty parts, which is read forever.
@@ -10,6 +10,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from aerodaas.config.extras import require_extra
 from aerodaas.recording.decoding.limits import MAX_CHUNK, MAX_ROS
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BATTERY",
+    "BOOL",
     "CAMERA_INFO",
     "COMPRESSED_IMAGE",
     "COMPRESSED_VIDEO",
@@ -27,8 +30,12 @@ __all__ = [
     "ODOMETRY",
     "ROS_TYPES",
     "TRANSFORMS",
+    "TWIST",
+    "TWIST_STAMPED",
+    "dds_type",
     "decoder_of",
     "ros_decoder",
+    "ros_message",
     "ros_types",
 ]
 
@@ -41,6 +48,9 @@ NAV_SAT_FIX = "sensor_msgs/msg/NavSatFix"
 BATTERY = "sensor_msgs/msg/BatteryState"
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 DETECTIONS = "vision_msgs/msg/Detection2DArray"
+TWIST = "geometry_msgs/msg/Twist"
+TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"
+BOOL = "std_msgs/msg/Bool"
 ROS_TYPES = frozenset(
     {
         IMAGE,
@@ -115,3 +125,73 @@ def ros_decoder(name: str) -> Callable[[bytes], Any]:
         return store.deserialize_cdr(data, name)
 
     return decode
+
+
+def ros_message(name: str, **fields: Any) -> Any:  # noqa: ANN401
+    """A message of a type; fields that are not given are zero or empty.
+
+    Args:
+        name: ROS 2's name of the type, such as `nav_msgs/msg/Odometry`.
+        fields: Values by the names of fields; arrays of numbers are numpy's.
+
+    Raises:
+        ConfigError: If the extra `ros` is not installed.
+    """
+    store = ros_types()
+    for field, (kind, detail) in _fields(name):
+        if field not in fields:
+            fields[field] = _zero(kind.name, detail)
+    return store.types[name](**fields)
+
+
+def _zero(kind: str, detail: Any) -> Any:  # noqa: ANN401
+    if kind == "NAME":
+        return ros_message(detail)
+    if kind == "BASE":
+        return "" if detail[0] == "string" else np.dtype(detail[0]).type().item()
+    (element, (number, *_)), length = detail
+    return [] if element.name == "NAME" else np.zeros(length, number)
+
+
+@cache
+def dds_type(name: str) -> Any:  # noqa: ANN401
+    """The type of DDS `sensor_msgs::msg::dds_::Image_` of the type `sensor_msgs/msg/Image`.
+
+    Its `message` is one of `ros_message`; encoding and decoding are those of bags.
+    """
+    from cyclonedds.idl import make_idl_struct  # noqa: PLC0415 - an extra
+
+    store = ros_types()
+    fields = {field: _dds_field(kind.name, detail) for field, (kind, detail) in _fields(name)}
+    package, _, own = name.split("/")
+    made: Any = make_idl_struct(own, f"{package}::msg::dds_::{own}_", fields, dataclassify=False)
+
+    def construct(self: Any, message: object) -> None:  # noqa: ANN401
+        self.message = message
+
+    def serialize(self: Any, *_: object, **__: object) -> bytes:  # noqa: ANN401
+        return bytes(store.serialize_cdr(self.message, name))
+
+    def deserialize(data: bytes, *_: object, **__: object) -> object:
+        return store.deserialize_cdr(data, name)
+
+    made.__init__, made.serialize = construct, serialize
+    made.deserialize = staticmethod(deserialize)
+    return made
+
+
+def _fields(name: str) -> Any:  # noqa: ANN401
+    return ros_types().fielddefs[name][1]
+
+
+def _dds_field(kind: str, detail: Any) -> Any:  # noqa: ANN401
+    from cyclonedds.idl import types  # noqa: PLC0415 - an extra
+
+    if kind == "NAME":
+        return dds_type(detail)
+    if kind == "BASE":
+        known = {"string": str, "bool": bool}
+        return known.get(detail[0]) or getattr(types, detail[0])
+    (element, content), length = detail
+    inner = _dds_field(element.name, content)
+    return types.array[inner, length] if kind == "ARRAY" else types.sequence[inner]
