@@ -14,7 +14,7 @@ from aerodaas.errors import ConfigError
 if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["LiveViews", "ProviderOptions", "RunOptions", "Speed", "current_options"]
+__all__ = ["EdgeShare", "LiveViews", "ProviderOptions", "RunOptions", "Speed", "current_options"]
 
 Speed: TypeAlias = "float | Literal['max']"
 """Mission seconds per wall second; `max`: as fast as the machine goes, in simulated time."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay, attach_absent_user
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.config.options import EdgeShare, RunOptions, current_options
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import Graph
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
@@ -110,7 +110,7 @@ class FlightProcess:
                 record=self._folder.recording,
                 address=order.address,
                 locks=None if order.rehearsal else order.locks,
-                edge=None if order.edge is None else EdgeShare(**dict(order.edge)),
+                edge=order.edge,
                 view=False,
                 remote=False,
                 report=None if order.rehearsal or order.attached else "page",

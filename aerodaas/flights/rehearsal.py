@@ -17,7 +17,7 @@ from aerodaas.flights.process import FlightProcess
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
-from aerodaas.service.rehearsal import judge
+from aerodaas.service.rehearsal.findings import judge
 from aerodaas.service.rehearsal.picture import draw
 
 __all__ = ["rehearse"]

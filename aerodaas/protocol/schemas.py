@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, FailFast, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, FailFast, Field, field_validator
 
 from aerodaas.dataflow.mission_document import DocumentWaypoint, MissionDocument
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -87,9 +87,9 @@ class RequestModel(BaseModel):
 
 
 class AnswerModel(BaseModel):
-    """Base of answers."""
+    """Base of answers; a stored row becomes one by its attributes of the same names."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, from_attributes=True)
 
 
 class Role(str, enum.Enum):
@@ -118,6 +118,13 @@ class Scope(str, enum.Enum):
     """Receive cameras' pictures and other sensors' items."""
     COMPUTE = "compute"
     """Run analyses on the provider's edge and cloud."""
+
+
+def _in_order(scopes: list[Scope]) -> list[Scope]:
+    return [scope for scope in Scope if scope in scopes]
+
+
+Scopes: TypeAlias = Annotated[list[Scope], AfterValidator(_in_order)]
 
 
 class SilencePolicy(str, enum.Enum):
@@ -485,12 +492,16 @@ class AccountIn(RequestModel):
     name: Word
     tenant: Word
     role: Role = Role.PILOT
-    scopes: list[Scope] = Field(default_factory=lambda: list(Scope))
+    scopes: Scopes = Field(default_factory=lambda: list(Scope))
 
 
-class AccountOut(AccountIn):
+class AccountOut(AnswerModel):
     """An account."""
 
+    name: Word
+    tenant: Word
+    role: Role
+    scopes: Scopes
     created: float
     disabled: bool = False
 
@@ -509,7 +520,7 @@ class TokenOut(AnswerModel):
 
     id: str
     account: str
-    scopes: list[Scope]
+    scopes: Scopes
     created: float
     expires: float
     revoked: bool = False

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.errors import MissionError
@@ -300,43 +301,33 @@ class ActiveMission:
         return lines[-1][-_LAST_WORDS:] if lines else "its process ended without a word"
 
 
+_LAST = ("status", "places", "alerts")
+"""What is told of a mission's drones in flight and afterwards, as `MissionOut` has it."""
+_IN_FLIGHT = ("told", "streams", "analytics")
+_REQUESTED = ("share", "attach", "grants")
+
+
 def shown(active: ActiveMission) -> MissionOut:
     """A mission with its newest state: of its flight while it goes on, else as it ended."""
-    row = active.row
+    row, state = active.row, None if active.link is None else active.link.mission
     outcome = active.flight.outcome() if active.over else None
-    state = None if active.link is None else active.link.mission
-    newest = outcome or state
-    flying = None if active.over else state
-    verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
-    if verdict is not None:
+    recorded = active.phase is not MissionPhase.FLYING and active.flight.recording.is_file()
+    news: dict[str, Any] = {
+        "reason": without_folders(active.waits_for or row.reason),
+        "recording": recorded,
+        **{name: row.request[name] for name in _REQUESTED if name in row.request},
+    }
+    if (newest := outcome or state) is not None:
+        news |= {name: getattr(newest, name) for name in _LAST}
+    if state is not None and not active.over:
+        news |= {name: getattr(state, name) for name in _IN_FLIGHT}
+    answer = MissionOut.model_validate(row)
+    if (verdict := answer.verdict) is not None:
+        drawn = active.rehearsal.picture.is_file()
+        picture = f"/v1/missions/{row.id}/rehearsal.png" if drawn else verdict.picture
         reasons = [without_folders(reason) for reason in verdict.reasons]
-        verdict = verdict.model_copy(update={"reasons": reasons})
-    if verdict is not None and active.rehearsal.picture.is_file():
-        verdict = verdict.model_copy(update={"picture": f"/v1/missions/{row.id}/rehearsal.png"})
-    return MissionOut(
-        id=row.id,
-        name=row.name,
-        tenant=row.tenant,
-        account=row.account,
-        phase=row.phase,
-        reason=without_folders(active.waits_for or row.reason),
-        robots=list(row.robots),
-        lease=row.lease,
-        share=list(row.request.get("share", ())),
-        attach=active.attached_to,
-        grants=active.grants,
-        submitted=row.submitted,
-        started=row.started,
-        ended=row.ended,
-        verdict=verdict,
-        status={} if newest is None else newest.status,
-        places={} if newest is None else newest.places,
-        told={} if flying is None else flying.told,
-        alerts=[] if newest is None else newest.alerts,
-        streams={} if flying is None else flying.streams,
-        analytics=None if flying is None else flying.analytics,
-        recording=active.phase is not MissionPhase.FLYING and active.flight.recording.is_file(),
-    )
+        news["verdict"] = verdict.model_copy(update={"reasons": reasons, "picture": picture})
+    return answer.model_copy(update=news)
 
 
 def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
@@ -347,15 +338,12 @@ def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
         outcome: Outcome of its flight.
         recording: File of its recording; one that is missing takes no storage.
     """
+    used = Outcome.model_fields.keys() & Usage.__table__.columns.keys()
     return Usage(
         mission=mission.id,
         tenant=mission.tenant,
         account=mission.account,
         started=outcome.began,
-        flight_seconds=outcome.flight_seconds,
-        distance=outcome.distance,
-        battery_used=outcome.battery_used,
-        compute_seconds=outcome.compute_seconds,
-        cloud_calls=outcome.cloud_calls,
         recorded_bytes=recording.stat().st_size if recording.is_file() else 0,
+        **outcome.model_dump(include=used),
     )

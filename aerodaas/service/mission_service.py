@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import itertools
+import json
 import logging
 import secrets
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -38,16 +41,14 @@ from aerodaas.service.fleet.fleet_registry import OUT_OF_SERVICE, FleetRegistry
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder, RobotLocks
 from aerodaas.service.flights.orders import FlightOrder, FlightOrders
-from aerodaas.service.idempotency import fingerprint
 from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError, shown, usage_of
 from aerodaas.service.models.model_store import ModelStore, require_room
 from aerodaas.service.monitor.process import FleetMonitor
-from aerodaas.service.rehearsal.turns import in_turn
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 
-__all__ = ["MissionService"]
+__all__ = ["MissionService", "rehearsal_order"]
 
 _TURN_SECONDS = 0.1
 _REHEARSAL_SHARE = 4.0
@@ -161,7 +162,7 @@ class MissionService:
             folder=str(self._path(name)),
             request=submission.model_dump(mode="json", exclude={"document"}),
             key=key,
-            fingerprint=None if key is None else fingerprint(submission),
+            fingerprint=None if key is None else _fingerprint(submission),
         )
         mission = self._active(row)
         mission.write(submission.document)
@@ -193,7 +194,7 @@ class MissionService:
         row = None if key is None else self._store.missions.of_key(principal.tenant, key)
         if row is None:
             return None
-        if row.fingerprint != fingerprint(submission):
+        if row.fingerprint != _fingerprint(submission):
             raise RefusedError(
                 422,
                 f"another mission was submitted with this Idempotency-Key ({row.id}): send a "
@@ -544,7 +545,7 @@ class MissionService:
             elif active.phase is MissionPhase.REHEARSING:
                 running.append(active.row.tenant)
         free = max(0, self._settings.most_rehearsals - len(running))
-        order = in_turn(waiting, running, self._last_rehearsed)
+        order = rehearsal_order(waiting, running, self._last_rehearsed)
         return {id_: max(0, number - free) for number, id_ in enumerate(order, 1)}
 
     def _judge(self, active: ActiveMission) -> None:
@@ -713,6 +714,15 @@ class MissionService:
             raise RefusedError(403, f"{mission} is {tenant}'s: you may watch it")
 
 
+def _fingerprint(submission: MissionIn) -> str:
+    """SHA-256 of a submission's content, hexadecimal; the order of its keys makes no difference.
+
+    What was left out counts as such: a later version's defaults change no fingerprint.
+    """
+    content = submission.model_dump(mode="json", exclude_unset=True)
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 def _is_user(principal: Principal, mission: MissionOut) -> bool:
     return mission.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
 
@@ -721,3 +731,27 @@ def _may_fly(last: RobotStatus) -> bool:
     """Whether a drone whose mission has ended is not known to stand on the ground."""
     down = last.vehicle is None or last.vehicle.mode is VehicleMode.GROUNDED
     return not down and last.mission.state is not MissionState.LANDED
+
+
+def rehearsal_order(
+    waiting: Iterable[tuple[str, str]], running: Iterable[str], begun: Mapping[str, int]
+) -> list[str]:
+    """Put the missions that wait for a rehearsal into the order in which theirs begin.
+
+    First comes a tenant with the fewest under way, counting those before it in this order; among
+    equals the one whose last one began longest ago, then who has waited longest.
+
+    Args:
+        waiting: Id and tenant of each, in the order of submission.
+        running: Tenant of each that is under way.
+        begun: When each tenant's last one began, as a number that grows.
+
+    Returns:
+        The ids.
+    """
+    counts = Counter(running)
+    keyed = []
+    for number, (id_, tenant) in enumerate(waiting):
+        keyed.append((counts[tenant], begun.get(tenant, 0), number, id_))
+        counts[tenant] += 1
+    return [id_ for *_, id_ in sorted(keyed)]

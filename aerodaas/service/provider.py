@@ -67,9 +67,7 @@ def build_service(
     )
     admission = Admission(access, audit)
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
-    fleet = FleetView(
-        settings.config, shown, settings.actuators, registry, leases, missions, accounts
-    )
+    fleet = FleetView(settings.config, shown, settings.actuators, registry, leases, missions, store)
     players = Players()
 
     def player(principal: Principal, mission: str) -> Player:

@@ -1,6 +1,10 @@
 // Made from wire.schema.json by types.mjs; not to be edited.
 
 /**
+ * Role of an account; each role may do what those before it may.
+ */
+export type Role = "viewer" | "pilot" | "operator" | "admin";
+/**
  * Purpose of a token, within its account's role.
  */
 export type Scope = "fly" | "sense" | "compute";
@@ -103,10 +107,7 @@ export interface AccountOut {
   created: number;
   disabled: boolean;
   name: string;
-  /**
-   * Role of an account; each role may do what those before it may.
-   */
-  role: "viewer" | "pilot" | "operator" | "admin";
+  role: Role;
   scopes: Scope[];
   tenant: string;
 }

@@ -91,7 +91,7 @@ class Service:
 
     def revoke(self, name: str) -> None:
         """Revoke an account's tokens."""
-        for one in self.accounts.tokens(name):
+        for one in self.store.tokens.all(name):
             self.accounts.revoke(one.id)
 
     @contextlib.contextmanager
@@ -323,7 +323,7 @@ def test_who_was_refused_is_not_remembered_while_the_database_is_gone(service: S
     """Not even where the token was never tried after that; others command on."""
     root, ivan = service.token("root"), service.token("ivan")
     assert service.status("GET", "fleet", ivan) == 200
-    (token,) = [one.id for one in service.accounts.tokens("ivan")]
+    (token,) = [one.id for one in service.store.tokens.all("ivan")]
     assert service.status("DELETE", f"tokens/{token}", root) == 200
     olga = service.token("olga")
     assert service.status("GET", "fleet", olga) == 200

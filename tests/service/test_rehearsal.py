@@ -17,7 +17,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.messages.health import Verdict
 from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.service.flights.environment import rehearsal_config
-from aerodaas.service.rehearsal import judge
+from aerodaas.service.rehearsal.findings import judge
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.simulation.airframe import Airframe
 

@@ -7,7 +7,7 @@ from collections import Counter
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.service.rehearsal.turns import in_turn
+from aerodaas.service.mission_service import rehearsal_order
 
 TENANTS = st.lists(st.sampled_from("abcd"), max_size=20)
 
@@ -18,7 +18,7 @@ def test_each_begins_once_and_each_tenants_in_their_order(
 ) -> None:
     """Whoever else waits."""
     waiting = [(f"m{number:02}", tenant) for number, tenant in enumerate(sent)]
-    order = in_turn(waiting, running, {})
+    order = rehearsal_order(waiting, running, {})
     assert sorted(order) == [id_ for id_, _ in waiting]
     for tenant in "abcd":
         own = [id_ for id_, owner in waiting if owner == tenant]
@@ -33,7 +33,7 @@ def test_a_first_one_waits_for_no_tenants_second(sent: list[str]) -> None:
     rounds: Counter[str] = Counter()
     waiting = list(owners.items())
     for moment in range(1, len(sent) + 1):
-        first = in_turn(waiting, [], begun)[0]
+        first = rehearsal_order(waiting, [], begun)[0]
         tenant = owners[first]
         still = {owner for _, owner in waiting}
         assert rounds[tenant] <= min(rounds[owner] for owner in still)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from http import HTTPStatus
 
-from aerodaas.protocol.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
+from aerodaas.protocol.schemas import AccountIn, Role, Scope, TokenIn, TokenOut
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.oidc import Issued, OidcVerifier
 from aerodaas.service.access.principal import Principal
@@ -106,23 +106,17 @@ class Accounts:
             self.add(AccountIn(name=_FIRST, tenant=_FIRST, role=Role.ADMIN))
         return self.issue(TokenIn(account=_FIRST, days=_FIRST_DAYS)).secret
 
-    def add(self, account: AccountIn) -> AccountOut:
+    def add(self, account: AccountIn) -> Account:
         """Make an account, and its tenant without quotas if there is none of this name.
 
         Raises:
             RefusedError: With status 409, if there is one of this name.
         """
-        now = self._clock()
-        row = Account(
-            name=account.name,
-            tenant=account.tenant,
-            role=account.role,
-            scopes=frozenset(account.scopes),
-            created=now,
-        )
+        given = {**dict(account), "scopes": frozenset(account.scopes)}
+        row = Account(**given, created=self._clock())
         with self._lock:
             self._add(row)
-        return _account_out(row)
+        return row
 
     def of_issued(self, issued: Issued) -> Account:
         """The account of a token's subject, with the token's tenant and role.
@@ -166,7 +160,7 @@ class Accounts:
         role: Role | None = None,
         scopes: Collection[Scope] | None = None,
         disabled: bool | None = None,
-    ) -> AccountOut:
+    ) -> Account:
         """Change what is not None; its tokens obey at once.
 
         Args:
@@ -197,17 +191,9 @@ class Accounts:
                     raise RefusedError(409, "no administrator would be left: make another first")
                 return new
 
-            found = _account_out(self._store.accounts.update(name, changed))
+            found = self._store.accounts.update(name, changed)
         self.on_change(name)
         return found
-
-    def get(self, name: str) -> AccountOut:
-        """An account; raises RefusedError with status 404 if there is none."""
-        return _account_out(self._store.accounts.require(name))
-
-    def all(self, tenant: str | None = None) -> list[AccountOut]:
-        """Accounts of a tenant, or all, by name."""
-        return [_account_out(row) for row in self._store.accounts.all(tenant)]
 
     def issue(self, request: TokenIn) -> TokenOut:
         """Make a token; the answer alone has its secret.
@@ -240,17 +226,13 @@ class Accounts:
                     409, f"account {account.name} has {_MOST_TOKENS} tokens: revoke some"
                 )
             self._store.tokens.add(row)
-        return _token_out(row, new.text)
+        return TokenOut.model_validate(row).model_copy(update={"secret": new.text})
 
-    def revoke(self, token: str) -> TokenOut:
+    def revoke(self, token: str) -> Token:
         """Revoke a token by its id; raises RefusedError with status 404 if there is none."""
         row = self._store.tokens.update(token, lambda row: replace(row, revoked=True))
         self.on_change(row.account)
-        return _token_out(row)
-
-    def tokens(self, account: str | None = None) -> list[TokenOut]:
-        """Tokens of an account, or all, oldest first, without their secrets."""
-        return [_token_out(row) for row in self._store.tokens.all(account)]
+        return row
 
 
 def _name_of(issued: Issued) -> str:
@@ -258,33 +240,6 @@ def _name_of(issued: Issued) -> str:
     readable = re.sub(r"[^\w\-]", "-", issued.name)[:_NAME_LETTERS]
     first = "" if readable[:1].isalpha() else "u"
     return f"{first}{readable}-{hashlib.sha256(issued.subject.encode()).hexdigest()[:16]}"
-
-
-def _account_out(row: Account) -> AccountOut:
-    return AccountOut(
-        name=row.name,
-        tenant=row.tenant,
-        role=row.role,
-        scopes=_in_order(row.scopes),
-        created=row.created,
-        disabled=row.disabled,
-    )
-
-
-def _token_out(row: Token, secret: str | None = None) -> TokenOut:
-    return TokenOut(
-        id=row.id,
-        account=row.account,
-        scopes=_in_order(row.scopes),
-        created=row.created,
-        expires=row.expires,
-        revoked=row.revoked,
-        secret=secret,
-    )
-
-
-def _in_order(scopes: Collection[Scope]) -> list[Scope]:
-    return [scope for scope in Scope if scope in scopes]
 
 
 _NO_SECRET = "0" * 64

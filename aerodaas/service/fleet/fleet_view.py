@@ -11,12 +11,11 @@ from aerodaas.config.sections.actuators import permitted
 from aerodaas.messages.health import HealthReport
 from aerodaas.protocol.scenery import SceneryOut
 from aerodaas.protocol.schemas import AccountOut, FleetOut, LinkState, RobotOut, VehicleReport
-from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal, sees
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
 from aerodaas.service.leases.lease_service import LeaseService
 from aerodaas.service.mission_service import MissionService
-from aerodaas.service.store import RobotState
+from aerodaas.service.store import RobotState, Store
 
 __all__ = ["FleetView"]
 
@@ -32,10 +31,10 @@ class FleetView:
         registry: FleetRegistry,
         leases: LeaseService,
         missions: MissionService,
-        accounts: Accounts,
+        store: Store,
     ) -> None:
         """Show `catalogue`, and the drones of `config`; to a tenant its `actuators`."""
-        self._accounts = accounts
+        self._store = store
         self._actuators = actuators
         self._config = config
         self._catalogue = catalogue
@@ -45,7 +44,7 @@ class FleetView:
 
     def account(self, principal: Principal) -> AccountOut:
         """The account that asks."""
-        return self._accounts.get(principal.account)
+        return AccountOut.model_validate(self._store.accounts.require(principal.account))
 
     def preflight(self, robot: str) -> HealthReport:
         """A robot's health before take-off; raises RefusedError for an unknown robot."""

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.clock import WallOffset
 from aerodaas.config.checked import checked
+from aerodaas.config.options import EdgeShare
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.messages.actions import MoveActuator
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from aerodaas.service.store import Lease, Mission, Store
 
 __all__ = [
-    "EdgeTurnsOrder",
     "FlightOrder",
     "FlightOrders",
     "HostFlight",
@@ -78,15 +78,6 @@ class HostFlight(_Record):
     """Cameras that are shared, by full id."""
 
 
-class EdgeTurnsOrder(_Record):
-    """The tenant's share of the edge."""
-
-    turns: Path
-    """Socket of the service that gives turns."""
-    tenant: str
-    weight: float
-
-
 class FlightOrder(_Record):
     """All that a flight's process needs to know; the document lies beside it."""
 
@@ -117,7 +108,7 @@ class FlightOrder(_Record):
     seed: int | None = None
     address: str | None = None
     """Ray cluster to join; None for one of its own."""
-    edge: EdgeTurnsOrder | None = None
+    edge: EdgeShare | None = None
     """None where flights use the edge as they like."""
     attached: HostFlight | None = None
     """For a mission that senses only, which has no robots."""
@@ -339,12 +330,12 @@ class FlightOrders:
             edge=self._edge(mission.tenant),
         )
 
-    def _edge(self, tenant: str) -> EdgeTurnsOrder | None:
+    def _edge(self, tenant: str) -> EdgeShare | None:
         settings = self._settings
         if settings.edge_slots is None:
             return None
         weight = self._store.tenants.require(tenant).weight
-        return EdgeTurnsOrder(turns=settings.edge_turns, tenant=tenant, weight=weight)
+        return EdgeShare(turns=settings.edge_turns, tenant=tenant, weight=weight)
 
 
 def robots_of(document: MissionDocument) -> list[str]:

@@ -22,8 +22,8 @@ from aerodaas.service.flights.server import LeasedFlight, LeaseWatch
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
-from aerodaas.service.live.jobs import end_jobs
 from aerodaas.service.live.packed_reader import PackedReader
+from aerodaas.service.live.session import end_jobs
 from aerodaas.service.own.access import OWN
 
 __all__ = ["FlightRoutes"]

@@ -13,33 +13,11 @@ from aerodaas.protocol.schemas import LeaseIn, LeaseOut, LeaseState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.store import Lease, LeaseEnd
 
-__all__ = [
-    "MINUTE",
-    "Candidate",
-    "Fleet",
-    "LeaseBook",
-    "LeaseTable",
-    "check_wish",
-    "distance",
-    "expired",
-    "grants",
-    "is_waited_for",
-    "lease_of",
-    "lease_out",
-    "waited_for",
-]
+__all__ = ["Candidate", "Fleet", "LeaseBook", "LeaseTable", "lease_out"]
 
 
-def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
-    """Refuse what this fleet cannot fulfil however long one waits.
-
-    Args:
-        wish: What is asked for.
-        fleet: Drones of the provider, by id.
-
-    Raises:
-        RefusedError: With status 404, 409 or 422; see `LeaseBook.request`.
-    """
+def _check_wish(wish: LeaseIn, fleet: Fleet) -> None:
+    """Raise RefusedError for what this fleet cannot fulfil however long one waits."""
     names = wish.robots or []
     if len(set(names)) < len(names):
         raise RefusedError(422, "a lease names each robot once")
@@ -54,50 +32,10 @@ def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
         raise RefusedError(409, "no drone of the fleet could ever fit")
 
 
-def lease_of(
-    wish: LeaseIn, *, id_: str, number: int, tenant: str, account: str, now: float
-) -> Lease:
-    """A wish as a queued lease.
-
-    Args:
-        wish: What is asked for.
-        id_: Id of the lease.
-        number: Number by which leases are ordered.
-        tenant: Tenant that asks.
-        account: Account that asks.
-        now: When it is asked, Unix time, seconds.
-    """
-    return Lease(
-        id=id_,
-        number=number,
-        tenant=tenant,
-        account=account,
-        minutes=wish.minutes,
-        asked=now,
-        wanted=tuple(wish.robots or ()),
-        camera=wish.camera,
-        within=wish.within,
-        near=wish.near,
-        battery_minutes=wish.battery_minutes,
-        area=None if wish.area is None else tuple(wish.area),
-    )
-
-
 def lease_out(lease: Lease) -> LeaseOut:
     """A lease as the HTTP interface shows it."""
-    return LeaseOut(
-        id=lease.id,
-        tenant=lease.tenant,
-        account=lease.account,
-        robots=list(lease.robots or lease.wanted),
-        state=lease.state,
-        reason=lease.reason,
-        minutes=lease.minutes,
-        asked=lease.asked,
-        granted=lease.granted,
-        ends=lease.ends,
-        area=None if lease.area is None else list(lease.area),
-    )
+    named = list(lease.robots or lease.wanted)
+    return LeaseOut.model_validate(lease).model_copy(update={"robots": named})
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,31 +59,16 @@ Fleet: TypeAlias = Mapping[str, Candidate]
 """The whole fleet, by id."""
 
 
-def waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
-    """Robots that a queued lease could use now, were they all free.
-
-    All of those that it names, if each can be flown; or each one that fits.
-
-    Args:
-        lease: The queued lease.
-        fleet: Drones of the provider, by id.
-
-    Returns:
-        All of those that it names, if each can be flown; or each one that fits.
-    """
+def _waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
+    """Robots that a queued lease could use now, were they all free: all that it names, or any."""
     if not lease.wanted:
         return frozenset(id_ for id_, robot in fleet.items() if _fits(lease, robot))
     ready = all(id_ in fleet and not fleet[id_].objection for id_ in lease.wanted)
     return frozenset(lease.wanted) if ready else frozenset()
 
 
-def distance(lease: Lease, robot: Candidate) -> float:
-    """Metres from where a lease wants any drone; infinity if it is not known where this one is.
-
-    Args:
-        lease: The lease, with the place that it wants a drone near to.
-        robot: The drone.
-    """
+def _distance(lease: Lease, robot: Candidate) -> float:
+    """Metres from where a lease wants any drone; infinity for a drone of unknown position."""
     return math.inf if robot.position is None else math.dist(robot.position, lease.near)
 
 
@@ -153,22 +76,17 @@ def _fits(lease: Lease, robot: Candidate) -> bool:
     return (
         not robot.objection
         and (robot.camera or not lease.camera)
-        and (lease.within is None or distance(lease, robot) <= lease.within)
+        and (lease.within is None or _distance(lease, robot) <= lease.within)
         and (lease.battery_minutes or 0.0) <= (robot.battery_minutes or 0.0)
     )
 
 
-MINUTE = 60.0
+_MINUTE = 60.0
 """Seconds."""
 
 
-def expired(live: Iterable[Lease], now: float) -> list[Lease]:
-    """Leases whose time is over, as ended.
-
-    Args:
-        live: Leases that have not ended.
-        now: Unix time, seconds.
-    """
+def _expired(live: Iterable[Lease], now: float) -> list[Lease]:
+    """Leases whose time is over, as ended."""
     return [
         replace(
             lease,
@@ -182,16 +100,11 @@ def expired(live: Iterable[Lease], now: float) -> list[Lease]:
     ]
 
 
-def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
+def _grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
     """Leases of the queue that can have their drones now, as granted.
 
     Each lease that must wait keeps the robots it waits for from all later ones: of several robots,
     those that are free stay so for it, or it might never find them free together.
-
-    Args:
-        live: Leases queued, or granted and not over, in the queue's order.
-        now: Moment, seconds of Unix time.
-        fleet: The drones as they are now.
     """
     taken = {robot for lease in live for robot in lease.robots}
     taken |= {id_ for id_, robot in fleet.items() if robot.busy}
@@ -199,13 +112,13 @@ def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
     for lease in live:
         if lease.state is not LeaseState.QUEUED:
             continue
-        robots = waited_for(lease, fleet)
+        robots = _waited_for(lease, fleet)
         free = robots - taken
         if not free or (lease.wanted and free != robots):
             taken |= robots
             continue
         # The nearest of any; the order by name makes it the same one each time.
-        nearest = min(sorted(free), key=lambda id_: distance(lease, fleet[id_]))
+        nearest = min(sorted(free), key=lambda id_: _distance(lease, fleet[id_]))
         chosen = lease.wanted or (nearest,)
         taken.update(chosen)
         granted.append(
@@ -214,22 +127,16 @@ def grants(live: Collection[Lease], now: float, fleet: Fleet) -> list[Lease]:
                 state=LeaseState.GRANTED,
                 robots=chosen,
                 granted=now,
-                ends=now + lease.minutes * MINUTE,
+                ends=now + lease.minutes * _MINUTE,
             )
         )
     return granted
 
 
-def is_waited_for(held: Lease, live: Iterable[Lease], fleet: Fleet) -> bool:
-    """Whether a queued lease waits for a robot that `held` holds.
-
-    Args:
-        held: The lease that holds robots.
-        live: Leases that have not ended.
-        fleet: Drones of the provider, by id.
-    """
+def _is_waited_for(held: Lease, live: Iterable[Lease], fleet: Fleet) -> bool:
+    """Whether a queued lease waits for a robot that `held` holds."""
     return any(
-        lease.state is LeaseState.QUEUED and not waited_for(lease, fleet).isdisjoint(held.robots)
+        lease.state is LeaseState.QUEUED and not _waited_for(lease, fleet).isdisjoint(held.robots)
         for lease in live
     )
 
@@ -314,7 +221,7 @@ class LeaseBook:
                 named twice; 429 if the tenant, or all of them, wait for too many.
             StoreError: If the database does not take it; nothing is asked for then.
         """
-        check_wish(wish, fleet)
+        _check_wish(wish, fleet)
         with self._lock:
             self._settle(now, fleet)
             waiting = [
@@ -324,13 +231,15 @@ class LeaseBook:
                 raise RefusedError(429, "too many leases wait: give some back")
             # A number is used once, even by what the database may or may not have taken.
             self._number += 1
-            lease = lease_of(
-                wish,
-                id_=self._new_id(),
+            lease = Lease(
+                id=self._new_id(),
                 number=self._number,
                 tenant=tenant,
                 account=account,
-                now=now,
+                asked=now,
+                wanted=tuple(wish.robots or ()),
+                area=None if wish.area is None else tuple(wish.area),
+                **wish.model_dump(exclude={"robots", "area"}),
             )
             self._write(now, fleet, lease)
             return self._live[lease.id], self._take_changes()
@@ -363,14 +272,14 @@ class LeaseBook:
                 raise RefusedError(409, f"lease {id_} is queued: extend it when it is granted")
             if not 0 < minutes <= _LONGEST - lease.minutes:
                 raise RefusedError(422, "a lease lasts a day at most, with its extensions")
-            if is_waited_for(lease, self._live.values(), fleet):
+            if _is_waited_for(lease, self._live.values(), fleet):
                 raise RefusedError(409, f"another waits for a robot of lease {id_}")
             if minutes * len(lease.robots) > allowed:
                 raise RefusedError(
                     403, f"the quota of {lease.tenant} leaves {max(0.0, allowed):.1f} minutes"
                 )
             longer = replace(
-                lease, minutes=lease.minutes + minutes, ends=lease.ends + minutes * MINUTE
+                lease, minutes=lease.minutes + minutes, ends=lease.ends + minutes * _MINUTE
             )
             self._write(now, fleet, longer)
             return longer, self._take_changes()
@@ -458,7 +367,7 @@ class LeaseBook:
             if lease.tenant == tenant:
                 left = lease.minutes
                 if lease.ends is not None:
-                    left = max(0.0, lease.ends - now) / MINUTE
+                    left = max(0.0, lease.ends - now) / _MINUTE
                 total += left * len(lease.robots or lease.wanted or ("any",))
         return total
 
@@ -471,7 +380,7 @@ class LeaseBook:
         self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
     ) -> tuple[Lease, ...]:
         with self._lock:
-            self._drop(expired(self._live.values(), now))
+            self._drop(_expired(self._live.values(), now))
             lease = self._required(id_)
             self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
             self._settle(now, fleet)
@@ -485,7 +394,7 @@ class LeaseBook:
 
     def _settle(self, now: float, fleet: Fleet) -> None:
         """End what is over and grant what is free; while the database fails, nothing is granted."""
-        self._drop(expired(self._live.values(), now))
+        self._drop(_expired(self._live.values(), now))
         try:
             self._write(now, fleet)
         except StoreError:
@@ -500,7 +409,7 @@ class LeaseBook:
     def _write(self, now: float, fleet: Fleet, *changed: Lease) -> None:
         """Take over `changed` and what can be granted with it, if the database does."""
         live = self._live | {lease.id: lease for lease in changed}
-        granted = grants(live.values(), now, fleet)
+        granted = _grants(live.values(), now, fleet)
         live |= {lease.id: lease for lease in granted}
         rows = self._unsaved | {lease.id: live[lease.id] for lease in (*changed, *granted)}
         if rows:

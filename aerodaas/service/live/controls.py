@@ -21,7 +21,7 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.mission.commands import Answer, ReleaseControls, Steer, TakeControls
 from aerodaas.protocol.piloting import ControlsOut, SteerIn
 from aerodaas.service.http.gate import SUBPROTOCOL
-from aerodaas.service.live.jobs import end_jobs
+from aerodaas.service.live.session import end_jobs
 
 __all__ = ["ControlCommand", "ControlSession", "Freshness"]
 

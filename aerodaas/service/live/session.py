@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import Callable, Sequence
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 from fastapi import Query, WebSocket, WebSocketDisconnect
 
@@ -15,7 +16,6 @@ from aerodaas.service.backend import Missions
 from aerodaas.service.http.gate import SUBPROTOCOL
 from aerodaas.service.http.limits import RequestLimits
 from aerodaas.service.live.hub import StreamHub, Watcher
-from aerodaas.service.live.jobs import end_jobs
 
 __all__ = [
     "Form",
@@ -23,10 +23,12 @@ __all__ = [
     "Rate",
     "StreamNames",
     "StreamRequest",
+    "end_jobs",
     "until_refused",
     "wanted_streams",
 ]
 
+_log = logging.getLogger(__name__)
 StreamRequest: TypeAlias = tuple[str, PictureForm]
 """A stream, and how its pictures are sent."""
 
@@ -62,6 +64,27 @@ async def until_refused(allowed: Callable[[], bool]) -> None:
     """Return when the one behind a connection may not have it any more; asked in another thread."""
     while await asyncio.to_thread(allowed):  # noqa: ASYNC110 - a token's end has no event
         await asyncio.sleep(_RENEWAL_SECONDS)
+
+
+async def end_jobs(
+    what: str, sending: Sequence[asyncio.Task[Any]], reading: Sequence[asyncio.Task[Any]] = ()
+) -> None:
+    """Cancel the jobs of a connection, and wait for their end.
+
+    Args:
+        what: The connection, for the log.
+        sending: Jobs that fail by mistakes of ours alone, which are logged; but for what is raised
+            when the other side has gone.
+        reading: Jobs that fail by what the other side sends, which is its own business.
+    """
+    for job in (*sending, *reading):
+        job.cancel()
+    await asyncio.gather(*reading, return_exceptions=True)
+    for found in await asyncio.gather(*sending, return_exceptions=True):
+        # A server raises RuntimeError for what is sent on a connection that has ended.
+        gone = isinstance(found, WebSocketDisconnect | RuntimeError)
+        if isinstance(found, Exception) and not gone:
+            _log.error("%s has failed", what, exc_info=found)
 
 
 class LiveSession:

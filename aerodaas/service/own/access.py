@@ -45,7 +45,7 @@ def account_of(principal: Principal) -> AccountOut:
         name=principal.account,
         tenant=OWN,
         role=principal.role,
-        scopes=sorted(principal.scopes, key=list(Scope).index),
+        scopes=list(principal.scopes),
         created=0.0,
     )
 

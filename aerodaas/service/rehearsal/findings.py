@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import shapely
@@ -16,9 +15,9 @@ from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
-from aerodaas.service.flights.environment import Outline
+from aerodaas.service.flights.orders import OtherLease
 
-__all__ = ["Finding", "OtherArea", "findings_of", "judge"]
+__all__ = ["Finding", "findings_of", "judge"]
 
 _GROUND = ("", "idle", "preflight", "landed", "aborted")
 _BOUNDARIES = {
@@ -51,20 +50,6 @@ _FAILURES = frozenset(
 finding of their own."""
 
 
-class OtherArea(Protocol):
-    """Area of another granted lease."""
-
-    @property
-    def id(self) -> str:
-        """Id of the lease."""
-        ...
-
-    @property
-    def area(self) -> Outline:
-        """Corners of the area."""
-        ...
-
-
 @dataclass(frozen=True)
 class Finding:
     """A reason to refuse a flight."""
@@ -80,7 +65,7 @@ def findings_of(
     config: EnvironmentConfig,
     *,
     minutes: float,
-    others: Sequence[OtherArea] = (),
+    others: Sequence[OtherLease] = (),
 ) -> list[Finding]:
     """All reasons to refuse a flight; empty if there is none.
 
@@ -119,7 +104,7 @@ class _RobotFindings:
         self._path: NDArray[np.float64] = flight.position[~np.isin(states, _GROUND), :2]
         """Positions in the air, shape (N, 2)."""
 
-    def all(self, others: Iterable[OtherArea]) -> Iterator[Finding]:
+    def all(self, others: Iterable[OtherLease]) -> Iterator[Finding]:
         yield from self._landing()
         yield from self._fence()
         yield from self._waypoints()
@@ -190,7 +175,7 @@ class _RobotFindings:
                 self._last(),
             )
 
-    def _separation(self, other: OtherArea) -> Iterator[Finding]:
+    def _separation(self, other: OtherLease) -> Iterator[Finding]:
         if not len(self._path):
             return
         away = shapely.distance(shapely.Polygon(other.area), shapely.points(self._path))
@@ -237,7 +222,7 @@ def judge(
     config: EnvironmentConfig,
     *,
     minutes: float,
-    others: Sequence[OtherArea] = (),
+    others: Sequence[OtherLease] = (),
 ) -> VerdictOut:
     """The verdict of a rehearsed flight.
 

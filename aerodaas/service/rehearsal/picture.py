@@ -19,7 +19,8 @@ from aerodaas.recording.report.page.figures import png_of
 from aerodaas.recording.report.plots.style import mark
 from aerodaas.recording.report.plots.trajectory import trajectory_figure
 from aerodaas.service.flights.environment import Outline
-from aerodaas.service.rehearsal.findings import Finding, OtherArea, findings_of
+from aerodaas.service.flights.orders import OtherLease
+from aerodaas.service.rehearsal.findings import Finding, findings_of
 
 __all__ = ["draw"]
 
@@ -32,7 +33,7 @@ def draw(
     config: EnvironmentConfig,
     *,
     minutes: float,
-    others: Sequence[OtherArea] = (),
+    others: Sequence[OtherLease] = (),
 ) -> None:
     """Write a PNG of a rehearsed flight.
 
@@ -66,7 +67,7 @@ def _overlay(
     axes: Axes,
     *,
     findings: Sequence[Finding],
-    others: Sequence[OtherArea],
+    others: Sequence[OtherLease],
     no_fly: Sequence[Outline],
 ) -> list[Artist]:
     entries: list[Artist] = []

@@ -25,7 +25,7 @@ from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.quotas import usage_csv
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.store import AuditEntry, Store, Tenant
+from aerodaas.service.store import Account, AuditEntry, Store, Tenant, Token
 
 __all__ = ["AccountRoutes"]
 
@@ -57,16 +57,19 @@ class AccountRoutes:
     def router(self) -> APIRouter:
         """The routes."""
         router = api_router("/v1", "accounts")
-        router.add_api_route("/accounts", self.accounts)
-        router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
-        router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])
+        one: dict[str, Any] = {"response_model": AccountOut}
+        router.add_api_route("/accounts", self.accounts, response_model=list[AccountOut])
+        router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201, **one)
+        router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"], **one)
         router.add_api_route("/tenants", self.tenants, response_model=list[TenantOut])
         router.add_api_route(
             "/tenants/{name}", self.change_tenant, methods=["PATCH"], response_model=TenantOut
         )
-        router.add_api_route("/tokens", self.tokens)
+        router.add_api_route("/tokens", self.tokens, response_model=list[TokenOut])
         router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
-        router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
+        router.add_api_route(
+            "/tokens/{token}", self.revoke, methods=["DELETE"], response_model=TokenOut
+        )
         router.add_api_route("/audit", self.audit, response_model=list[AuditOut])
         table: dict[int | str, dict[str, Any]] = {
             200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
@@ -74,12 +77,12 @@ class AccountRoutes:
         router.add_api_route("/usage", self.usage, response_model=list[UsageOut], responses=table)
         return router
 
-    def accounts(self, request: Request) -> list[AccountOut]:
+    def accounts(self, request: Request) -> list[Account]:
         """All accounts."""
         self._admission.require(request, Role.ADMIN)
-        return self._accounts.all()
+        return self._store.accounts.all()
 
-    def add(self, account: AccountIn, request: Request) -> AccountOut:
+    def add(self, account: AccountIn, request: Request) -> Account:
         """Make an account, and its tenant if it is a new one."""
         principal = self._admission.require(request, Role.ADMIN)
         made = self._accounts.add(account)
@@ -87,7 +90,7 @@ class AccountRoutes:
         self._audit.write(principal, "account.add", account.name, role, accepted=True)
         return made
 
-    def change(self, name: str, body: AccountChange, request: Request) -> AccountOut:
+    def change(self, name: str, body: AccountChange, request: Request) -> Account:
         """Change an account's role or scopes, or disable it; its tokens obey at once."""
         principal = self._admission.require(request, Role.ADMIN)
         found = self._accounts.change(
@@ -113,11 +116,11 @@ class AccountRoutes:
         self._audit.write(principal, "tenant.change", name, text, accepted=True)
         return found
 
-    def tokens(self, request: Request) -> list[TokenOut]:
+    def tokens(self, request: Request) -> list[Token]:
         """One's own tokens; all of them for an administrator. Secrets are not among it."""
         principal = self._admission.require(request, Role.VIEWER)
         every = principal.role.reaches(Role.ADMIN)
-        return self._accounts.tokens(None if every else principal.account)
+        return self._store.tokens.all(None if every else principal.account)
 
     def issue(self, body: TokenIn, request: Request) -> TokenOut:
         """Make a token; this answer alone has its secret."""
@@ -126,7 +129,7 @@ class AccountRoutes:
         self._audit.write(principal, "token.issue", made.id, body.account, accepted=True)
         return made
 
-    def revoke(self, token: str, request: Request) -> TokenOut:
+    def revoke(self, token: str, request: Request) -> Token:
         """Revoke a token."""
         principal = self._admission.require(request, Role.ADMIN)
         found = self._accounts.revoke(token)

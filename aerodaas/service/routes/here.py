@@ -16,8 +16,7 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import flight_address
 from aerodaas.service.http.gate import Admission
 from aerodaas.service.http.refusals import refuse
-from aerodaas.service.live.jobs import end_jobs
-from aerodaas.service.live.session import until_refused
+from aerodaas.service.live.session import end_jobs, until_refused
 from aerodaas.service.mission_service import MissionService
 
 __all__ = ["HereRoutes"]

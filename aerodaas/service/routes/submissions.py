@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
@@ -9,12 +10,16 @@ from fastapi.responses import FileResponse
 
 from aerodaas.protocol.schemas import GrantIn, MissionIn, MissionOut, Role, Scope, Word
 from aerodaas.service.access.audit import Audit
+from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.idempotency import read_key
 from aerodaas.service.mission_service import MissionService
 
 __all__ = ["SubmissionRoutes"]
+
+_STRING = re.compile(r'"((?:[\x20-\x21\x23-\x5b\x5d-\x7e]|\\["\\]){1,255})"')
+"""A string of HTTP's structured fields (RFC 8941), neither empty nor long: an idempotency key, as
+in the IETF's draft of that header field (draft-ietf-httpapi-idempotency-key-header)."""
 
 
 class SubmissionRoutes:
@@ -57,7 +62,7 @@ class SubmissionRoutes:
         scope = Scope.FLY if wanted.attach is None else Scope.SENSE
         principal = self._admission.require(request, Role.PILOT, scope)
         with self._admission.auditing(principal, request):
-            found = self._missions.submit(principal, wanted, read_key(idempotency_key))
+            found = self._missions.submit(principal, wanted, _key(idempotency_key))
         self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
         return found
 
@@ -116,3 +121,17 @@ class SubmissionRoutes:
         return FileResponse(
             self._missions.file(principal, mission, "picture"), media_type="image/png"
         )
+
+
+def _key(header: str | None) -> str | None:
+    """The key in a request's header field; raises RefusedError for a malformed one."""
+    if header is None:
+        return None
+    found = _STRING.fullmatch(header.strip(" "))
+    if found is None:
+        raise RefusedError(
+            400,
+            "Idempotency-Key is one string of 1 to 255 characters in quotation marks, such as "
+            '"8e03978e-40d5-43dd-bc93-6894a57f9324"',
+        )
+    return re.sub(r"\\(.)", r"\1", found[1])
