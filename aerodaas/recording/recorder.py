@@ -34,7 +34,7 @@ from aerodaas.recording.converters.plan import fence_entries
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.messages import FORMAT, Drops, Latency, json_entry
-from aerodaas.recording.output import Output, RecordingSummary, keep_chunk_indexes_on_disk
+from aerodaas.recording.output import Output, RecordingSummary
 from aerodaas.recording.provenance import Provenance
 
 __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
@@ -91,7 +91,6 @@ class FlightRecorder:
         self._live = live
         self._output = Output(self.path)
         self._writer = Writer(self._output, chunk_size=_CHUNK)  # type: ignore[arg-type]
-        keep_chunk_indexes_on_disk(self._writer, self.path.parent)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._counts: Counter[str] = Counter()
