@@ -22,7 +22,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -31,7 +31,7 @@ from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal, Task
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 
-__all__ = ["SIX", "Segments", "TaskArrival", "Workload", "load_workload"]
+__all__ = ["SIX", "Segment", "TaskArrival", "Workload", "load_workload"]
 
 SIX: tuple[str, ...] = ("2D-P", "3D-P", "4D-P", "2D-A", "3D-A", "4D-A")
 """The published workloads: drones on one edge, with four (P) or six (A) models."""
@@ -55,26 +55,13 @@ class TaskArrival:
     """As in `Task`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Segments:
-    """Segments of video that a trace counts: so many from `at` on, at times drawn from the seed.
-
-    Those of a `length` of 0 come at `at`.
-    """
+class Segment(NamedTuple):
+    """A segment of video that a trace tells of."""
 
     at: int
     """Nanoseconds from the start."""
-    length: int = 0
-    """Nanoseconds over which they come."""
-    count: int = 1
     source: str = ""
     edge: int = 0
-
-    def times(self, draw: random.Random) -> list[int]:
-        """When each comes."""
-        if not self.length:
-            return [self.at] * self.count
-        return [self.at + draw.randrange(self.length) for _ in range(self.count)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +80,7 @@ class Workload:
     duration: int = 300 * NANOSECONDS
     period: int = NANOSECONDS
     arrivals: tuple[TaskArrival, ...] = field(default=())
-    segments: tuple[Segments, ...] = field(default=())
+    segments: tuple[Segment, ...] = field(default=())
 
     def __post_init__(self) -> None:
         """Refuse a workload of nothing."""
@@ -164,7 +151,7 @@ class Workload:
                 )
                 for number, a in enumerate(self.arrivals_at(edge))
             ]
-        segments = self._traced(edge, draw) if self.segments else self._flown(edge, draw)
+        segments = self._traced(edge) if self.segments else self._flown(edge, draw)
         profiles = list(self.models.values())
         tasks: list[Task] = []
         for at, name, segment in segments:
@@ -187,17 +174,14 @@ class Workload:
             for start in range(phase, self.duration, self.period)
         )
 
-    def _traced(self, edge: int, draw: random.Random) -> list[tuple[int, str, int]]:
-        """Arrivals of a trace."""
-        times = sorted(
-            (at, one.source)
-            for one in self.segments
-            if one.edge == edge
-            for at in one.times(draw)
-            if at < self.duration
-        )
+    def _traced(self, edge: int) -> list[tuple[int, str, int]]:
+        """Segments of a trace; in order."""
         numbers = defaultdict[str, Iterator[int]](count)
-        return [(at, source, next(numbers[source])) for at, source in times]
+        return [
+            (at, source, next(numbers[source]))
+            for at, source, where in sorted(self.segments)
+            if where == edge and at < self.duration
+        ]
 
     def arrivals_at(self, edge: int) -> list[TaskArrival]:
         """The listed tasks of one edge, in the order in which `tasks` numbers them."""

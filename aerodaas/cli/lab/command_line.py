@@ -101,8 +101,8 @@ def run(
         str,
         typer.Option(
             help="`steady`, `trapezium[:MS]` (latency rises and falls), `outage[:30-45,80-81]` "
-            "(seconds), `trace:FILE` (measured bandwidth: Mahimahi, Pensieve, Ghent's and Cork's "
-            "logs, or a CSV of seconds, Mbit/s); joined by `+`.",
+            "(seconds), `trace:FILE` (measured bandwidth: Mahimahi, Pensieve, or a CSV of seconds, "
+            "Mbit/s); joined by `+`.",
         ),
     ] = "steady",
     times: Annotated[
