@@ -8,7 +8,7 @@ EXTENSION = Extension(
     lab=(
         Command(
             "leaderboard",
-            "aerodaas.extensions.leaderboard.command_line:leaderboard",
+            "aerodaas.extensions.leaderboard.command:leaderboard",
             "Rank all schedulers, and yours, on one fixed set of workloads, networks and seeds.",
         ),
     ),

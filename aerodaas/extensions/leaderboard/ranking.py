@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
@@ -160,17 +159,6 @@ class Leaderboard:
             }.items()
         ]
 
-    def as_json(self) -> dict[str, Any]:
-        """Everything, for a file; p is null for the leader."""
-        return {
-            "set": SET,
-            **asdict(self.extent),
-            "cases": [asdict(case) for case in CASES],
-            "standings": [
-                {**asdict(one), "p": None if math.isnan(one.p) else one.p} for one in self.standings
-            ],
-        }
-
 
 def run_leaderboard(
     schedulers: Sequence[Wanted],
@@ -195,9 +183,14 @@ def run_leaderboard(
     """
     if extent.seeds < 2:  # noqa: PLR2004 - one seed tells nothing
         raise SchedulerError("a leaderboard needs at least two seeds")
-    total = len(CASES) * extent.seeds
+    before = 0
+
+    def advance(done: int, _: int) -> None:
+        if progress is not None:
+            progress(before + done, len(CASES) * extent.seeds)
+
     results: dict[str, LabResult] = {}
-    for number, case in enumerate(CASES):
+    for case in CASES:
         load = Workload.named(case.workload, extent.seconds * NANOSECONDS)
         results[case.name] = run_lab(
             load,
@@ -208,16 +201,10 @@ def run_leaderboard(
             resources=Resources(cloud_slots=case.cloud_slots),
             jobs=jobs,
             spread=spread,
-            progress=partial(_told, progress, number * extent.seeds, total),
+            progress=advance,
         )
+        before += extent.seeds
     return Leaderboard(extent, _standings([scheduler_label(one) for one in schedulers], results))
-
-
-def _told(
-    progress: Callable[[int, int], None] | None, before: int, total: int, done: int, _: int
-) -> None:
-    if progress is not None:
-        progress(before + done, total)
 
 
 def _standings(names: Sequence[str], results: dict[str, LabResult]) -> tuple[Rank, ...]:

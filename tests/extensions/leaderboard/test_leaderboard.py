@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -12,18 +11,14 @@ from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import AeroDaaSError, ConfigError, SchedulerError
-from aerodaas.extensions.leaderboard.command import leaderboard
-from aerodaas.extensions.leaderboard.markdown import markdown_page
-from aerodaas.extensions.leaderboard.origin import Origin
-from aerodaas.extensions.leaderboard.page import html_page
+from aerodaas.errors import AeroDaaSError, SchedulerError
+from aerodaas.extensions.leaderboard.command import html_page, rank
 from aerodaas.extensions.leaderboard.ranking import CASES, Extent, Leaderboard, run_leaderboard
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Decision, Drop, Resources, Task
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.lab import ExecutionTimes, Network, Workload, run_lab
 
 SHORT = Extent(seeds=8, seconds=2)
-ORIGIN = Origin("2000-01-01", "abc+", "a processor", 2, {"aerodaas": "0"})
 VOID = {"meta", "link", "br", "img"}
 
 
@@ -100,13 +95,6 @@ def test_a_standing_is_the_mean_of_what_the_lab_says(board: Leaderboard) -> None
     assert first.utility.value == pytest.approx(mean)
 
 
-def test_cases_differ_and_have_names_of_their_own() -> None:
-    """Else one would count twice."""
-    assert len({case.name for case in CASES}) == len(CASES)
-    words = {(case.workload, case.network, case.times, case.cloud_slots) for case in CASES}
-    assert len(words) == len(CASES)
-
-
 def test_one_seed_ranks_nothing() -> None:
     """It has no interval."""
     with pytest.raises(SchedulerError, match="two seeds"):
@@ -117,49 +105,22 @@ def test_the_page_stands_alone_and_runs_nothing(board: Leaderboard) -> None:
     """Names and ideas are a stranger's text; all tags close, nothing is loaded."""
     ideas = {one.scheduler: f"<script>{one.scheduler}</script>" for one in board.standings}
     reader = Balanced()
-    reader.feed(html_page(board, ideas, ORIGIN))
+    reader.feed(html_page(board, ideas, "abc+ with changes"))
     assert reader.open == []
     for word in ("<script>Idle</script>", *(case.name for case in CASES), "abc+ with changes"):
         assert word in reader.text, word
     assert "first: 1 of 2" in reader.text
 
 
-def test_markdown_keeps_to_its_columns(board: Leaderboard) -> None:
-    """A bar in a docstring is no column."""
-    ideas = {one.scheduler: type(one).__name__ for one in board.standings}
-    ideas["Idle"] = "a | b"
-    lines = markdown_page(board, ideas, ORIGIN).splitlines()
-    (idle,) = [line for line in lines if line.startswith("| 3 |")]
-    assert idle.replace("\\|", "").count("|") == 6
-    assert "†" in idle
-
-
-def test_the_command_writes_all_four_files(
+def test_the_command_writes_page_and_figures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The same figures in each; JSON has no NaN."""
+    """A row for each scheduler and case, and one for its standing."""
     out = tmp_path / "some" / "board"
-    leaderboard(
-        ["edf", "dems"],
-        full=False,
-        only=True,
-        jobs=1,
-        address=None,
-        out=out,
-        extent=Extent(2, 1),
-    )
+    rank(["edf", "dems"], Extent(2, 1), jobs=1, address=None, out=out)
     assert "leaderboard.html" in capsys.readouterr().out
     rows = list(csv.DictReader((out / "leaderboard.csv").open(encoding="utf-8")))
     assert len(rows) == 2 * (1 + len(CASES))
-    found = json.loads(
-        (out / "leaderboard.json").read_text(encoding="utf-8"), parse_constant=pytest.fail
-    )
-    assert [one["scheduler"] for one in found["standings"]] == [
-        row["scheduler"] for row in rows if row["case"] == "all"
-    ]
-    assert found["standings"][0]["utility"]["value"] == float(rows[0]["utility_of_bound"])
-    assert found["origin"]["versions"]["python"]
-    assert "`dems`" in (out / "leaderboard.md").read_text(encoding="utf-8")
     assert "<th>dems</th>" in (out / "leaderboard.html").read_text(encoding="utf-8")
 
 
@@ -175,9 +136,3 @@ def test_what_cannot_be_is_told_before_the_simulations(tmp_path: Path) -> None:
         assert isinstance(outcome.exception, AeroDaaSError)
         assert outcome.exception.exit_code == 2
         assert told in str(outcome.exception)
-
-
-def test_nothing_to_rank_is_an_error(tmp_path: Path) -> None:
-    """In Python, too."""
-    with pytest.raises(ConfigError):
-        leaderboard([], full=False, only=True, jobs=1, address=None, out=tmp_path)
