@@ -76,7 +76,7 @@ def test_page_is_one_whole_file(recorded: Path, tmp_path: Path) -> None:
     """Well-formed, pictures inside and decodable, nothing fetched from anywhere."""
     page = Page(write_report(recorded, tmp_path).page.read_text())
     assert all(link.startswith("data:") for link in page.links)
-    assert len(page.images) >= 5 + 6
+    assert len(page.images) >= 4 + 6
     assert all(image.std() > 1 for image in page.images)
     for told in ("landed: mission complete", "4 of 4", "dropped", "tello/camera", "battery_low"):
         assert told in page.words
@@ -112,7 +112,7 @@ def test_comparison_holds_both(recorded: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.mcap"
     record(other, SyntheticFlight(frames=0.5, rate=10, hover=2))
     page = Page(write_comparison(recorded, other, tmp_path / "deep" / "page.html").read_text())
-    assert len(page.images) == 2 * 5
+    assert len(page.images) == 2 * 4
     assert re.search(r"tello: in the air \(s\)105\.093\.0-12\.0", page.words)
 
 

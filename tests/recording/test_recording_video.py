@@ -162,7 +162,6 @@ def test_the_report_shows_it(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     record(path, SyntheticFlight(frames=1, rate=10), config=CONFIG)
     report = write_report(path, tmp_path / "report")
-    assert (tmp_path / "report" / "moments.png").stat().st_size > 10_000
     assert "tello/camera" in report.page.read_text()
 
 

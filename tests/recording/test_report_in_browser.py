@@ -83,7 +83,7 @@ def test_pages_load_without_complaint(recorded: Path, tmp_path: Path, width: int
     """Both pages, on a desktop and in the narrowest window that a headless browser opens."""
     report = write_report(recorded, tmp_path)
     comparison = write_comparison(recorded, recorded, tmp_path / "compare.html")
-    for page, pictures in ((report.page, 5 + 6), (comparison, 2 * 5)):
+    for page, pictures in ((report.page, 4 + 6), (comparison, 2 * 4)):
         found, log = look(page, width)
         assert found["width"] == width
         assert found["errors"] == []

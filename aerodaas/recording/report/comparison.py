@@ -8,8 +8,8 @@ from pathlib import Path
 from aerodaas.errors import RecordingError
 from aerodaas.recording.report.page.document import render_page
 from aerodaas.recording.report.page.flight import figures, origin_line
-from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.report import Report, read_report
+from aerodaas.recording.report.section import Plot
 
 __all__ = ["comparison_page", "write_comparison"]
 

@@ -1,9 +1,9 @@
-"""Selection of a flight's key moments and their images, and all of them in one image."""
+"""Selection of a flight's key moments and their images."""
 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -14,17 +14,13 @@ from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedDetection, RecordedFlight
-from aerodaas.recording.report.overlay import draw_detections, draw_line
+from aerodaas.recording.report.overlay import draw_detections
 
-__all__ = ["Moment", "MomentPicture", "contact_sheet", "key_moments", "picture_moments"]
+__all__ = ["Moment", "MomentPicture", "key_moments", "picture_moments"]
 
 _MOST = 12
 _WIDEST = 1920
-"""Pixels along a side of a moment's picture, more than page and sheet show."""
-_COLUMNS = 3
-_WIDTH = 480
-"""Width of each tile in pixels."""
-_GAP = 8
+"""Pixels along a side of a moment's picture, more than the page shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,26 +152,3 @@ def _states(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
                     met.add(band.state)
                     yield moment
         yield from again
-
-
-def contact_sheet(moments: Sequence[MomentPicture]) -> NDArray[np.uint8]:
-    """Tile the images of `moments`, three per row, each with its caption; BGR."""
-    tiles = [_tile(moment) for moment in moments]
-    rows = [tiles[at : at + _COLUMNS] for at in range(0, len(tiles), _COLUMNS)]
-    strips = []
-    for row in rows:
-        height = max(tile.shape[0] for tile in row)
-        strip = np.full((height + _GAP, _COLUMNS * (_WIDTH + _GAP), 3), 255, np.uint8)
-        for place, tile in enumerate(row):
-            left = place * (_WIDTH + _GAP)
-            strip[: tile.shape[0], left : left + _WIDTH] = tile
-        strips.append(strip)
-    return np.concatenate(strips)
-
-
-def _tile(moment: MomentPicture) -> NDArray[np.uint8]:
-    height, width = moment.image.shape[:2]
-    size = (_WIDTH, max(1, round(height * _WIDTH / width)))
-    image = np.asarray(cv2.resize(moment.image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    draw_line(image, moment.caption)
-    return image

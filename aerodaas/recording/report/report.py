@@ -7,21 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
-
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import RecordingError
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.report.moments import (
-    MomentPicture,
-    contact_sheet,
-    key_moments,
-    picture_moments,
-)
+from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
 from aerodaas.recording.report.page.flight import flight_page
-from aerodaas.recording.report.plot import Plot
-from aerodaas.recording.report.section import ReportSection, extension_sections
+from aerodaas.recording.report.section import Plot, ReportSection, extension_sections
 from aerodaas.recording.report.summary import FlightSummary
 
 __all__ = ["SUMMARY", "Report", "ReportFiles", "read_report", "write_report", "write_summary"]
@@ -86,12 +78,9 @@ def _plots(flight: RecordedFlight, sections: Sequence[ReportSection]) -> list[Pl
     """The plots of a flight and of what extensions add; none without the extra `plots`."""
     if not has_extra("plots"):
         return []
-    from aerodaas.recording.report.page.figures import (  # noqa: PLC0415 - needs the extra
-        plots_of,
-        section_plots,
-    )
+    from aerodaas.recording.report.page.figures import plots_of  # noqa: PLC0415 - needs the extra
 
-    return [*plots_of(flight), *section_plots(sections)]
+    return plots_of(flight, sections)
 
 
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
@@ -118,9 +107,6 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
         tuple(report.sections),
     )
     contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
-    if report.moments:
-        _, sheet = cv2.imencode(".png", contact_sheet(report.moments))
-        contents[folder / "moments.png"] = sheet.tobytes()
     summary = report.summary
     contents |= {
         files.page: flight_page(summary, report.plots, report.moments, report.sections).encode(),

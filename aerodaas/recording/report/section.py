@@ -1,10 +1,10 @@
-"""Sections that extensions add to the report of a recording."""
+"""Plots of a report, and sections that extensions add to it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from aerodaas.config.extensions import added
 from aerodaas.recording.reader import Recording
@@ -12,7 +12,18 @@ from aerodaas.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Drawing", "ReportSection", "extension_sections"]
+__all__ = ["Drawing", "Plot", "ReportSection", "extension_sections"]
+
+
+class Plot(NamedTuple):
+    """A rendered plot with its texts."""
+
+    name: str
+    """Name of its file, without suffix."""
+    title: str
+    description: str
+    """Alternative text of the image."""
+    png: bytes
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ from aerodaas.extensions.vehicle_logs.attachment import (
 from aerodaas.extensions.vehicle_logs.log import Series
 from aerodaas.extensions.vehicle_logs.plots import log_drawings
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.report.page.figures import section_plots
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.page.figures import plots_of
 from aerodaas.recording.report.report import read_report, write_report
 
 FLOWN = Flown()
@@ -157,7 +158,7 @@ def test_a_log_that_cannot_be_shown_says_why(recording: Path, tmp_path: Path) ->
     attach_file(recording, noise, "vehicle_logs/eagle/../../x", *labels)
     report = read_report(recording)
     assert [section.rows for section in report.sections] == [(), ()]
-    assert section_plots(report.sections) == []
+    assert plots_of(RecordedFlight(), report.sections) == []
     page = write_report(recording, tmp_path / "report").page.read_text()
     assert "&lt;b&gt;x&lt;/b&gt; of drone is not shown: &lt;b&gt;x&lt;/b&gt; is no log" in page
     assert "../../x of eagle is not shown: no robot in the recording is called" in page

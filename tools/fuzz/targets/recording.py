@@ -53,8 +53,8 @@ from aerodaas.recording.replay.vehicle import ReplayedVehicle
 from aerodaas.recording.report.comparison import comparison_page
 from aerodaas.recording.report.difference import difference
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.report.moments import contact_sheet, key_moments, picture_moments
-from aerodaas.recording.report.page.figures import plots_of, section_plots
+from aerodaas.recording.report.moments import key_moments, picture_moments
+from aerodaas.recording.report.page.figures import plots_of
 from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
 from aerodaas.recording.report.section import extension_sections
@@ -139,10 +139,8 @@ def _report(path: Path, _folder: Path, plotted: bool) -> None:  # noqa: FBT001
         moments = picture_moments(recording, key_moments(flight))
         summary = FlightSummary.of(recording, flight)
         sections = extension_sections(recording)
-    plots = [*plots_of(flight), *section_plots(sections)] if plotted else []
+    plots = plots_of(flight, sections) if plotted else []
     report = Report(summary, plots, moments, sections)
-    if moments:
-        contact_sheet(moments)
     flight_page(summary, plots, moments, sections).encode()
     json.dumps(summary.as_dict()).encode()
     f"{summary}".encode()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 from itertools import islice
 from typing import TypeVar
@@ -12,20 +13,15 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.plots.performance import (
     latency_figure,
     loads_figure,
     outcomes_figure,
 )
-from aerodaas.recording.report.plots.trajectory import (
-    profile_figure,
-    timeline_figure,
-    trajectory_figure,
-)
-from aerodaas.recording.report.section import ReportSection
+from aerodaas.recording.report.plots.trajectory import timeline_figure, trajectory_figure
+from aerodaas.recording.report.section import Drawing, Plot, ReportSection
 
-__all__ = ["plots_of", "png_of", "section_plots"]
+__all__ = ["plots_of", "png_of"]
 
 _DPI = 200
 _MOST = 24
@@ -34,67 +30,59 @@ _MOST = 24
 V = TypeVar("V")
 
 
-def plots_of(flight: RecordedFlight) -> list[Plot]:
-    """All plots that the flight has data for, the most important first."""
-    flown = any(robot.states for robot in flight.robots.values())
-    makers: list[tuple[str, str, str, Callable[[RecordedFlight], Figure], bool]] = [
-        (
-            "trajectory",
-            "Seen from above",
-            "Path over the ground in the colours of the mission's states, with waypoints",
-            trajectory_figure,
-            flown,
-        ),
-        (
-            "profile",
-            "Seen from the side",
-            "Height over the way flown in the colours of the mission's states",
-            profile_figure,
-            flown,
-        ),
-        (
-            "timeline",
-            "Height and battery over time",
-            "Height and battery charge over mission time",
-            timeline_figure,
-            flown,
-        ),
-        (
-            "latency",
-            "Latency",
-            "Violins of the time taken on each hop, end to end, and of the overhead",
-            latency_figure,
-            bool(flight.latencies),
-        ),
-        (
-            "outcomes",
-            "Analytics scheduling",
-            "Bars of what the scheduler decided and what came of it, by analysis",
-            outcomes_figure,
-            bool(flight.outcomes),
-        ),
-        (
-            "load",
-            "Processor and memory",
-            "Processor and memory of each actor over mission time",
-            loads_figure,
-            bool(flight.loads),
-        ),
-    ]
-    return [
-        Plot(name, title, description, png_of(flight, make))
-        for name, title, description, make, wanted in makers
-        if wanted
-    ]
+def plots_of(flight: RecordedFlight, sections: Sequence[ReportSection] = ()) -> list[Plot]:
+    """All plots that there is data for, the most important first.
 
-
-def section_plots(sections: Sequence[ReportSection]) -> list[Plot]:
-    """Plots of sections of a report."""
-    return [
-        Plot(drawing.name, drawing.title, drawing.description, _png(drawing.draw))
-        for section in sections
-        for drawing in section.drawings
-    ]
+    Args:
+        flight: The flight.
+        sections: Sections of the report, whose plots follow.
+    """
+    shown = _shown(flight)
+    drawings: list[Drawing] = []
+    if any(robot.states for robot in flight.robots.values()):
+        drawings += [
+            Drawing(
+                "trajectory",
+                "Seen from above",
+                "Path over the ground in the colours of the mission's states, with waypoints",
+                partial(trajectory_figure, shown),
+            ),
+            Drawing(
+                "timeline",
+                "Height and battery over time",
+                "Height and battery charge over mission time",
+                partial(timeline_figure, shown),
+            ),
+        ]
+    if flight.latencies:
+        drawings.append(
+            Drawing(
+                "latency",
+                "Latency",
+                "Violins of the time taken on each hop, end to end, and of the overhead",
+                partial(latency_figure, shown),
+            )
+        )
+    if flight.outcomes:
+        drawings.append(
+            Drawing(
+                "outcomes",
+                "Analytics scheduling",
+                "Bars of what the scheduler decided and what came of it, by analysis",
+                partial(outcomes_figure, shown),
+            )
+        )
+    if flight.loads:
+        drawings.append(
+            Drawing(
+                "load",
+                "Processor and memory",
+                "Processor and memory of each actor over mission time",
+                partial(loads_figure, shown),
+            )
+        )
+    drawings += [drawing for section in sections for drawing in section.drawings]
+    return [Plot(one.name, one.title, one.description, _png(one.draw)) for one in drawings]
 
 
 def png_of(flight: RecordedFlight, make: Callable[[RecordedFlight], Figure]) -> bytes:

@@ -8,8 +8,7 @@ import cv2
 
 from aerodaas.recording.report.moments import MomentPicture
 from aerodaas.recording.report.page.document import render_page
-from aerodaas.recording.report.plot import Plot
-from aerodaas.recording.report.section import ReportSection
+from aerodaas.recording.report.section import Plot, ReportSection
 from aerodaas.recording.report.summary import FlightSummary
 
 __all__ = ["figures", "flight_page", "origin_line"]

@@ -1,4 +1,4 @@
-"""Plots of the flight from above, from the side, and over mission time."""
+"""Plots of the flight from above and over mission time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from aerodaas.recording.report.plots.style import (
     words,
 )
 
-__all__ = ["profile_figure", "timeline_figure", "trajectory_figure"]
+__all__ = ["timeline_figure", "trajectory_figure"]
 
 _STAYING = 0.6
 """Metres within which a drone counts as stationary …"""
@@ -34,8 +34,8 @@ _LONG = 1.5
 _GROUND = frozenset({"idle", "preflight", "taking_off", "landing", "landed", "aborted"})
 _SHAPES = "sDv^P*X"
 """Marks of the first, second, … label seen."""
-_NAMES_ABOVE, _NAMES_ASIDE = 8, 5
-"""Waypoints that are named in each plot at most: more names would hide each other."""
+_NAMES = 8
+"""Waypoints that are named at most: more names would hide each other."""
 _APART = 1.0
 """Metres between the marks of one label: an object seen 15 times a second is marked once."""
 
@@ -123,37 +123,6 @@ def trajectory_figure(
     return figure
 
 
-def profile_figure(flight: RecordedFlight) -> Figure:
-    """The flight from the side: height over ground distance flown, one row per robot."""
-    robots = {name: robot for name, robot in flight.robots.items() if robot.states}
-    figure = new_figure(1.1 + 1.9 * max(1, len(robots)))
-    rows = figure.subplots(max(1, len(robots)), 1, squeeze=False)[:, 0]
-    states: dict[str, None] = {}
-    for (name, robot), axes in zip(robots.items(), rows, strict=False):
-        way = _way(robot.position)
-        for begin, end, state in _pieces(robot):
-            axes.plot(
-                way[begin:end],
-                robot.position[begin:end, 2],
-                color=STATE_COLOURS.get(state, "black"),
-                linewidth=2.5,
-            )
-            states[state] = None
-        passed = list(_passed(robot, way))
-        labelled = _labelled(len(passed), _NAMES_ASIDE)
-        for index, (name_, distance, height) in enumerate(passed):
-            axes.plot(distance, height, "o", color="black", markersize=7, zorder=4)
-            if index in labelled:
-                _label(axes, distance, height, name_)
-        suffix = f" of {name}" if len(robots) > 1 else ""
-        axes.set_ylabel(f"Height{suffix} (m)")
-        axes.margins(x=0.02, y=0.22)
-        grid(axes)
-    rows[-1].set_xlabel("Way flown over the ground (m)")
-    legend(figure, [*_state_lines(states), *_visited_mark(flight)])
-    return figure
-
-
 def _visited_mark(flight: RecordedFlight) -> list[Artist]:
     visited = any(robot.visited for robot in flight.robots.values())
     return [mark("waypoint, visited", "black")] if visited else []
@@ -176,51 +145,18 @@ def _pieces(robot: RobotFlight) -> Iterator[tuple[int, int, str]]:
         yield int(begin), int(end) + 1, str(states[begin])
 
 
-def _way(position: Floats) -> Floats:
-    """Ground distance in metres up to each point; noise while hovering does not count."""
-    way = np.zeros(len(position))
-    anchor = 0
-    for index in range(1, len(position)):
-        step = float(np.linalg.norm(position[index, :2] - position[anchor, :2]))
-        if step >= _STAYING / 2:
-            way[index], anchor = way[anchor] + step, index
-        else:
-            way[index] = way[anchor]
-    return way
-
-
-def _passed(robot: RobotFlight, way: Floats) -> Iterator[tuple[str, float, float]]:
-    """Yield name, ground distance and height of each waypoint visited, at the closest point."""
-    begin = 0
-    for number, name in enumerate(robot.visited, start=1):
-        if name not in robot.plan or begin >= len(robot.position):
-            continue
-        away = np.linalg.norm(robot.position[begin:] - np.array(robot.plan[name]), axis=1)
-        # From the first approach only: a later leg may pass the same place.
-        close = away <= max(_STAYING, float(np.nanmin(away)))
-        first = int(np.argmax(close))
-        stay = int(np.argmin(np.append(close[first:], False)))
-        near = begin + first + int(np.argmin(away[first : first + stay]))
-        yield f"{number}. {name}", float(way[near]), float(robot.position[near, 2])
-        begin = near
-
-
 def _draw_plan(axes: Axes, robot: RobotFlight) -> None:
     if robot.fence:
         ring = np.array([*robot.fence, robot.fence[0]])
         axes.plot(ring[:, 0], ring[:, 1], "--", color="black", linewidth=1.2)
     order = {name: str(number) for number, name in enumerate(robot.visited, start=1)}
-    labelled = _labelled(len(robot.plan), _NAMES_ABOVE)
+    count = len(robot.plan)
+    labelled = np.linspace(0, count - 1, min(count, _NAMES)).round().astype(int).tolist()
     for index, (name, (east, north, _)) in enumerate(robot.plan.items()):
         face = "black" if name in order else "white"
         axes.plot(east, north, "o", color="black", mfc=face, markersize=7, zorder=4)
         if index in labelled:
             _label(axes, east, north, f"{order[name]}. {name}" if name in order else name)
-
-
-def _labelled(count: int, most: int) -> frozenset[int]:
-    """Which of `count` waypoints in a row are named, `most` at most; first and last are."""
-    return frozenset(np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist())
 
 
 def _draw_path(axes: Axes, robot: RobotFlight) -> list[str]:
