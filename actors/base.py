@@ -2,8 +2,8 @@
 
 The application's process creates all actors at once, then calls on each `prepare` (make and open
 the nodes, join the streams), `start` (run each node in a thread of its own), any number of
-`report`, and `stop`. An actor restarted by Ray begins again with `prepare`, and one that joins in
-flight begins there; both get the mission's time before, by `set_origin`.
+`report`, and `stop`. An actor restarted by Ray gets the mission's time, by `set_origin`, and begins
+again with `prepare`.
 """
 
 from __future__ import annotations
@@ -23,14 +23,12 @@ from aerodaas.actors.cluster.dead_man import exit_actor, exit_soon
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
-from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
 from aerodaas.clock import host_time_ns
-from aerodaas.errors import AeroDaaSError, MissionError, as_project_error
+from aerodaas.errors import AeroDaaSError, as_project_error
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.vitals import read_vitals
 from aerodaas.runtime.node import Node
-from aerodaas.runtime.nodes.camera import CameraNode
 from aerodaas.runtime.reports import (
     ActorReport,
     AlertHandler,
@@ -46,8 +44,6 @@ from aerodaas.runtime.session import Session
 __all__ = ["ActorInfo", "NodeActor", "NodeMaker"]
 
 _PROBLEMS_KEPT = 50
-_LISTENING = 5.0
-"""Wall seconds that a node's thread may take to subscribe to further streams."""
 _LOOK_INTERVAL = 1.0
 """Wall seconds between two looks at nodes that may hang."""
 _PARTING = 3.0
@@ -99,7 +95,6 @@ class NodeActor:
         self._started = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._threads: list[threading.Thread] = []
         # Reentrant: sending an alert may raise another one, if it turns out unsendable.
         self._alerting = threading.RLock()
         self._problems: list[str] = []
@@ -125,33 +120,21 @@ class NodeActor:
         return self.info()
 
     def _open(self, specs: tuple[NodeMaker, ...]) -> None:
-        """Make and open nodes; none of them is kept if the opening of one raises."""
-        fresh = [self._runner(spec.make(self.session)) for spec in specs]
-        before = set(self.publishers)
+        """Make and open nodes; closes them if the opening of one raises."""
+        self.runners = [self._runner(spec.make(self.session)) for spec in specs]
         try:
-            for runner in fresh:
-                runner.open([one.node for one in (*self.runners, *fresh)])
+            for runner in self.runners:
+                runner.open([one.node for one in self.runners])
         except BaseException:
-            for runner in fresh:
+            for runner in self.runners:
                 runner.close()
-            for stream in set(self.publishers) - before:
-                self.publishers.pop(stream).close()
             raise
-        self.runners += fresh
 
     def _runner(self, node: Node) -> NodeRunner:
         return NodeRunner(self, node)
 
-    def join(self, *specs: NodeMaker) -> ActorInfo:
-        """Run further nodes in flight; none of them if the opening of one raises."""
-        before = len(self.runners)
-        self._open(specs)
-        for runner in self.runners[before:]:
-            self._threads.append(runner.start_thread())
-        return self.info()
-
     def info(self) -> ActorInfo:
-        """Node, process and current streams of the actor."""
+        """Node, process and streams of the actor."""
         return ActorInfo(
             ray.get_runtime_context().get_node_id(),
             os.getpid(),
@@ -160,39 +143,6 @@ class NodeActor:
             tuple(self.reads()),
             host_time_ns(),
         )
-
-    def listen(self, node: str, depths: dict[str, int]) -> ActorInfo:
-        """Subscribe a node to further streams; returns once subscribed.
-
-        Args:
-            node: Name of the node.
-            depths: Queue depths by stream.
-
-        Raises:
-            MissionError: If the node's thread is busy for too long.
-        """
-        for runner in self.runners:
-            if runner.node.name == node:
-                runner.node.reads.update(depths)
-                subscribed = runner.subscriber.add(depths)
-                if not subscribed.wait(_LISTENING) and not self.stopping:
-                    raise MissionError(f"{self.name} is busy and listens to nothing new")
-        return self.info()
-
-    def end_mission_when_finished(self, camera: str, ends: bool) -> None:  # noqa: FBT001 - Ray's
-        """Change whether the mission ends with a camera.
-
-        Args:
-            camera: Name of the camera's node.
-            ends: Whether it ends when the camera has no more images.
-        """
-        for runner in self.runners:
-            if isinstance(runner.node, CameraNode) and runner.node.name == camera:
-                runner.node.ends = ends
-
-    def add_definitions(self, application: Application) -> None:
-        """Receive the definitions that the application has added since the session was made."""
-        del application  # unpickling it is enough
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Set the actors on other nodes that read this actor's streams."""
@@ -395,13 +345,13 @@ class NodeActor:
 
     def _run(self) -> None:
         """Run each node in a thread; watch for those that hang until all have ended."""
-        self._threads = [runner.start_thread() for runner in self.runners]
+        threads = [runner.start_thread() for runner in self.runners]
         given_up = math.inf
-        while any(one.is_alive() for one in self._threads) and time.monotonic() < given_up:
+        while any(one.is_alive() for one in threads) and time.monotonic() < given_up:
             if self.stopping:
                 given_up = min(given_up, time.monotonic() + _PARTING)
-            for thread in tuple(self._threads):
-                thread.join(_LOOK_INTERVAL / len(self._threads))
+            for thread in threads:
+                thread.join(_LOOK_INTERVAL / len(threads))
             for runner in self.runners:
                 runner.watch()
 

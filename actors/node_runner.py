@@ -153,16 +153,11 @@ class NodeRunner(Host):
         if isinstance(self.node, CameraNode) and (most := most_memory(self.node.camera)):
             limit_memory(most)
         self.node.open(self)
-        self.open_publishers()
-        if isinstance(self.node, CameraNode):
-            self.node.place_pictures_in(self._actor.publishers[self.node.name].picture_memory)
-
-    def open_publishers(self) -> None:
-        """Open the streams that the node has added."""
         what = f"{self._who}'s result" if self._who else ""
         for stream in self.node.outlets:
-            if stream not in self._actor.publishers:
-                self._actor.publisher(stream, what)
+            self._actor.publisher(stream, what)
+        if isinstance(self.node, CameraNode):
+            self.node.place_pictures_in(self._actor.publishers[self.node.name].picture_memory)
 
     def run(self) -> None:
         """Step the node until the actor is stopped; a node that raises ends."""

@@ -105,7 +105,7 @@ class DroneFlight:
                 session,
                 name,
                 specs,
-                lambda _, scheduler: InlinePlanner(scheduler),
+                lambda spec: InlinePlanner(spec.scheduler),
                 neighbours=[other for other in names if other != name],
                 observed={},
             )

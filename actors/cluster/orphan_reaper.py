@@ -10,7 +10,6 @@ others, or of one of its own in a run that is not recorded.
 
 from __future__ import annotations
 
-import itertools
 import threading
 import time
 from collections.abc import Sequence
@@ -68,15 +67,6 @@ class ReaperHost:
         """Whether the reaper is ending the run, or has ended it."""
         return self._reaper.ending
 
-    def look_after(self, actors: Sequence[Any], helpers: Sequence[Any]) -> None:
-        """Replace the actors to be ended, after actors were added in flight.
-
-        Args:
-            actors: Actors of the run.
-            helpers: Its other processes.
-        """
-        self._reaper.look_after(actors, helpers)
-
 
 class OrphanReaperActor(ReaperHost):
     """Actor for the reaper alone, of a run that is not recorded."""
@@ -103,7 +93,10 @@ class _OrphanReaper:
         self._itself = ray.get_runtime_context().current_actor
         self._lock: RunLock | None = None
         self._silent_from = time.monotonic() + _LAUNCH
-        self.look_after(watched.actors, watched.helpers)
+        self._actors, self._helpers = watched.actors, watched.helpers
+        for actor in (*self._actors, *self._helpers):
+            # An actor's address is resolved once, by the cluster's head, which may be lost later.
+            actor.resolve_address.remote()
         threading.Thread(target=self._watch, name="orphan reaper", daemon=True).start()
 
     def heard(self) -> None:
@@ -111,21 +104,12 @@ class _OrphanReaper:
             self._lock = RunLock()
         self._silent_from = time.monotonic() + _SILENCE
 
-    def look_after(self, actors: Sequence[Any], helpers: Sequence[Any]) -> None:
-        self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (
-            (actors, [self._itself]),
-            helpers,
-        )
-        for actor in (*itertools.chain(*self._ended[0]), *helpers):
-            # An actor's address is resolved once, by the cluster's head, which may be lost later.
-            actor.resolve_address.remote()
-
     def _watch(self) -> None:
         while not self._gone() or any(map(may_fly, self._drones)):
             time.sleep(_LOOK_INTERVAL)
         self.ending = True
         # The last of them is its own: the process ends, which releases the lock.
-        end_actors(*self._ended)
+        end_actors((self._actors, [self._itself]), self._helpers)
 
     def _gone(self) -> bool:
         if not self._application.near:

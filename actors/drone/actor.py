@@ -27,7 +27,6 @@ from aerodaas.runtime.nodes.controller import RobotSpec
 from aerodaas.runtime.nodes.drone import DroneNode, failure_of
 from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["ANSWER_TIMEOUT", "CHANGES", "COMMANDS", "DroneActor"]
 
@@ -120,40 +119,6 @@ class DroneActor(NodeActor):
         except LoopOverError as over:
             state = self._reports[robot].mission.state.value
             return Answer(accepted=False, text=f"{over}: {state}")
-
-    def grow(self, robots: tuple[RobotSpec, ...], timeout: float) -> ActorInfo:
-        """Subscribe to the streams added to `robots`; returns once the loop uses them.
-
-        Args:
-            robots: The robots, with the streams added.
-            timeout: Wall seconds that the loop has to answer.
-
-        Raises:
-            MissionError: If the loop has ended or does not answer.
-        """
-        self._calls.ask(lambda: self._grow(robots), timeout)
-        return self.info()
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
-        """Use another trajectory scheduler for all robots from now on.
-
-        Args:
-            scheduler: The scheduler.
-            timeout: Wall seconds that the loop has to answer.
-
-        Raises:
-            MissionError: If the loop has ended or does not answer.
-        """
-        # In this thread: a planner's process takes seconds to start.
-        planners = self._node.planners_of(scheduler)
-        self._calls.ask(lambda: self._node.use_planners(planners), timeout)
-
-    def _grow(self, robots: tuple[RobotSpec, ...]) -> None:
-        self._node.grow(robots, None, self.clock.now())
-        (runner,) = self.runners
-        runner.open_publishers()
-        runner.subscriber.add(self._node.reads)
-        runner.subscriber.subscribe_added()
 
     def robots(self, newest: int = 200) -> dict[str, RobotStatus]:
         """Report of each robot's last loop cycle, with the `newest` latencies.

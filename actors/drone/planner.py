@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -17,7 +16,6 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.mission.navigation.planner import BackgroundPlanner, Planner, solve
 from aerodaas.runtime.nodes.controller import RobotSpec
 from aerodaas.runtime.session import Session
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["PlannerExecutor", "planner_for"]
 
@@ -81,19 +79,6 @@ class PlannerExecutor(Executor):
         """
         return self._caller.submit(self._call, function, args, kwargs)
 
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
-        """End the actor and cancel the waiting calls.
-
-        Args:
-            wait: Ignored; it never waits.
-            cancel_futures: Ignored; waiting calls are always cancelled.
-        """
-        del wait, cancel_futures
-        # The waiting calls first, or the next one would start as soon as the actor is dead.
-        self._caller.shutdown(wait=False, cancel_futures=True)
-        with contextlib.suppress(Exception):
-            ray.kill(self._actor)
-
     def _call(self, function: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
         try:
             # Wait for a restarting actor: the timeout counts from when it is ready.
@@ -109,14 +94,14 @@ class PlannerExecutor(Executor):
         return result
 
 
-def planner_for(session: Session, spec: RobotSpec, scheduler: TrajectoryScheduler) -> Planner:
-    """Create the planner of a scheduler; an isolated one plans in an actor, which starts first.
+def planner_for(session: Session, spec: RobotSpec) -> Planner:
+    """Create a robot's planner; an isolated scheduler plans in an actor, which starts first.
 
     Args:
         session: The run.
-        spec: The robot that is planned for.
-        scheduler: Its trajectory scheduler.
+        spec: The robot, with its trajectory scheduler.
     """
+    scheduler = spec.scheduler
     if not scheduler.isolated:
         return BackgroundPlanner(scheduler)
     patience = _PLANS_PATIENCE * spec.robot.mission.plan_timeout

@@ -32,8 +32,6 @@ class ActorState:
     """Arguments of `prepare`."""
     restarts: int
     """Most restarts by Ray."""
-    further: dict[str, int] = field(default_factory=dict)
-    """Streams added in flight that it reads, and their queue depths."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None

@@ -41,15 +41,6 @@ class Application:
     files: tuple[Path, ...] = ()
     """Files and folders of the modules that Ray's job brings along; they stay here."""
 
-    def and_later(self, later: Application) -> Application:
-        """Union of this and the `later` application, whose definitions have precedence."""
-        both = {
-            name: {**self.modules.get(name, {}), **more} for name, more in later.modules.items()
-        }
-        return Application(
-            {**self.modules, **both}, tuple(dict.fromkeys((*self.files, *later.files)))
-        )
-
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         """Pickle it so that unpickling makes its modules available."""
         return _arrived, (dict(self.modules),)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -29,7 +28,6 @@ from aerodaas.actors.isolation import environment_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.recorder import RecorderActor, RecorderSpec
 from aerodaas.actors.run.actor_state import ActorState, ask, require_clock, routes
-from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.live import live_source
 from aerodaas.actors.run.losses import (
@@ -41,26 +39,22 @@ from aerodaas.actors.run.losses import (
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 from aerodaas.clock import host_time_ns
 from aerodaas.config.options import LiveViews
-from aerodaas.errors import AeroDaaSError, MissionError, SilentError
+from aerodaas.errors import MissionError, SilentError
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.dispatch.offload import CloudProcess
-from aerodaas.runtime.growth import Growth, growth
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.placement import Placement
-from aerodaas.runtime.plan import ActorPlan, CameraSpec, DispatchPlan, FlightPlan
+from aerodaas.runtime.plan import ActorPlan, DispatchPlan, FlightPlan
 from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.runtime.stream_names import done_stream
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["Flight"]
 
 _PREPARE_TIMEOUT = 90.0
-_GROWING = 10.0
-"""Timeout in wall seconds of a change in flight, and of holding mission time for it."""
 _LOOK_TIMEOUT = 1.0
 """Timeout in seconds of a drone's actor that has answered before, so that others are looked at."""
 _SILENT_AFTER = 3.0
@@ -95,13 +89,13 @@ class Flight:
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, ActorState] = {}
-        """By name; replaced and never changed, because other threads iterate over it."""
+        """By name; not changed once the flight is launched, for other threads iterate over it."""
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
         self._job = ray.get_runtime_context().get_job_id()
         self._pulse = SuspensionMonitor()
         self._opening: list[Any] = []
-        self._liveness_monitor: list[LivenessMonitor] = []
+        self._liveness_monitor: LivenessMonitor | None = None
         self._head: HeadWatch | None = None
         session = plan.session
         environments = environment_options(plan)
@@ -116,6 +110,9 @@ class Flight:
         for actor in plan.actors:
             if actor.name != self._recorder:
                 self._create_actor(actor, environments)
+        if plan.dispatch is not None:
+            self._create_dispatcher(plan.dispatch, environments)
+        # Last, for its reaper knows all others.
         for actor in plan.actors:
             if actor.name == self._recorder and self.recording and provenance is not None:
                 spec = RecorderSpec(self.recording, plan.recorded, provenance, live)
@@ -124,15 +121,10 @@ class Flight:
                 self._create(actor.name, kind, place, args, restarts=_RESTARTS, setup=setup)
         recorder = self._members.get(self._recorder)
         self._reaper = recorder.handle if recorder is not None else self._create_reaper()
-        if plan.dispatch is not None:
-            self._create_dispatcher(plan.dispatch, environments)
-            self._inform_reaper()
         self._origin = 0
         self._notes: list[Alert] = []
         """Alerts of the application's process; appended to by any thread."""
         self._recordings: list[Path] = [] if self.recording is None else [self.recording]
-        self._changing = False
-        """Whether a change keeps actors from answering."""
         self._answers: dict[str, tuple[float, dict[str, RobotStatus]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
@@ -157,7 +149,7 @@ class Flight:
 
         `progress` is called with the name of each actor that is ready.
         """
-        self._prepare(list(self._members.values()), progress)
+        self._prepare(progress)
         for reference in self._opening:
             ask(reference, _PREPARE_TIMEOUT)
         # Nothing starts before the reaper runs and has a heartbeat: later ones would wait in this
@@ -165,17 +157,14 @@ class Flight:
         ask(self._call_reaper("heard"), _PREPARE_TIMEOUT)
         self._pulse.beat()
         self._origin = host_time_ns()
-        self._start(list(self._members.values()))
-        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self.publish_alert)
-
-    def _start(self, members: list[ActorState]) -> None:
         # Pure readers start first, so that no message is published without its readers.
-        for member in reversed(members):
+        for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
             member.answered_at = time.monotonic()
-        mortal = {member.name: member.handle for member in members if member.restarts}
-        self._liveness_monitor.append(LivenessMonitor(mortal, self._life_of))
+        mortal = {name: one.handle for name, one in self._members.items() if one.restarts}
+        self._liveness_monitor = LivenessMonitor(mortal, self._life_of)
+        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self.publish_alert)
 
     def poll(self, newest: int = 200) -> FlightState:
         """State of the run, with the `newest` latencies of each robot.
@@ -275,96 +264,6 @@ class Flight:
         """False after this process has left the cluster of the actors."""
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
 
-    def add_definitions(self, application: Application) -> None:
-        """Send the application's current definitions to every actor."""
-        application = self.plan.session.application.and_later(application)
-        session = replace(self.plan.session, application=application)
-        self.plan = replace(self.plan, session=session)
-        for reference in [
-            one.handle.add_definitions.remote(application) for one in self._members.values()
-        ]:
-            # An actor that has died receives it when it is set up again.
-            with contextlib.suppress(AeroDaaSError):
-                ask(reference)
-
-    def grow(self, plan: FlightPlan) -> None:
-        """Continue with `plan`, that of the current graph; returns when all additions run.
-
-        Raises GraphError for a change that is impossible in flight, and the errors of a new
-        actor's opening; the run then continues unchanged.
-        """
-        change = growth(self.plan, plan)
-        self._changing = True
-        try:
-            self._join(change)
-        finally:
-            self._end_change()
-        self.plan = plan
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
-        """Use the trajectory scheduler `scheduler` for all robots from now on."""
-        self._changing = True
-        try:
-            for name in sorted(self._ids()):
-                handle = self._members[name].handle
-                ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
-        finally:
-            self._end_change()
-
-    def _end_change(self) -> None:
-        """Expect reports of all actors again, from now on."""
-        for member in self._members.values():
-            member.answered_at = time.monotonic()
-        self._changing = False
-
-    def _join(self, change: Growth) -> None:
-        known = set(self._members)
-        environments = environment_options(replace(self.plan, actors=change.actors))
-        try:
-            for actor in change.actors:
-                self._create_actor(actor, environments)
-            fresh = [member for name, member in self._members.items() if name not in known]
-            # Before they start: the application may be killed at any time.
-            self._inform_reaper()
-            self._prepare(fresh, lambda _: None)
-            for actor in change.joining:
-                member = self._members[actor.name]
-                specs = _setup(actor)[1:]
-                member.info = ask(member.handle.join.remote(*specs), _PREPARE_TIMEOUT)
-                member.setup += specs
-        except BaseException:
-            for name in set(self._members) - known:
-                ray.kill(self._members[name].handle)
-            self._members = {name: one for name, one in self._members.items() if name in known}
-            self._inform_reaper()
-            raise
-        if (recorder := self._members.get(self._recorder)) is not None and change.recorded:
-            recorder.further |= change.recorded
-            recorder.info = ask(
-                recorder.handle.listen.remote("recorder", change.recorded), _GROWING
-            )
-        for robots in change.drones:
-            drone = self._members[self._drones[robots[0].robot.id]]
-            drone.info = ask(drone.handle.grow.remote(robots, _GROWING), 2 * _GROWING)
-        for stream, ends in change.ending.items():
-            camera = next(
-                self._members[actor.name]
-                for actor in self.plan.actors
-                if any(spec.stream == stream for spec in actor.cameras)
-            )
-            camera.setup = tuple(
-                replace(spec, ends=ends)
-                if isinstance(spec, CameraSpec) and spec.stream == stream
-                else spec
-                for spec in camera.setup
-            )
-            ask(camera.handle.end_mission_when_finished.remote(stream, ends))
-        self._connect_all()
-        self._start(fresh)
-
-    def _inform_reaper(self) -> None:
-        self._call_reaper("look_after", self._ended_first(), list(self._helpers))
-
     @property
     def flying(self) -> bool:
         """Whether a drone may be in the air and thus needs its actor."""
@@ -450,8 +349,8 @@ class Flight:
 
     def _watch_no_longer(self) -> None:
         self._stopped = True
-        for liveness_monitor in self._liveness_monitor:
-            liveness_monitor.end()
+        if self._liveness_monitor is not None:
+            self._liveness_monitor.end()
         if self._head is not None:
             self._head.end()
 
@@ -470,8 +369,8 @@ class Flight:
         options = self._options("orphan_reaper", Placement(), restarts=_RESTARTS)
         return made.options(**options).remote(self._watched())
 
-    def _call_reaper(self, what: Literal["heard", "ending", "look_after"], *args: object) -> Any:  # noqa: ANN401 - Ray's reference
-        return getattr(self._reaper, what).options(concurrency_group=REAPER).remote(*args)
+    def _call_reaper(self, what: Literal["heard", "ending"]) -> Any:  # noqa: ANN401 - Ray's reference
+        return getattr(self._reaper, what).options(concurrency_group=REAPER).remote()
 
     def _ids(self) -> set[str]:
         return set(self._drones.values())
@@ -496,10 +395,7 @@ class Flight:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members = {
-            **self._members,
-            name: ActorState(name, made.remote(*args), setup, restarts),
-        }
+        self._members[name] = ActorState(name, made.remote(*args), setup, restarts)
 
     def _options(self, name: str, place: Placement, *, restarts: int) -> dict[str, Any]:
         """Ray options of an actor; a detached one, to outlive the application, needs a name."""
@@ -559,13 +455,10 @@ class Flight:
         self._opening.append(executor.prepare())
         return executor
 
-    def _prepare(self, members: list[ActorState], progress: Callable[[str], None]) -> None:
+    def _prepare(self, progress: Callable[[str], None]) -> None:
         # Before the calls: on a busy machine the first is done before the last is made.
         began = host_time_ns()
-        if self._origin:
-            for member in members:
-                member.handle.set_origin.remote(self._origin)
-        waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
+        waiting = {one.handle.prepare.remote(*one.setup): one for one in self._members.values()}
         deadline = time.monotonic() + _PREPARE_TIMEOUT
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
@@ -577,9 +470,6 @@ class Flight:
             require_clock(member.name, info, began)
             member.info = info
             progress(member.name)
-        self._connect_all()
-
-    def _connect_all(self) -> None:
         for reference in [self._connect(member) for member in self._members.values()]:
             ask(reference)
 
@@ -613,7 +503,7 @@ class Flight:
     def _report_silence(self, member: ActorState) -> None:
         """Raise an alert, once, for an actor that lives and has not answered for too long."""
         silence = time.monotonic() - member.answered_at
-        expected = member.report.phase == "running" and not self._changing
+        expected = member.report.phase == "running"
         if member.silent or member.lost_at is not None or not expected or silence < _SILENT_AFTER:
             return
         # An application that was suspended itself has not had the time to hear it.
@@ -693,14 +583,8 @@ class Flight:
         while member.lost_at == lost_at and not self._stopped:
             try:
                 if cast("ActorReport", ray.get(actor.report.remote())).phase == "new":
-                    if actor == self._reaper:
-                        # It knows what was there at the start.
-                        self._inform_reaper()
-                    ray.get(actor.add_definitions.remote(self.plan.session.application))
                     ray.get(actor.set_origin.remote(self._origin))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
-                    if member.further:
-                        member.info = ray.get(actor.listen.remote("recorder", member.further))
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
                     # It may hang before its next report.

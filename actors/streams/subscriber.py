@@ -6,7 +6,6 @@ import threading
 import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping
-from queue import SimpleQueue
 from typing import Any
 
 from aerodaas.actors.streams.availability import shared_memory_available
@@ -41,7 +40,6 @@ class Subscriber:
             within: Streams that this process publishes itself, of which it is given the messages
                 by `accept`.
         """
-        self._within = frozenset(within)
         self._unreadable = unreadable
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
         self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
@@ -51,31 +49,11 @@ class Subscriber:
         }
         self._called = threading.Condition()
         self._calls = 0
-        self._scope = scope
-        self._added: SimpleQueue[tuple[Mapping[str, int], threading.Event]] = SimpleQueue()
         self._local = LocalSubscriber(scope) if shared_memory_available() else None
-        self._subscribe(depths)
-
-    def add(self, depths: Mapping[str, int]) -> threading.Event:
-        """Request a subscription to further streams; thread-safe.
-
-        The event is set once the reading thread has subscribed: later messages are received.
-        """
-        subscribed = threading.Event()
-        self._added.put((depths, subscribed))
-        self.wake()
-        return subscribed
-
-    def subscribe_added(self) -> None:
-        """Subscribe to the added streams, in the reading thread; `receive` does it, too."""
-        while not self._added.empty():
-            depths, subscribed = self._added.get()
-            fresh = {name: depth for name, depth in depths.items() if name not in self._delivered}
-            self._subscribe(fresh)
-            for stream, depth in fresh.items():
-                self.received[stream] = self.dropped[stream] = 0
-                self._delivered[stream] = deque(maxlen=depth)
-            subscribed.set()
+        if self._local is not None:
+            for stream, depth in depths.items():
+                if stream not in within:
+                    self._local.subscribe(stream, depth)
 
     @property
     def shared(self) -> bool:
@@ -88,7 +66,6 @@ class Subscriber:
         Returns early, perhaps without messages, when woken. Streams are in the order of
         subscription, independent of the order of arrival.
         """
-        self.subscribe_added()
         if self._local is not None:
             return self._collect(self._local.receive(timeout))
         messages = self._collect({})
@@ -127,12 +104,6 @@ class Subscriber:
         """Close all streams."""
         if self._local is not None:
             self._local.close()
-
-    def _subscribe(self, depths: Mapping[str, int]) -> None:
-        if self._local is not None:
-            for stream, depth in depths.items():
-                if stream not in self._within:
-                    self._local.subscribe(stream, depth)
 
     def _await_call(self, timeout: float) -> None:
         with self._called:

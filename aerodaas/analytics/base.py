@@ -204,8 +204,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co] | AeroData[O_co | None]:
         """Analyse a stream, or a single item at once.
 
-        Called again with a stream, the same analysis reads that one, too. While a mission flies,
-        the analysis starts at once; it can then not be changed any more. A single item, such as
+        Called again with a stream, the same analysis reads that one, too. A single item, such as
         `AeroData(frame)`, is processed in the application's process, without a mission.
 
         Args:
@@ -215,8 +214,8 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             The stream of results; of a single item its result, which may be None.
 
         Raises:
-            GraphError: If `data` is neither, or carries another type.
-            Exception: What the analysis' `open` raises, for a single item and in flight.
+            GraphError: If `data` is neither, or carries another type, and for a stream in flight.
+            Exception: What the analysis' `open` raises, for a single item.
         """
         if isinstance(data, AeroStreamData):
             with data.graph.calling(self, data.name):
@@ -238,15 +237,9 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     def _analyse_stream(self, data: AeroStreamData[Any]) -> AeroStreamData[O_co]:
         self._prepare_for(data.item)
         graph = data.graph
-        if self.node is not None:
-            self._require_idle("read a further stream")
+        graph.require_idle(f"analyse {data.name}")
         node = self._node_in(graph, graph.nodes[data.name].robot)
-        try:
-            graph.connect(data, node, self.accepts)
-            graph.launch(node)
-        except BaseException:
-            self._leave_flying(graph)
-            raise
+        graph.connect(data, node, self.accepts)
         return AeroStreamData(graph, node.id, self.produces)
 
     def instantiate(self) -> AeroStreamData[O_co]:
@@ -256,21 +249,15 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             The stream of results.
 
         Raises:
-            GraphError: If it was not deployed, and so belongs to no environment.
+            GraphError: If it was not deployed, and so belongs to no environment; in flight.
         """
         if self._graph is None:
             message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
             raise GraphError(message)
-        if self.node is not None:
-            self._require_idle("instantiate it")
+        self._graph.require_idle("instantiate it")
         with self._graph.calling(self, None):
             node = self._node_in(self._graph, None)
             node.kind = "external"
-            try:
-                self._graph.launch(node)
-            except BaseException:
-                self._leave_flying(self._graph)
-                raise
         return AeroStreamData(self._graph, node.id, self.produces)
 
     def trigger(
@@ -290,8 +277,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             The analysis itself.
 
         Raises:
-            GraphError: For any other target, for a `when` that is not callable, or if one of the
-                two analyses is already running.
+            GraphError: For any other target, for a `when` that is not callable, and in flight.
         """
         if when is not None and not callable(when):
             raise refusal(f"a trigger's `when` is a function of a result, not {when!r}")
@@ -332,14 +318,8 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
         return self._triggers
 
     def _require_idle(self, what: str) -> None:
-        if self.node is not None and self._graph is not None:
-            self._graph.require_idle(self.node, what)
-
-    def _leave_flying(self, graph: Graph) -> None:
-        """Remove the node from the graph after a failed start in flight."""
-        if graph.flying and self.node is not None:
-            graph.nodes.pop(self.node.id, None)
-            self.node = None
+        if self._graph is not None:
+            self._graph.require_idle(what)
 
     def _node_in(self, graph: Graph, robot: str | None) -> Node:
         self._graph = graph

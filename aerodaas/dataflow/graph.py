@@ -147,11 +147,15 @@ class Graph:
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
         self.on_launch: list[Callable[[], None]] = []
         """Called once the streams are live."""
-        self.on_growth: Callable[[], None] | None = None
-        """Starts additions in flight; set by the runtime while a mission runs."""
+        self.flying = False
+        """Whether a mission runs by this graph, which takes no additions then; set by the run."""
 
     def add(self, node: Node) -> Node:
-        """Add a node, giving it a fresh id where its own is taken by another."""
+        """Add a node, giving it a fresh id where its own is taken by another.
+
+        Raises GraphError, with the application's line, while a mission flies.
+        """
+        self.require_idle(f"add {node.id}")
         base, count = node.id, 2
         while node.id in self.nodes or (node.kind != "sensor" and node.id in self._sensors):
             node.id = f"{base}_{count}"
@@ -190,40 +194,10 @@ class Graph:
         ]
         return list(dict.fromkeys(texts))
 
-    @property
-    def flying(self) -> bool:
-        """Whether a mission runs by this graph."""
-        return self.on_growth is not None
-
-    def launch(self, node: Node) -> None:
-        """Start `node`, which was just added, if a mission runs; it is taken out if that fails.
-
-        Raises what the runtime raises.
-        """
-        if self.on_growth is None:
-            return
-        try:
-            self.on_growth()
-        except BaseException:
-            del self.nodes[node.id]
-            raise
-
-    def require_idle(self, node: Node, what: str) -> None:
-        """Require that a node does not run yet.
-
-        Args:
-            node: The node.
-            what: What is too late once it runs, for the error.
-
-        Raises:
-            GraphError: With the application's line, if it runs already.
-        """
-        if self.flying and node.id in self.nodes:
-            message = (
-                f"{node.id} runs already, too late to {what}; do that before analyse(), or with a "
-                "further analysis"
-            )
-            raise refusal(message)
+    def require_idle(self, what: str) -> None:
+        """Raise GraphError, with the application's line, if it is too late to do `what`."""
+        if self.flying:
+            raise refusal(f"the mission flies, too late to {what}: do that before start_mission()")
 
     def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
         """Draw an edge.

@@ -66,12 +66,14 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         return str(known[name])
 
     def get_data_stream(self) -> AeroStreamData[E]:
-        """Return the stream of the sensor's data; in flight, a camera that is off is started."""
+        """Return the stream of the sensor's data.
+
+        Raises GraphError in flight for a camera that is off.
+        """
         name = self._config.full_id
         item = SENSOR_ITEMS[self._config.type]
         if name not in self._graph.nodes:
-            node = self._graph.add(Node(name, "sensor", item, self._config, self._config.robot))
-            self._graph.launch(node)
+            self._graph.add(Node(name, "sensor", item, self._config, self._config.robot))
         return AeroStreamData(self._graph, name, item)
 
     def subscribe(self, callback: Callable[[E], None]) -> None:

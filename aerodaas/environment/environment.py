@@ -15,6 +15,7 @@ from aerodaas.dataflow.graph import Graph, NavigationEdge, application_line
 from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.actuators import require_actuators
 from aerodaas.environment.mission_run import MissionRun
 from aerodaas.environment.offering import BuildOnlyMission, note_built, offer
@@ -280,13 +281,11 @@ class Environment(PaperNames, IEnvironment):
     ) -> None:
         """Plug in the trajectory scheduler: a name, `module:Class`, a class, or an instance.
 
-        In flight, the whole queue is planned again by it. Raises UnknownIdError for a name that
-        there is not, ConfigError for what is no scheduler.
+        Raises UnknownIdError for a name that there is not, ConfigError for what is no scheduler,
+        GraphError in flight.
         """
-        checked = self._trajectory_scheduler(scheduler)
-        if self._mission is not None and self.graph.flying:
-            self._mission.use_scheduler(checked)
-        self._trajectory = self.chosen_trajectory = checked
+        self.graph.require_idle("plug in a trajectory scheduler")
+        self._trajectory = self.chosen_trajectory = self._trajectory_scheduler(scheduler)
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
         """Plug in the analytics scheduler: a name, `module:Class`, or an instance.
@@ -362,16 +361,13 @@ class Environment(PaperNames, IEnvironment):
                 _addressee(entry, flying)
             return False
         robot = _addressee(entry, flying)
-        self._require_flying(robot)
-        if entry.navigation.stream is None:
-            self.command(
-                robot,
-                AddNavigation(
-                    entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
-                ),
-            )
-        else:
-            self.fly_by(_edge(robot, entry))
+        self._require_flying(robot, entry.navigation)
+        self.command(
+            robot,
+            AddNavigation(
+                entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
+            ),
+        )
         return True
 
     def fly_by(self, edge: NavigationEdge) -> None:
@@ -380,22 +376,18 @@ class Environment(PaperNames, IEnvironment):
         Raises GraphError for what cannot be added in flight, MissionError for what the mission
         refuses.
         """
-        graph = self.graph
         require_actuators(self.config, edge)
-        self._require_flying(edge.robot)
-        graph.navigation.append(edge)
-        if graph.on_growth is None:
-            return
-        try:
-            graph.on_growth()
+        self._require_flying(edge.robot, edge.navigation)
+        if self.graph.flying:
             for command in initial_commands([edge]):
                 self.command(edge.robot, command)
-        except BaseException:
-            graph.navigation.remove(edge)
-            raise
+        self.graph.navigation.append(edge)
 
-    def _require_flying(self, robot: str) -> None:
+    def _require_flying(self, robot: str, navigation: AeroNavigation) -> None:
+        """Raise GraphError for a robot or a stream that did not take off with the mission."""
         graph = self.graph
+        if navigation.stream is not None:
+            graph.require_idle(f"navigate by {navigation.stream.name}")
         if graph.flying and robot not in {one.robot for one in graph.navigation}:
             raise GraphError(
                 f"{robot} cannot join a mission in flight: call navigate() for every robot "

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
 from aerodaas.mission.commands import Answer, Command
-
-if TYPE_CHECKING:
-    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["MissionRun", "recording_folder", "recording_path"]
 
@@ -47,10 +44,6 @@ class MissionRun(Protocol):
         Raises:
             MissionError: Once the run is over.
         """
-        ...
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
-        """Have all robots plan by `scheduler` from now on; raises the project's errors."""
         ...
 
     def wait(self) -> None:

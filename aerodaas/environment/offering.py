@@ -23,7 +23,6 @@ from aerodaas.mission.commands import Command
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
-    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = [
     "BuildEndedError",
@@ -164,11 +163,6 @@ class BuildOnlyMission(MissionRun):
     def command(self, robot: str, command: Command) -> NoReturn:
         """Refuse a command."""
         del robot, command
-        self.refuse()
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> NoReturn:
-        """Refuse a scheduler for a mission in flight."""
-        del scheduler
         self.refuse()
 
     def read(self, stream: str) -> NoReturn:

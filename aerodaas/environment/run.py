@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from aerodaas.runtime.live import LiveReader
     from aerodaas.runtime.plan import FlightPlan
     from aerodaas.runtime.reports import ActorReport, FlightState
-    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
     from aerodaas.service.own.flight import OwnFlight
     from aerodaas.service.own.server import FlightServer
     from aerodaas.terminal.console import FlightView
@@ -86,8 +85,6 @@ class Run:
         self._api: OwnFlight | None = None
         self._console: FlightServer | None = None
         self._servers: list[FlightServer] = []
-        self._remote = False
-        """Whether one of them is for a remote user."""
         self._environment = environment
         self._flight: Flight | InlineFlight | None = None
         self._view: FlightView
@@ -171,7 +168,7 @@ class Run:
         for text in self.graph.unused:
             flight.publish_alert("unused", text)
         self.graph.reader = read
-        self.graph.on_growth = self.grow
+        self.graph.flying = True
         for callback in self.graph.on_launch:
             callback()
         threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
@@ -237,7 +234,7 @@ class Run:
         self._listen_for_remote()
 
     def _listen_for_remote(self) -> None:
-        """Listen for a remote user, once the application has asked for it."""
+        """Listen for a remote user, if the application asks for it."""
         from aerodaas.analytics.remote import RemoteAnalytics  # noqa: PLC0415 - slow to load
 
         works = (node.work for node in self.graph.nodes.values())
@@ -249,11 +246,9 @@ class Run:
                 "one API serves all robots of a flight: give each RemoteAnalytics the same "
                 "address and token"
             )
-        if not self._remote:
-            from aerodaas.service.own.server import FlightServer  # noqa: PLC0415 - only where asked
+        from aerodaas.service.own.server import FlightServer  # noqa: PLC0415 - only where asked
 
-            self._servers.append(FlightServer.of_remote(wanted[0]))
-            self._remote = True
+        self._servers.append(FlightServer.of_remote(wanted[0]))
 
     def _serve(self) -> None:
         """Serve the flight, which has begun, by each server that does not serve it yet."""
@@ -286,7 +281,8 @@ class Run:
             MissionError: Once the run is over.
             ConfigError: For what cannot be listened on.
         """
-        self._flying("there is nothing to be watched")
+        if self._flight is None or self._over:
+            raise MissionError("the mission is over: there is nothing to be watched")
         require_extra("remote", "the console")
         check_served("address", address)
         if self._console is None:
@@ -318,38 +314,6 @@ class Run:
     def over(self) -> bool:
         """True once every mission has ended."""
         return self._over
-
-    def grow(self) -> None:
-        """Start the graph's additions; raises the reason if that is impossible."""
-        from aerodaas.runtime.plan import (  # noqa: PLC0415 - ray only where it is needed
-            make_plan,
-        )
-
-        flight = self._flying("nothing can be added")
-        self._change_models()
-        self._listen_for_remote()
-        flight.add_definitions(self._application())
-        flight.grow(
-            make_plan(
-                flight.plan.session,
-                self.graph,
-                self._environment.compute(),
-                self._environment.trajectory_scheduler(),
-                self._environment.analytics_scheduler(),
-            )
-        )
-        self._serve()
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
-        """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
-        flight = self._flying("no scheduler can be set")
-        flight.add_definitions(self._application(scheduler))
-        flight.use_scheduler(scheduler)
-
-    def _flying(self, hence: str) -> Flight | InlineFlight:
-        if self._flight is None or self._over:
-            raise MissionError(f"the mission is over: {hence}")
-        return self._flight
 
     def poll(self, newest: int = 200) -> FlightState:
         """Return the present state, with the `newest` latencies of each robot."""
@@ -450,8 +414,8 @@ class Run:
             rehearse(spec.robot, spec.initial, self.config, spec.scheduler)
         return plan
 
-    def _application(self, *others: object) -> Any:  # noqa: ANN401 - the actors' own
-        """Definitions of the application for actors, those of `others` included; None inline.
+    def _application(self) -> Any:  # noqa: ANN401 - the actors' own
+        """Definitions of the application for actors; None inline.
 
         Raises GraphError, with the name, for an object that cannot be sent: inline, too, so that
         what flies in simulated time flies in real time.
@@ -459,7 +423,7 @@ class Run:
         from aerodaas.runtime.sending import require_sendable  # noqa: PLC0415
 
         environment = self._environment
-        used = (environment.trajectory_scheduler(), environment.analytics_scheduler(), *others)
+        used = (environment.trajectory_scheduler(), environment.analytics_scheduler())
         plugins = [one for one in used if one is not None]
         application = None
         if self._uses_ray:
@@ -552,7 +516,7 @@ class Run:
         assert self._flight is not None  # noqa: S101 - launched
         self._finished.set()
         self._over = True
-        self.graph.on_growth = None
+        self.graph.flying = False
         atexit.unregister(self.abandon)
         self._close_servers()
         flown = time.monotonic() - self._launched

@@ -394,10 +394,6 @@ class Mission:
         if self._obeyed:
             self._supervisor.motion.command(request, setpoint)
 
-    def use_planner(self, planner: Planner) -> None:
-        """Plan with `planner` from now on, beginning with the whole queue."""
-        self._navigator.use_planner(planner)
-
     def vehicle_refused(self, text: str) -> None:
         """Record that the vehicle refused a request; `text` is the vehicle's message."""
         if self.state is MissionState.TAKING_OFF:

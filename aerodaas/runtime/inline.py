@@ -99,7 +99,7 @@ class Tap:
 class _Entry:
     node: Node
     part: Part
-    positions: dict[str, int] = field(default_factory=dict)
+    positions: dict[str, int]
     """Place of each stream's messages in one step."""
     inbox: list[Message[Any]] = field(default_factory=list)
     due: int = NEVER
@@ -140,38 +140,18 @@ class InlineExecutor:
         """
         group = self.parts.setdefault(part, Part(part, self))
         for node in nodes:
-            entry = _Entry(node, group)
+            entry = _Entry(node, group, {stream: at for at, stream in enumerate(node.reads)})
             group.nodes.append(node)
             self._entries.append(entry)
-            self.subscribe(node)
+            for stream in node.reads:
+                self._readers.setdefault(stream, []).append(entry)
             if first:
                 self._first.append(entry)
 
     def order(self, nodes: Sequence[Node]) -> None:
-        """Set the order in which ready nodes are stepped, once nodes were added in flight."""
+        """Set the order in which ready nodes are stepped, in the place of that of adding."""
         places = {id(node): place for place, node in enumerate(nodes)}
-        # A new list: another thread may look for a part's entries meanwhile.
-        self._entries = sorted(self._entries, key=lambda entry: places[id(entry.node)])
-
-    def remove(self, nodes: Iterable[Node]) -> None:
-        """Remove nodes, which have not been started."""
-        gone = set(map(id, nodes))
-        self._entries = [entry for entry in self._entries if id(entry.node) not in gone]
-        for readers in self._readers.values():
-            readers[:] = [entry for entry in readers if id(entry.node) not in gone]
-        for part in list(self.parts.values()):
-            part.nodes = [node for node in part.nodes if id(node) not in gone]
-            if not part.nodes:
-                del self.parts[part.name]
-
-    def subscribe(self, node: Node) -> None:
-        """Deliver the messages of all streams that an added node reads now."""
-        entry = self._entry(node)
-        entry.positions = {stream: place for place, stream in enumerate(node.reads)}
-        for stream in node.reads:
-            readers = self._readers.setdefault(stream, [])
-            if entry not in readers:
-                readers.append(entry)
+        self._entries.sort(key=lambda entry: places[id(entry.node)])
 
     def _entry(self, node: Node) -> _Entry:
         return next(entry for entry in self._entries if entry.node is node)

@@ -21,28 +21,25 @@ from aerodaas.messages.mission import RobotStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import read_vitals
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.mission.navigation.planner import InlinePlanner, Planner
+from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.recording.provenance import Provenance
 from aerodaas.runtime.dispatch.simulated import SimulatedDispatcher
-from aerodaas.runtime.growth import growth
 from aerodaas.runtime.inline import InlineExecutor
 from aerodaas.runtime.live import LiveReader
 from aerodaas.runtime.node import NEVER, Node
 from aerodaas.runtime.nodes.analysis import AnalysisSpec
-from aerodaas.runtime.nodes.camera import CameraNode
-from aerodaas.runtime.nodes.controller import RobotSpec
+from aerodaas.runtime.nodes.controller import MakePlanner
 from aerodaas.runtime.nodes.drone import DroneNode
 from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.nodes.recorder import RecorderNode
 from aerodaas.runtime.plan import ActorPlan, CameraSpec, FlightPlan
 from aerodaas.runtime.reports import ActorReport, FlightState
 from aerodaas.runtime.session import Session
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["InlineFlight"]
 
 _ANSWER_TIMEOUT = 60.0
-"""Wall seconds within which a call is served: between two moments, one may open a model."""
+"""Wall seconds within which a call is served, between two moments."""
 _STOP_TIMEOUT = 5.0
 """Wall seconds within which the step under way returns once the flight is stopped."""
 _REPORT_INTERVAL = 0.02
@@ -138,7 +135,7 @@ class InlineFlight:
         """What of the robots the application is told at once."""
         self._notes: list[Alert] = []
 
-    def _add(self, actor: ActorPlan) -> list[Node]:
+    def _add(self, actor: ActorPlan) -> None:
         """Add the cameras and analyses of an actor as one part."""
         session, proxies = self.plan.session, self._proxies
         cameras: dict[str, Node] = {}
@@ -154,9 +151,7 @@ class InlineFlight:
             analyses[spec.stream] = proxy or own.make(session)
         self._cameras |= cameras
         self._analyses |= analyses
-        nodes = [*cameras.values(), *analyses.values()]
-        self._executor.add(actor.name, nodes)
-        return nodes
+        self._executor.add(actor.name, [*cameras.values(), *analyses.values()])
 
     def _nodes(self) -> list[Node]:
         """All nodes in the order in which ready ones are stepped."""
@@ -319,57 +314,6 @@ class InlineFlight:
             # By the drone's stream of alerts, which is recorded.
             self._executor.parts[self._drone.name].alert(kind, text)
 
-    def add_definitions(self, application: object) -> None:
-        """Do nothing: every definition of the application is in this process."""
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
-        """Use the trajectory scheduler `scheduler` for all robots from now on."""
-        drone = self._drone
-        if drone is not None:
-            planners = drone.planners_of(scheduler)
-            self._calls.ask(lambda: drone.use_planners(planners), _ANSWER_TIMEOUT)
-
-    def grow(self, plan: FlightPlan) -> None:
-        """Continue with `plan`, that of the current graph.
-
-        Raises GraphError for a change that is impossible in flight, and the errors of a new
-        node's opening; the run then continues unchanged.
-        """
-        self._calls.ask(lambda: self._grow(plan), _ANSWER_TIMEOUT)
-        self.plan = plan
-
-    def _grow(self, plan: FlightPlan) -> None:
-        change, executor = growth(self.plan, plan), self._executor
-        fresh: list[Node] = []
-        try:
-            for actor in (*change.actors, *change.joining):
-                fresh += self._add(actor)
-            executor.order(self._nodes())
-            executor.open(fresh)
-        except BaseException:
-            for node in fresh:
-                node.close()
-            executor.remove(fresh)
-            self._cameras = {
-                stream: node for stream, node in self._cameras.items() if node not in fresh
-            }
-            self._analyses = {
-                stream: node for stream, node in self._analyses.items() if node not in fresh
-            }
-            raise
-        for stream, ends in change.ending.items():
-            camera = self._cameras[stream]
-            if isinstance(camera, CameraNode):
-                camera.ends = ends
-        if self._drone is not None:
-            for specs in change.drones:
-                self._drone.grow(specs, plan.observed, executor.clock.now())
-            executor.subscribe(self._drone)
-        if self._recorder is not None:
-            self._recorder.reads.update(change.recorded)
-            executor.subscribe(self._recorder)
-        executor.start(fresh)
-
     def end_sensing(self) -> None:
         """End a run without drones, which otherwise goes on as long as its cameras."""
         self._sensed = True
@@ -413,10 +357,10 @@ class InlineFlight:
         self.stop()
 
 
-def _planner_maker() -> Callable[[RobotSpec, TrajectoryScheduler], Planner]:
+def _planner_maker() -> MakePlanner:
     """A maker of planners that plan in the loop itself, with one copy of each scheduler."""
     memo: dict[int, object] = {}
-    return lambda _, scheduler: InlinePlanner(copy.deepcopy(scheduler, memo))
+    return lambda spec: InlinePlanner(copy.deepcopy(spec.scheduler, memo))
 
 
 def _by_dependence(nodes: Mapping[str, Node]) -> list[Node]:

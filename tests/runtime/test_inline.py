@@ -1,4 +1,4 @@
-"""The inline executor: order of steps, delivery of messages, failures, growth and the end."""
+"""The inline executor: order of steps, delivery of messages, failures and the end."""
 
 from __future__ import annotations
 
@@ -339,50 +339,6 @@ def test_a_tap_keeps_the_newest_messages_for_a_slow_thread() -> None:
     kept = [message.item for message in tap.receive(0.0)]
     assert kept == list(range(1000 - len(kept), 1000))
     assert 0 < len(kept) < 1000
-
-
-def test_nodes_join_in_flight() -> None:
-    """They read what is published from then on, and stand where `order` places them."""
-    log: Steps = []
-    source = Recorder("source", log=log, period=10, react=lambda now, _: [now])
-    last = Recorder("last", "source", "joined", log=log)
-    executor = started(source, last)
-    run(executor, 20)
-    log.clear()
-    joined = Recorder("joined", "source", log=log, react=lambda _, got: [-got[0]])
-    executor.add("joined", [joined])
-    executor.order([source, joined, last])
-    executor.open([joined])
-    executor.start([joined])
-    run(executor, 30)
-    assert log == [("source", 30, []), ("joined", 30, [30]), ("last", 30, [30, -30])]
-    assert executor.publishes("joined")
-
-
-def test_a_node_listens_to_further_streams_once_it_has_subscribed() -> None:
-    """As one does whose graph has grown; no message comes twice."""
-    source = Recorder("source", period=10, react=lambda now, _: [now])
-    reader = Recorder("reader")
-    executor = started(source, reader)
-    run(executor, 10)
-    reader.reads["source"] = 8
-    executor.subscribe(reader)
-    executor.subscribe(reader)
-    run(executor, 30)
-    assert [item_of(message) for message in reader.received] == [20, 30]
-
-
-def test_nodes_that_could_not_be_opened_are_removed() -> None:
-    """Nothing of them is left: no part, no stream, no step."""
-    source = Recorder("source", period=10, react=lambda now, _: [now])
-    executor = started(source)
-    fresh = Recorder("fresh", "source", period=5)
-    executor.add("fresh", [fresh])
-    executor.remove([fresh])
-    run(executor, 30)
-    assert list(executor.parts) == ["source"]
-    assert not executor.publishes("fresh")
-    assert fresh.log == []
 
 
 def test_retired_nodes_get_nothing_more() -> None:

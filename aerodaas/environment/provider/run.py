@@ -7,7 +7,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from aerodaas.clock import seconds
 from aerodaas.config.extras import require_extra
@@ -36,7 +36,6 @@ from aerodaas.runtime.checks import check_graph
 if TYPE_CHECKING:
     from aerodaas.environment.document.compiling import WrittenMission
     from aerodaas.environment.environment import Environment
-    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
     from aerodaas.terminal.provided import ProvidedView
 
 __all__ = ["ProvidedRun"]
@@ -131,9 +130,8 @@ class ProvidedRun:
                 return WireReader(self._client, follower, stream)
             return WireReader(self._client, follower, stream, here.revealed)
 
-        self._nodes = known
         self.graph.reader = read
-        self.graph.on_growth = self.grow
+        self.graph.flying = True
         atexit.register(self.abandon)
         for callback in self.graph.on_launch:
             callback()
@@ -143,22 +141,6 @@ class ProvidedRun:
         if self.over or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return send_command(self._client, self._id, robot, command)
-
-    def grow(self) -> None:
-        """Take further waypoints, which follow as commands; raises GraphError for anything else."""
-        added = [name for name in self.graph.nodes if name not in self._nodes]
-        if added:
-            raise GraphError(
-                f"{', '.join(added)}: a mission that a provider flies takes no further sensors or "
-                "analyses: build them before start_mission()"
-            )
-
-    def use_scheduler(self, scheduler: TrajectoryScheduler) -> NoReturn:
-        """Refuse: the provider plans by what it was given."""
-        raise GraphError(
-            f"{type(scheduler).__name__} cannot be set while a provider flies the mission: call "
-            "set_trajectory_scheduler before start_mission()"
-        )
 
     def wait(self) -> None:
         """Watch until the mission has ended; raises the error that it ended with.
@@ -305,7 +287,7 @@ class ProvidedRun:
         from aerodaas.terminal.console import show_results, show_speed  # noqa: PLC0415 - slow
 
         self._finished.set()
-        self.graph.on_growth = None
+        self.graph.flying = False
         atexit.unregister(self.abandon)
         self._close()
         mission = self._following.mission

@@ -162,12 +162,6 @@ class Navigator:
         valid_for = round(min(command.valid_for, self._command_timeout) * NANOSECONDS)
         self.command = LiveCommand(command, now + valid_for, cause)
 
-    def use_planner(self, planner: Planner) -> None:
-        """Plan with `planner` from now on, beginning with the whole queue."""
-        self._planner = planner
-        self._unanswered = None
-        self._unplanned |= {stop.waypoint.priority for stop in self.queue}
-
     def clear(self) -> list[str]:
         """Discard all queued and interrupted waypoints and the live command; returns the ids."""
         self.command = None

@@ -131,7 +131,7 @@ class BackgroundPlanner(_SchedulerPlanner):
     """
 
     def __init__(self, scheduler: TrajectoryScheduler, executor: Executor | None = None) -> None:
-        """Plan with `scheduler` on `executor`, which is shut down by `close`."""
+        """Plan with `scheduler` on `executor`; None for a thread."""
         super().__init__(scheduler)
         self._executor = executor or ThreadPoolExecutor(1, "planner")
         self._running: Future[Plan] | None = None
@@ -159,10 +159,6 @@ class BackgroundPlanner(_SchedulerPlanner):
         )
         self._begin()
         return plan
-
-    def close(self) -> None:
-        """Release the executor; a plan being made is not waited for."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def _begin(self) -> None:
         request, self._waiting = self._waiting, None

@@ -34,7 +34,7 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.navigation.planner import BackgroundPlanner, Planner
+from aerodaas.mission.navigation.planner import Planner
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.ground_clearance import GroundClearance
 from aerodaas.mission.safety.neighbours import Neighbour
@@ -90,7 +90,7 @@ class RobotSpec:
     scheduler: TrajectoryScheduler
 
 
-MakePlanner: TypeAlias = Callable[["RobotSpec", TrajectoryScheduler], Planner]
+MakePlanner: TypeAlias = Callable[["RobotSpec"], Planner]
 
 
 class VehicleController:
@@ -109,7 +109,7 @@ class VehicleController:
             spec: The robot.
             session: The run.
             publish: Called with each message to publish.
-            make_planner: Makes the planner of a trajectory scheduler.
+            make_planner: Makes the planner of the robot's trajectory scheduler.
         """
         self._send = publish
         self._make_planner = make_planner
@@ -149,10 +149,9 @@ class VehicleController:
         sea_level = self._sea_level()
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
-        self._planner = self._make_planner(self.spec, self.spec.scheduler)
         self.mission = Mission(
             robot,
-            self._planner,
+            self._make_planner(self.spec),
             takeoff=takeoff,
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
@@ -196,21 +195,6 @@ class VehicleController:
             # cycle, at 0 s, publishes it.
             self._publish(state_stream(self.id), self.state, clock.now())
         self.handle(Start(), clock.now())
-
-    def grow(self, spec: RobotSpec) -> None:
-        """Accept the further streams of `spec`."""
-        self.spec = spec
-
-    def use_planner(self, planner: Planner) -> None:
-        """Use `planner` from now on, starting with the current queue."""
-        former, self._planner = self._planner, planner
-        self.mission.use_planner(planner)
-        if isinstance(former, BackgroundPlanner):
-            former.close()
-
-    def planner_of(self, scheduler: TrajectoryScheduler) -> Planner:
-        """Create the planner of another scheduler; it may take seconds to start."""
-        return self._make_planner(self.spec, scheduler)
 
     def advance_to(self, stamp: int) -> None:
         """Advance a simulated vehicle's time."""

@@ -13,13 +13,11 @@ from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import RobotStatus
 from aerodaas.mission.commands import Answer, Command, ReturnHome
-from aerodaas.mission.navigation.planner import Planner
 from aerodaas.mission.safety.neighbours import SILENT, Neighbours, Whereabouts
 from aerodaas.runtime.node import NEVER, Host, Node
 from aerodaas.runtime.nodes.controller import MakePlanner, RobotSpec, VehicleController
 from aerodaas.runtime.session import CONTROL_RATE, MESSAGE_DEPTH, Session, next_due
 from aerodaas.runtime.stream_names import whereabouts_stream
-from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["DroneNode", "failure_of"]
 
@@ -43,7 +41,7 @@ class DroneNode(Node):
             session: The run.
             name: Name of the node.
             robots: Robots that share the loop.
-            make_planner: Makes the planner of a trajectory scheduler.
+            make_planner: Makes the planner of a robot's trajectory scheduler.
             neighbours: Names of the other drone nodes, from whose robots to keep separation.
             observed: Rates in Hz, by source, of what measures a simulated vehicle: its state is
                 published at each of their times, too. None where vehicles are observed once a
@@ -232,35 +230,6 @@ class DroneNode(Node):
         for controller in self._controllers.values():
             if not controller.over:
                 controller.abandon()
-
-    def grow(
-        self, robots: tuple[RobotSpec, ...], observed: Mapping[str, float] | None, now: int
-    ) -> None:
-        """Use the further streams and sources of a graph that has grown.
-
-        Args:
-            robots: The same robots, with all streams of the new graph.
-            observed: As in the constructor, for the new graph.
-            now: Mission time, nanoseconds.
-        """
-        for spec in robots:
-            self._controllers[spec.robot.id].grow(spec)
-        self.reads.update(dict.fromkeys(_streams(robots), MESSAGE_DEPTH))
-        self._specs, self._observed = robots, observed
-        for source in observed or ():
-            if source not in self._observed_at:
-                self._observed_at[source] = self._next_measurement(source, now)
-
-    def planners_of(self, scheduler: TrajectoryScheduler) -> dict[str, Planner]:
-        """Create planners of another scheduler, by robot; may take seconds."""
-        return {
-            name: controller.planner_of(scheduler) for name, controller in self._controllers.items()
-        }
-
-    def use_planners(self, planners: Mapping[str, Planner]) -> None:
-        """Plan with `planners`, by robot, from now on."""
-        for name, planner in planners.items():
-            self._controllers[name].use_planner(planner)
 
     @property
     def over(self) -> bool:
