@@ -18,7 +18,6 @@ from tools.emulated import LONGEST_LEAP, EmulatedVehicle
 from tools.mavlink_vehicle.actuators import SILENT
 from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
 from tools.mavlink_vehicle.components import EmulatedComponent
-from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
@@ -32,7 +31,7 @@ _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
 _ROUNDING = 1e-6
-_Answerer: TypeAlias = ParameterStore | PlanStore | LogStore | FileServer | TimeKeeper
+_Answerer: TypeAlias = ParameterStore | PlanStore | LogStore | TimeKeeper
 _STORED: dict[str, Callable[[Firmware], _Answerer]] = {
     **dict.fromkeys(
         ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"),
@@ -49,7 +48,6 @@ _STORED: dict[str, Callable[[Firmware], _Answerer]] = {
         lambda firmware: firmware.plans,
     ),
     **dict.fromkeys(("LOG_REQUEST_DATA", "LOG_REQUEST_LIST"), lambda firmware: firmware.logs),
-    "FILE_TRANSFER_PROTOCOL": lambda firmware: firmware.files,
     "TIMESYNC": lambda firmware: firmware.time_keeper,
 }
 """What answers to a message."""

@@ -16,7 +16,6 @@ from aerodaas.messages.vehicle import VehicleMode
 from tools.mavlink_vehicle.actuators import EmulatedActuators
 from tools.mavlink_vehicle.aircraft import EmulatedTraffic
 from tools.mavlink_vehicle.extras import Extras
-from tools.mavlink_vehicle.files import FileServer
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
@@ -79,7 +78,7 @@ class Firmware(ABC):
         self.parameters = parameters
         parameters.values.update(options.parameters)
         self.plans = PlanStore(wants_numbers=self.wants_numbers)
-        self.logs, self.files = LogStore(), FileServer()
+        self.logs = LogStore()
         self.time_keeper = TimeKeeper(lambda: self.now)
         self.route = Route(
             flight,
@@ -274,7 +273,6 @@ class Firmware(ABC):
         self.stop_motors()
         self.now, self._setpoint_at, self.gps_lost_at = 0.0, -math.inf, None
         self.rates = dict(self.default_rates)
-        self.files.restart()
         self.flight.begin_frame_here()
         self.home = self.flight.ned
         self.forget_mode()

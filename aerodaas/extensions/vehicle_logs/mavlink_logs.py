@@ -1,9 +1,8 @@
-"""List and download of the autopilot's own logs: by MAVLink FTP, or else by LOG_REQUEST_DATA."""
+"""List and download of the autopilot's own logs, by LOG_REQUEST_DATA."""
 
 from __future__ import annotations
 
 import contextlib
-import logging
 import queue
 import time
 from collections.abc import Callable, Iterator
@@ -21,13 +20,10 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.errors import VehicleError
 from aerodaas.extensions.vehicle_logs.dataflash import DATAFLASH_HEAD
-from aerodaas.extensions.vehicle_logs.log_files import FileTransfer, fetch_file, find_file
 from aerodaas.extensions.vehicle_logs.log_service import LogEntry
 from aerodaas.extensions.vehicle_logs.ulog import ULOG_HEAD
 
 __all__ = ["MavlinkLogs"]
-
-_log = logging.getLogger(__name__)
 
 _TIMEOUT = 1.0
 """Seconds of silence after which is asked again."""
@@ -55,13 +51,11 @@ class _LogFormat:
     begin_until: tuple[int, int]
     """Version from which the time that the autopilot tells of a log is when it was last written;
     before, when it began."""
-    folders: tuple[str, ...]
-    """Where logs may lie: on its card, and in its simulator's folder."""
 
 
 _FORMATS = {
-    PX4.name: _LogFormat(".ulg", ULOG_HEAD, (1, 16), ("/fs/microsd/log", "/log")),
-    ArduPilot.name: _LogFormat(".bin", DATAFLASH_HEAD, (0, 0), ("/APM/LOGS", "/logs")),
+    PX4.name: _LogFormat(".ulg", ULOG_HEAD, (1, 16)),
+    ArduPilot.name: _LogFormat(".bin", DATAFLASH_HEAD, (0, 0)),
 }
 
 
@@ -131,14 +125,7 @@ class MavlinkLogs:
         file = folder / f"log-{log.number}{_when(log)}{form.suffix}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            transfer = FileTransfer(link)
-            path = self._path(transfer, log)
-            if path is not None:
-                # Not by its time: of the log that is written last, ArduPilot tells the present one.
-                part = folder / f"log-{log.number}-{log.size}.part"
-                fetch_file(transfer, path, log.size, file, part, told)
-            else:
-                _write(link, log, file, told)
+            _write(link, log, file, told)
             with file.open("rb") as written:
                 head = written.read(len(form.head))
         except OSError as error:
@@ -149,16 +136,6 @@ class MavlinkLogs:
                 "its card may be damaged"
             )
         return file
-
-    def _path(self, transfer: FileTransfer, log: LogEntry) -> str | None:
-        """Its path for MAVLink FTP; None where it is to be fetched by its number."""
-        if not self._vehicle.telemetry.serves_files:
-            return None
-        try:
-            return find_file(transfer, self._format.folders, self._format.suffix, log.size)
-        except VehicleError as error:
-            _log.warning("%s: its log is fetched by LOG_REQUEST_DATA", error)
-            return None
 
 
 def _write(link: MavlinkLink, log: LogEntry, file: Path, progress: Progress) -> None:

@@ -19,6 +19,7 @@ from aerodaas.errors import VehicleError
 from aerodaas.extensions.vehicle_logs.log_service import LogEntry
 from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
 from aerodaas.recording.reader import Recording
+from aerodaas.testing.channel import Impairment
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.store import LogStore
 
@@ -154,6 +155,32 @@ def test_not_in_flight(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None
             deed()
     connection.commander.give(connection.autopilot.disarm(), now=pair.now)
     pair.wait(lambda: not pair.vehicle.read().armed)
+
+
+def test_a_pilot_takes_off_in_between(pair: Stepped, logs: MavlinkLogs, tmp_path: Path) -> None:
+    """The link is needed: no more is asked for."""
+    connection = pair.vehicle.connection
+
+    def arm(done: int, _: int) -> None:
+        if done >= 30_000:
+            connection.commander.give(connection.autopilot.arm(), now=pair.now)
+            pair.wait(lambda: pair.vehicle.read().armed)
+
+    with pytest.raises(VehicleError, match="cannot fetch logs in flight"):
+        logs.fetch_log(LogEntry(2, len(DATAFLASH), BEGAN), tmp_path, arm)
+    assert max(one.ofs for one in pair.heard("LOG_REQUEST_DATA")) < 72_000
+    connection.commander.give(connection.autopilot.disarm(), now=pair.now)
+    pair.wait(lambda: not pair.vehicle.read().armed)
+
+
+def test_lost_doubled_and_overtaken_packets(
+    pair: Stepped, logs: MavlinkLogs, tmp_path: Path
+) -> None:
+    """A twentieth of them, both ways."""
+    bad = Impairment(loss=0.05, duplicates=0.05, jitter=0.02)
+    pair.autopilot.spoil(up=bad, down=bad)
+    log = LogEntry(2, len(DATAFLASH), BEGAN)
+    assert logs.fetch_log(log, tmp_path).read_bytes() == DATAFLASH
 
 
 @pytest.fixture

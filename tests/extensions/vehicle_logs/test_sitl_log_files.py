@@ -1,4 +1,4 @@
-"""Logs of real autopilots in simulation, and by MAVLink FTP as they lie on the disk."""
+"""Logs of real autopilots in simulation."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from pymavlink import DFReader
@@ -17,8 +16,6 @@ from sitl.relay import Relay
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.errors import VehicleError
 from aerodaas.extensions.sitl.process import SitlProcess
 from aerodaas.extensions.sitl.programs import SitlOptions
 from aerodaas.extensions.vehicle_logs.log_service import LogEntry
@@ -63,12 +60,6 @@ def newest_log(vehicle: MavlinkVehicle) -> LogEntry:
     return log
 
 
-def is_burst(message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
-    """Whether it asks for many packets of a file."""
-    burst = mavlink.MAV_FTP_OPCODE_BURSTREADFILE
-    return bool(message.get_type() == "FILE_TRANSFER_PROTOCOL" and message.payload[3] == burst)
-
-
 def around_a_change(vehicle: MavlinkVehicle) -> tuple[float, float]:
     """Seconds of its clock, by TIMESYNC, between which it changes a parameter."""
     deadline = time.monotonic() + 30.0
@@ -90,10 +81,8 @@ def own_time(vehicle: MavlinkVehicle) -> tuple[float, float]:
 
 
 @needs_peer("AERODAAS_ARDUPILOT")
-def test_a_log_comes_down_byte_for_byte(
-    relayed: tuple[str, Relay], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Cut half way and gone on with; over a link that loses, doubles and shuffles packets, too.
+def test_a_log_comes_down_byte_for_byte(relayed: tuple[str, Relay], tmp_path: Path) -> None:
+    """Over a link that loses, doubles and shuffles packets.
 
     Its own times in it are those that TIMESYNC tells.
     """
@@ -102,37 +91,14 @@ def test_a_log_comes_down_byte_for_byte(
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(60.0)
     try:
-        assert vehicle.telemetry.serves_files
         began, ended = around_a_change(vehicle)
         vehicle.parameters.set("LOG_DISARMED", 0.0)
         log = newest_log(vehicle)
         (original,) = (tmp_path / "state" / "logs").glob("*.BIN")
-        link, sent = vehicle.connection.link, list[Any]()
-        send = link.send
-
-        def record(message: Any) -> None:  # noqa: ANN401
-            sent.append(message)
-            send(message)
-
-        monkeypatch.setattr(link, "send", record)
-
-        def cut(done: int, size: int) -> None:
-            if done > size / 2:
-                raise VehicleError("cut")
-
-        with pytest.raises(VehicleError, match="cut; the next fetch goes on from"):
-            MavlinkLogs(vehicle).fetch_log(log, tmp_path, cut)
-        sent.clear()
-        file = MavlinkLogs(vehicle).fetch_log(log, tmp_path)
-        assert file.read_bytes() == original.read_bytes()
-        begins = [bytes(one.payload[8:12]) for one in sent if is_burst(one)]
-        assert int.from_bytes(begins[0], "little") > log.size / 2
-
         bad = Impairment(loss=0.02, duplicates=0.02, jitter=0.01)
         relay.spoil(bad)
-        again = MavlinkLogs(vehicle).fetch_log(log, tmp_path / "again")
-        assert again.read_bytes() == original.read_bytes()
-        assert not [one for one in sent if one.get_type() == "LOG_REQUEST_DATA"]
+        file = MavlinkLogs(vehicle).fetch_log(log, tmp_path)
+        assert file.read_bytes() == original.read_bytes()
     finally:
         vehicle.close()
     reader = DFReader.DFReader_binary(str(file))
@@ -141,7 +107,7 @@ def test_a_log_comes_down_byte_for_byte(
         changes += [message.TimeUS / 1e6] if message.Name == "WP_YAW_BEHAVIOR" else []
     assert began <= changes[-1] <= ended
     print(  # noqa: T201
-        f"\n{file.name}: {file.stat().st_size} bytes by MAVLink FTP; a change between {began:.4f} "
+        f"\n{file.name}: {file.stat().st_size} bytes; a change between {began:.4f} "
         f"and {ended:.4f} s of its clock by TIMESYNC is in it at {changes[-1]:.4f} s"
     )
 

@@ -101,8 +101,6 @@ class Telemetry:
         self.software = self.hardware = ""
         """Its version, and its board's own number in hexadecimal digits; empty before
         AUTOPILOT_VERSION has come, the latter also if it has none."""
-        self.serves_files = False
-        """Whether it said that it has MAVLink FTP."""
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
@@ -312,7 +310,6 @@ class Telemetry:
         self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
         number = bytes(message.uid2)
         self.hardware = number.rstrip(b"\0").hex() or (f"{message.uid:x}" if message.uid else "")
-        self.serves_files = bool(message.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP)
 
     def _mission(self, message: Any, _: float) -> None:  # noqa: ANN401
         self.mission_item = float(message.seq)
