@@ -27,7 +27,6 @@ from aerodaas.protocol.schemas import (
     StreamKind,
 )
 from aerodaas.service import mission as missions
-from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
@@ -157,7 +156,7 @@ class Provider:
             self.registry,
             self.leases,
             self.missions,
-            Accounts(self.store),
+            self.store,
         )
 
     def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401

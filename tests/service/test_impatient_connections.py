@@ -7,6 +7,7 @@ import select
 import socket
 import threading
 import time
+import tracemalloc
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 
@@ -278,6 +279,31 @@ def test_unfinished_messages_are_bounded_for_all_together(
         other.socket.sendall(_masked(5000)[:500])
         with pytest.raises(ConnectionClosed, match="connect again"):
             hoarder.recv(_ENOUGH)
+
+
+def test_fragments_of_a_byte_take_no_multiple_of_their_size(port: int) -> None:
+    """They are joined as they come, each of them an object of forty bytes."""
+    count = 20_000
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as hoarder:
+        tracemalloc.start()
+        hoarder.socket.sendall(b"\x01\x81\x00\x00\x00\x00a")
+        for _ in range(100):
+            hoarder.socket.sendall(b"\x00\x81\x00\x00\x00\x00a" * (count // 100))
+        assert hoarder.ping().wait(_ENOUGH)
+        kept, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert kept < 10 * count
+
+
+def test_a_server_has_so_many_connections(port: int) -> None:
+    """One more is refused while all others have their WebSockets, until one of them ends."""
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH):
+        with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH), client(port) as late:
+            late.sendall(HEAD + b"body")
+            assert late.recv(1000).startswith(b"HTTP/1.1 503")
+        end = time.monotonic() + _ENOUGH
+        while not _answers(port):
+            assert time.monotonic() < end
 
 
 def _masked(size: int) -> bytes:
