@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -20,8 +19,8 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions
 from aerodaas.errors import RecordingError
 from aerodaas.identifiers import is_internal
-from aerodaas.terminal.live import MissionView
-from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
+from aerodaas.terminal.live import FlightDisplay
+from aerodaas.terminal.panels import Snapshot, StreamSnapshot
 
 if TYPE_CHECKING:
     from aerodaas.runtime.reports import FlightState
@@ -74,41 +73,16 @@ class StartupView:
             self._status.update(text)
 
 
-class FlightView:
+class FlightView(FlightDisplay):
     """View of a flight in progress: its alerts at any time, the rest while it is entered."""
 
     def __init__(self, options: RunOptions, config: EnvironmentConfig) -> None:
+        super().__init__(shown=options.view)
         self._title = options.application.stem if options.application else config.name
-        self._view = MissionView() if options.view else None
-        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
         self._printed: set[tuple[str, int, int]] = set()
         """The newest alerts, by source, number and stamp."""
-        self._began = time.monotonic()
         self._before: tuple[float, dict[str, int]] = (0.0, {})
         self._rates: dict[str, float] = {}
-
-    def __enter__(self) -> Self:
-        if self._view is not None:
-            self._view.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._view is not None:
-            self._view.__exit__(kind, error, traceback)
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is redrawn on a terminal, rather than printed line by line."""
-        return self._view is not None and self._view.live
-
-    def say(self, text: str) -> None:
-        """Print a line on standard error."""
-        self._errors.print(text, markup=False)
 
     def print_alerts(self, state: FlightState) -> None:
         """Print a line for each new alert, unless they are shown on the terminal anyway."""
@@ -221,18 +195,22 @@ def show_speed(options: RunOptions, mission: float, wall: float, start: float) -
 
 def show_left(recordings: Sequence[Path]) -> None:
     """Print the fate of drones that still fly when the application ends."""
-    where = _recorded_in(recordings)
-    line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
-    Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
+    text = "a drone is still flying: it comes down by itself, and its processes end then"
+    _warn(text, recordings)
 
 
 def show_headless(head: str, recordings: Sequence[Path]) -> None:
     """Print the end of a run whose cluster has lost its head, at the address `head`."""
-    where = _recorded_in(recordings)
-    line = (
+    text = (
         f"the cluster's head at {head} is out of reach: what runs here for this flight ends by "
-        f"itself within half a minute{where}"
+        "itself within half a minute"
     )
+    _warn(text, recordings)
+
+
+def _warn(text: str, recordings: Sequence[Path]) -> None:
+    places = ", ".join(_shown(path) for path in recordings)
+    line = f"{text}; its recording: {places}" if places else text
     Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 
@@ -288,12 +266,6 @@ def show_results(
 def _print_places(console: Console, places: Iterable[tuple[str, Path]]) -> None:
     for name, path in places:
         console.print(f"{name:>{_NAMES}}  {_shown(path)}", markup=False)
-
-
-def _recorded_in(recordings: Sequence[Path]) -> str:
-    """Where the recording is, to end a line with; empty without one."""
-    places = ", ".join(_shown(path) for path in recordings)
-    return f"; its recording: {places}" if places else ""
 
 
 def _shown(path: Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -12,19 +11,21 @@ from rich.rule import Rule
 from rich.text import Text
 from typing_extensions import Self
 
-from aerodaas.messages.mission import MissionState, RobotStatus
-from aerodaas.terminal.lines import robot_line
-from aerodaas.terminal.panels import alerts_panel, clock_text, robot_panel, streams_panel
-from aerodaas.terminal.snapshot import Snapshot
+from aerodaas.messages.mission import MissionState
+from aerodaas.terminal.panels import (
+    Snapshot,
+    alerts_panel,
+    clock_text,
+    robot_line,
+    robot_panel,
+    streams_panel,
+)
 
-__all__ = ["MissionView"]
+__all__ = ["FlightDisplay", "MissionView"]
 
 _REDRAW = 0.1
 _LINE_EVERY = 5.0
 _WIDEST = 100
-_LONGEST_PATH = 2000
-_STEP = 0.1
-"""Metres between the points of the drawn path."""
 
 
 class MissionView:
@@ -44,7 +45,6 @@ class MissionView:
         self._lines: list[str] = []
         """What was told last of the robots."""
         self._states: dict[str, MissionState] = {}
-        self._paths: dict[str, list[tuple[float, float]]] = {}
 
     def __enter__(self) -> Self:
         if self._console.is_terminal and not self._console.is_dumb_terminal:
@@ -52,12 +52,7 @@ class MissionView:
             self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Leave the last view on the terminal."""
         if self._live is not None:
             if self._last is not None:
@@ -75,8 +70,6 @@ class MissionView:
     def update(self, snapshot: Snapshot) -> None:
         """Show `snapshot`."""
         self._last = snapshot
-        for name, robot in snapshot.robots.items():
-            self._remember(name, robot)
         now = time.monotonic()
         if self._live is not None:
             if now - self._drawn >= _REDRAW:
@@ -92,10 +85,7 @@ class MissionView:
     def render(self, snapshot: Snapshot) -> Panel:
         """The view of a snapshot, at least 72 columns wide."""
         ascii_only = not self._console.encoding.lower().startswith("utf")
-        parts = [
-            robot_panel(name, robot, self._paths.get(name, ()), ascii_only=ascii_only)
-            for name, robot in snapshot.robots.items()
-        ]
+        parts = [robot_panel(name, robot) for name, robot in snapshot.robots.items()]
         # rich draws a rule without a title in Unicode even where the terminal cannot.
         rule = Rule(style="dim", characters="-" if ascii_only else "─")
         if snapshot.streams:
@@ -113,17 +103,6 @@ class MissionView:
             width=min(self._console.width, _WIDEST),
         )
 
-    def _remember(self, name: str, robot: RobotStatus) -> None:
-        if robot.vehicle is None:
-            return
-        east, north, _ = (float(axis) for axis in robot.vehicle.odometry.position)
-        path = self._paths.setdefault(name, [])
-        if path and abs(path[-1][0] - east) + abs(path[-1][1] - north) < _STEP:
-            return
-        path.append((east, north))
-        if len(path) > _LONGEST_PATH:
-            del path[1::2]
-
     def _print(self, snapshot: Snapshot) -> None:
         lines = [robot_line(snapshot, *one) for one in snapshot.robots.items()]
         lines += [snapshot.scheduler] if snapshot.scheduler else []
@@ -131,3 +110,30 @@ class MissionView:
             self._lines = lines
             for line in lines:
                 self._console.print(line, markup=False, soft_wrap=True)
+
+
+class FlightDisplay:
+    """Display of one flight: a view of it where one is wanted, and lines on standard error."""
+
+    def __init__(self, *, shown: bool) -> None:
+        self._view = MissionView() if shown else None
+        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._began = time.monotonic()
+
+    def __enter__(self) -> Self:
+        if self._view is not None:
+            self._view.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._view is not None:
+            self._view.__exit__()
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is redrawn on a terminal, rather than printed line by line."""
+        return self._view is not None and self._view.live
+
+    def say(self, text: str) -> None:
+        """Print a line on standard error."""
+        self._errors.print(text, markup=False)

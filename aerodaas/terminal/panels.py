@@ -1,9 +1,10 @@
-"""Parts of the terminal view, each a function from data to a renderable of rich."""
+"""Parts of the terminal view: a mission at one moment, as text and as renderables of rich."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -13,13 +14,14 @@ from rich.text import Text
 
 from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus, RobotStatus
 from aerodaas.messages.vehicle import VehicleState
-from aerodaas.terminal.plan import braille_plan
-from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
 
 __all__ = [
+    "Snapshot",
+    "StreamSnapshot",
     "alerts_panel",
     "clock_text",
     "place_text",
+    "robot_line",
     "robot_panel",
     "streams_panel",
     "waypoints_text",
@@ -33,8 +35,44 @@ _STYLES = {
 }
 _CHARGE_COLOURS = ((0.2, "red"), (0.4, "yellow"), (math.inf, "green"))
 _BAR = 22
-_PLAN_COLUMNS, _PLAN_ROWS = 24, 8
 _ALERTS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class StreamSnapshot:
+    """One stream."""
+
+    name: str
+    rate: float | None = None
+    """Items per mission second."""
+    median_ms: float | None = None
+    """From capture to publishing, milliseconds of the host's clock."""
+    p99_ms: float | None = None
+    drops: int = 0
+    """Items that newer ones replaced before they were read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The whole mission at one moment."""
+
+    title: str
+    mission_time: float
+    """Mission seconds."""
+    wall_time: float
+    """Seconds on the host since the mission clock started."""
+    robots: Mapping[str, RobotStatus] = field(default_factory=dict)
+    """By id."""
+    streams: tuple[StreamSnapshot, ...] = ()
+    alerts: tuple[str, ...] = ()
+    """One line each, newest last; the view shows the last few."""
+    scheduler: str = ""
+    """Figures of the analytics scheduler in one line; empty without one."""
+
+    @property
+    def factor(self) -> float:
+        """Mission seconds per wall second."""
+        return self.mission_time / self.wall_time if self.wall_time > 0 else 0.0
 
 
 def clock_text(snapshot: Snapshot) -> str:
@@ -59,17 +97,37 @@ def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
     return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
 
 
-def robot_panel(
-    name: str, robot: RobotStatus, path: Sequence[tuple[float, float]], *, ascii_only: bool
-) -> RenderableType:
-    """Mission, position and battery of a robot, beside a plan of its flight.
+def robot_line(snapshot: Snapshot, name: str, robot: RobotStatus) -> str:
+    """One robot in one line.
 
     Args:
+        snapshot: The whole mission.
         name: Id of the robot.
         robot: Its status.
-        path: Where it has flown, metres east and north.
-        ascii_only: Whether the terminal shows nothing but ASCII, and so no plan.
     """
+    mission, vehicle = robot.mission, robot.vehicle
+    parts = [f"[{snapshot.mission_time:7.1f} s] {name} {mission.state.value}"]
+    if mission.reason:
+        parts[0] += f": {mission.reason}"
+    if vehicle is not None:
+        parts.append(place_text(vehicle))
+        parts.append(f"battery {100 * vehicle.battery.fraction:.0f} %")
+    parts.append(waypoints_text(mission)[1])
+    slowest = max(
+        (stream for stream in snapshot.streams if stream.median_ms is not None),
+        key=lambda stream: stream.median_ms or 0.0,
+        default=None,
+    )
+    if slowest is not None:
+        parts.append(f"{slowest.name} {slowest.median_ms:.1f} ms")
+    dropped = sum(stream.drops for stream in snapshot.streams)
+    if dropped:
+        parts.append(f"{dropped} dropped")
+    return ", ".join(parts)
+
+
+def robot_panel(name: str, robot: RobotStatus) -> RenderableType:
+    """Mission, position and battery of a robot."""
     facts = Table.grid(padding=(0, 1), expand=True)
     facts.add_column(style="dim", width=9, no_wrap=True)
     facts.add_column(ratio=1, overflow="fold")
@@ -84,15 +142,7 @@ def robot_panel(
     facts.add_row("progress", _progress(mission))
     facts.add_row("flown", f"{mission.distance:.1f} m")
     facts.add_row("faults", _faults(mission, vehicle))
-    if ascii_only:
-        return facts
-    ahead = (*mission.pending, mission.target)
-    places = [(at.x, at.y) for at in ahead if at is not None]
-    beside = Table.grid(padding=(0, 1), expand=True)
-    beside.add_column(ratio=1)
-    beside.add_column(width=_PLAN_COLUMNS)
-    beside.add_row(facts, braille_plan(path, places, columns=_PLAN_COLUMNS, rows=_PLAN_ROWS))
-    return beside
+    return facts
 
 
 def streams_panel(streams: Sequence[StreamSnapshot]) -> RenderableType:

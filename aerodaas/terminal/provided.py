@@ -7,17 +7,13 @@ import time
 from collections import Counter
 from dataclasses import replace
 
-from rich.console import Console
-from typing_extensions import Self
-
 from aerodaas.clock import seconds
 from aerodaas.messages.mission import GROUNDED, RobotStatus
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
-from aerodaas.terminal.live import MissionView
-from aerodaas.terminal.progress import download_view
-from aerodaas.terminal.snapshot import Snapshot
+from aerodaas.terminal.live import FlightDisplay
+from aerodaas.terminal.panels import Snapshot
 
-__all__ = ["ProvidedView", "download_view", "phase_text"]
+__all__ = ["ProvidedView", "phase_text"]
 
 _WORDS = {
     MissionPhase.SUBMITTED: "submitted",
@@ -35,46 +31,33 @@ def phase_text(mission: MissionOut) -> str:
     return f"{words}: {mission.reason}" if mission.reason and mission.reason != words else words
 
 
-class ProvidedView:
+class ProvidedView(FlightDisplay):
     """View of a mission that a provider flies, drawn as one's own flight is."""
 
     def __init__(self, *, shown: bool) -> None:
         """Show it, or print new alerts alone."""
-        self._view = MissionView() if shown else None
-        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
-        self._began = time.monotonic()
+        super().__init__(shown=shown)
         self._told: Counter[str] = Counter()
         self._news: dict[str, tuple[int, float]] = {}
         """Mission clock of each robot's newest status, and the monotonic moment when it came."""
         self._lock = threading.Lock()
         self._notes: list[str] = []
 
-    def __enter__(self) -> Self:
-        """Begin to draw."""
-        if self._view is not None:
-            self._view.__enter__()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Leave the last view on the terminal."""
-        if self._view is not None:
-            self._view.__exit__(None, None, None)
-
     def show_message(self, text: str) -> None:
         """Show a message of this side, in any thread."""
         with self._lock:
             self._notes.append(text)
-        if self._view is None or not self._view.live:
-            self._errors.print(text, markup=False)
+        if not self.moves:
+            self.say(text)
 
     def print_alerts(self, mission: MissionOut) -> None:
         """Print a line for each new alert, unless they are shown anyway; in any thread."""
         with self._lock:
             before, self._told = self._told, Counter(mission.alerts)
             new = self._told - before
-        if self._view is None or not self._view.live:
+        if not self.moves:
             for text in new.elements():
-                self._errors.print(text, markup=False)
+                self.say(text)
 
     def update(self, mission: MissionOut) -> None:
         """Show the mission's present state."""

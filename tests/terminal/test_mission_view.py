@@ -8,8 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from rich.console import Console
 
 from aerodaas.messages.mission import BatteryOutlook, MissionState, MissionStatus, RobotStatus
@@ -17,10 +15,7 @@ from aerodaas.messages.odometry import Battery, Odometry
 from aerodaas.messages.vehicle import VehicleMode, VehicleState
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.terminal.live import MissionView
-from aerodaas.terminal.plan import braille_plan
-from aerodaas.terminal.snapshot import Snapshot, StreamSnapshot
-
-PLACES = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
+from aerodaas.terminal.panels import Snapshot, StreamSnapshot
 
 
 def snapshot(
@@ -88,8 +83,6 @@ def test_panel_shows_what_matters(width: int) -> None:
         "battery_low: at 20 %",
         "mission 0:05.0",
         "10.0x real time",
-        "○",
-        "●",
     ):
         assert words in text
 
@@ -174,21 +167,3 @@ def test_nothing_known_yet() -> None:
         view.update(Snapshot("Farm", 0.0, 0.0))
     assert isinstance(console.file, io.StringIO)
     assert "Farm" in console.file.getvalue()
-
-
-@given(st.lists(PLACES, max_size=20), st.lists(PLACES, max_size=5))
-def test_plan_always_fits(
-    path: list[tuple[float, float]], goals: list[tuple[float, float]]
-) -> None:
-    """Whatever is flown, the plan keeps its size and shows where the drone is."""
-    text = braille_plan(path, goals, columns=10, rows=4).plain
-    lines = text.split("\n")
-    assert [len(line) for line in lines] == [10] * 4
-    assert ("●" in text) == bool(path)
-
-
-def test_plan_has_north_up_and_east_right() -> None:
-    """A flight to the north-east ends at the top right."""
-    lines = braille_plan([(0, 0), (10, 10)], [(10, 0)], columns=8, rows=4).plain.split("\n")
-    assert lines[0][-1] == "●"
-    assert lines[-1][-1] == "○"

@@ -166,7 +166,7 @@ def fetch(
     aerodaas missions fetch 3f1a6c0d9b2e --delete
     aerodaas report flight.mcap
     """
-    from aerodaas.terminal.provided import download_view  # noqa: PLC0415 - slow to load
+    from aerodaas.terminal.progress import download_view  # noqa: PLC0415 - slow to load
 
     client = client_at(at)
     target = output or Path(f"{Path(mission).name}.mcap")

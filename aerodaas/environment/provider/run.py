@@ -307,7 +307,7 @@ class ProvidedRun:
 
     def _fetch(self, mission: MissionOut) -> bool:
         """Fetch the recording; returns whether it is here."""
-        from aerodaas.terminal.provided import download_view  # noqa: PLC0415 - slow to load
+        from aerodaas.terminal.progress import download_view  # noqa: PLC0415 - slow to load
 
         path = self.recording
         if path is None or not mission.recording:
