@@ -222,7 +222,7 @@ class _Stream(BaseHTTPRequestHandler):
 def stream() -> Iterator[str]:
     """Address of a running stream."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), _Stream)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}/stream.mjpg"
     server.shutdown()
     server.server_close()

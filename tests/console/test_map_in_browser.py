@@ -37,7 +37,7 @@ def browser() -> Iterator[Browser]:
 def serving(handler: type[BaseHTTPRequestHandler]) -> Iterator[int]:
     """A server of this machine; yields its port."""
     with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
         try:
             yield server.server_address[1]
         finally:

@@ -266,7 +266,7 @@ def test_an_endpoint_hears_nothing(flown: Path, tmp_path: Path) -> None:
             heard.append(self.headers.get("Authorization", ""))
 
     with HTTPServer(("127.0.0.1", 0), Ear) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
         thread.start()
         endpoint = {"url": f"http://127.0.0.1:{server.server_port}/", "token_env": "PATH"}
         fn = {"id": "fn", "kind": "http", "endpoint": endpoint}

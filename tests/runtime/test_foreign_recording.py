@@ -70,7 +70,7 @@ def test_nothing_foreign_runs_and_nothing_is_sent(
             heard.append(str(self.headers))
 
     server = HTTPServer(("127.0.0.1", 0), Ear)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     with Recording.open(flown) as recording:
         content = json.loads(recording.attachment("environment.json"))
     content["runtime_env"] = {
