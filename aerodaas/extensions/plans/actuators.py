@@ -10,18 +10,18 @@ from aerodaas.config.sections.actuators import (
     RelayConfig,
     ServoConfig,
 )
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.commands import (
-    DO_GRIPPER,
-    DO_SET_RELAY,
-    DO_SET_SERVO,
     FRAME_MISSION,
 )
 from aerodaas.extensions.plans.plan import PlanItem
 
 __all__ = ["MOVES", "move_item", "move_of"]
 
-MOVES = frozenset({DO_GRIPPER, DO_SET_RELAY, DO_SET_SERVO})
+MOVES = frozenset(
+    {mavlink.MAV_CMD_DO_GRIPPER, mavlink.MAV_CMD_DO_SET_RELAY, mavlink.MAV_CMD_DO_SET_SERVO}
+)
 """Commands that may become a waypoint's `actuate`."""
 _GRIPPER = ("release", "grab")
 """Positions by GRIPPER_ACTION."""
@@ -84,10 +84,10 @@ def _number(actuator: ActuatorConfig) -> int:
 
 def _positions(actuator: ActuatorConfig, command: int) -> dict[float, str] | None:
     """Positions by the command's second parameter; None if it is no command for this actuator."""
-    if command == DO_GRIPPER and isinstance(actuator, GripperConfig):
+    if command == mavlink.MAV_CMD_DO_GRIPPER and isinstance(actuator, GripperConfig):
         return {float(index): name for index, name in enumerate(_GRIPPER)}
-    if command == DO_SET_RELAY and isinstance(actuator, RelayConfig):
+    if command == mavlink.MAV_CMD_DO_SET_RELAY and isinstance(actuator, RelayConfig):
         return {float(index): name for index, name in enumerate(_RELAY)}
-    if command == DO_SET_SERVO and isinstance(actuator, ServoConfig):
+    if command == mavlink.MAV_CMD_DO_SET_SERVO and isinstance(actuator, ServoConfig):
         return {float(pulse): name for name, pulse in actuator.positions.items()}
     return None

@@ -38,10 +38,9 @@ app = typer.Typer(
     cls=ExampleGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
-    help="""Read and write the plans of QGroundControl and Mission Planner.
+    help="""Read the plans of QGroundControl and Mission Planner.
 
     aerodaas plan show survey.plan
-    aerodaas plan convert mission.waypoints mission.plan
     aerodaas plan fence survey.plan --home 47.3977,8.5456
 """,
 )
@@ -99,24 +98,6 @@ def _pictures(waypoint: Waypoint) -> str:
             case RecordVideo(on=on):
                 said.append(f", video {'begins' if on else 'ends'}")
     return "".join(said)
-
-
-@app.command()
-def convert(
-    plan: File,
-    output: Annotated[Path, typer.Argument(help="A new .plan or .waypoints file.")],
-) -> None:
-    """Write a plan in the other format, item for item; complex items become their waypoints.
-
-    aerodaas plan convert mission.waypoints mission.plan
-    """
-    from aerodaas.extensions.plans.reading import read_plan  # noqa: PLC0415 - slow to load
-    from aerodaas.extensions.plans.writing import write_plan  # noqa: PLC0415
-
-    read = read_plan(plan)
-    for notice in [*read.notices, *write_plan(output, read)]:
-        typer.echo(printable(f"left out: {notice}"))
-    typer.echo(str(output))
 
 
 @app.command()

@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-import functools
-import importlib
-from typing import Any
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 __all__ = [
-    "DO_CHANGE_SPEED",
-    "DO_DIGICAM_CONTROL",
-    "DO_GIMBAL_MANAGER_PITCHYAW",
-    "DO_GRIPPER",
-    "DO_MOUNT_CONTROL",
-    "DO_SET_CAM_TRIGG_DIST",
-    "DO_SET_CAM_TRIGG_INTERVAL",
-    "DO_SET_RELAY",
-    "DO_SET_ROI",
-    "DO_SET_ROI_LOCATION",
-    "DO_SET_ROI_NONE",
-    "DO_SET_ROI_WPNEXT_OFFSET",
-    "DO_SET_SERVO",
     "FRAMES_ABOVE_GROUND",
     "FRAMES_ABOVE_SEA",
     "FRAMES_RELATIVE",
@@ -27,59 +12,12 @@ __all__ = [
     "FRAME_ABOVE_SEA",
     "FRAME_MISSION",
     "FRAME_RELATIVE",
-    "IMAGE_START_CAPTURE",
-    "IMAGE_STOP_CAPTURE",
     "MOUNT_MAVLINK_TARGETING",
     "MOUNT_NEUTRAL",
-    "NAV_DELAY",
-    "NAV_LAND",
-    "NAV_LAST",
-    "NAV_LOITER_TIME",
-    "NAV_RETURN_TO_LAUNCH",
-    "NAV_SPLINE_WAYPOINT",
-    "NAV_TAKEOFF",
-    "NAV_VTOL_LAND",
-    "NAV_VTOL_TAKEOFF",
-    "NAV_WAYPOINT",
     "OF_RANGE",
-    "SET_CAMERA_FOCUS",
-    "SET_CAMERA_ZOOM",
-    "VIDEO_START_CAPTURE",
-    "VIDEO_STOP_CAPTURE",
     "command_name",
     "why_not",
 ]
-
-NAV_WAYPOINT = 16
-NAV_LOITER_TIME = 19
-NAV_RETURN_TO_LAUNCH = 20
-NAV_LAND = 21
-NAV_TAKEOFF = 22
-NAV_SPLINE_WAYPOINT = 82
-NAV_VTOL_TAKEOFF = 84
-NAV_VTOL_LAND = 85
-NAV_DELAY = 93
-NAV_LAST = 95
-"""Commands up to here say where to fly; later ones what to do on the way."""
-DO_CHANGE_SPEED = 178
-DO_SET_RELAY = 181
-DO_SET_SERVO = 183
-DO_SET_ROI_LOCATION = 195
-DO_SET_ROI_WPNEXT_OFFSET = 196
-DO_SET_ROI_NONE = 197
-DO_SET_ROI = 201
-DO_DIGICAM_CONTROL = 203
-DO_MOUNT_CONTROL = 205
-DO_SET_CAM_TRIGG_DIST = 206
-DO_GRIPPER = 211
-DO_SET_CAM_TRIGG_INTERVAL = 214
-SET_CAMERA_ZOOM = 531
-SET_CAMERA_FOCUS = 532
-DO_GIMBAL_MANAGER_PITCHYAW = 1000
-IMAGE_START_CAPTURE = 2000
-IMAGE_STOP_CAPTURE = 2001
-VIDEO_START_CAPTURE = 2500
-VIDEO_STOP_CAPTURE = 2501
 
 OF_RANGE = 2.0
 """CAMERA_ZOOM_TYPE and SET_FOCUS_TYPE of percent of the lens's range."""
@@ -131,13 +69,5 @@ def why_not(command: int) -> str:
 
 def command_name(command: int) -> str:
     """MAVLink's name of a command, without MAV_CMD; of an unknown one, its number."""
-    known = _names().get(command)
+    known = mavlink.enums["MAV_CMD"].get(command)
     return f"command {command}" if known is None else str(known.name).removeprefix("MAV_CMD_")
-
-
-@functools.cache
-def _names() -> dict[int, Any]:
-    names: dict[int, Any] = importlib.import_module("pymavlink.dialects.v20.ardupilotmega").enums[
-        "MAV_CMD"
-    ]
-    return names

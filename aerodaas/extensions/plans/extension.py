@@ -9,7 +9,7 @@ EXTENSION = Extension(
         Command(
             "plan",
             "aerodaas.extensions.plans.command_line:app",
-            "Read and write the plans of QGroundControl and Mission Planner.",
+            "Read the plans of QGroundControl and Mission Planner.",
         ),
     ),
     services={

@@ -12,27 +12,13 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar
 
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError, InvalidWaypointError
 from aerodaas.extensions.plans.commands import (
-    DO_DIGICAM_CONTROL,
-    DO_GIMBAL_MANAGER_PITCHYAW,
-    DO_MOUNT_CONTROL,
-    DO_SET_CAM_TRIGG_DIST,
-    DO_SET_CAM_TRIGG_INTERVAL,
-    DO_SET_ROI,
-    DO_SET_ROI_LOCATION,
-    DO_SET_ROI_NONE,
-    IMAGE_START_CAPTURE,
-    IMAGE_STOP_CAPTURE,
     MOUNT_MAVLINK_TARGETING,
     MOUNT_NEUTRAL,
     OF_RANGE,
-    SET_CAMERA_FOCUS,
-    SET_CAMERA_ZOOM,
-    VIDEO_START_CAPTURE,
-    VIDEO_STOP_CAPTURE,
     why_not,
 )
 from aerodaas.extensions.plans.formats.numbers import LatLon, place
@@ -105,18 +91,6 @@ class _Aim:
 class PictureItems:
     """Picture commands of a plan's items, up to an item."""
 
-    commands: ClassVar[frozenset[int]] = frozenset(
-        {
-            *(DO_SET_CAM_TRIGG_DIST, DO_SET_CAM_TRIGG_INTERVAL, DO_DIGICAM_CONTROL),
-            *(IMAGE_START_CAPTURE, IMAGE_STOP_CAPTURE),
-            *(DO_MOUNT_CONTROL, DO_GIMBAL_MANAGER_PITCHYAW),
-            *(DO_SET_ROI_LOCATION, DO_SET_ROI_NONE, DO_SET_ROI),
-            *(SET_CAMERA_ZOOM, SET_CAMERA_FOCUS),
-            *(VIDEO_START_CAPTURE, VIDEO_STOP_CAPTURE),
-        }
-    )
-    """What `take` knows."""
-
     def __init__(self, height: Height, *, ardupilot: bool) -> None:
         """Take no pictures; `height` is for places to look at."""
         self._height = height
@@ -131,22 +105,23 @@ class PictureItems:
         """Percent of `zoom` and `focus` that no waypoint has had yet, with their items."""
         self._angles = (0.0, 0.0)
         self._looks = False
-        self._does: dict[int, Callable[[PlanItem, list[Waypoint]], str]] = {
-            DO_SET_CAM_TRIGG_DIST: self._by_distance,
-            DO_SET_CAM_TRIGG_INTERVAL: self._by_time,
-            DO_DIGICAM_CONTROL: self._photograph,
-            IMAGE_START_CAPTURE: self._capture,
-            IMAGE_STOP_CAPTURE: self._begin,
-            DO_MOUNT_CONTROL: self._mount,
-            DO_GIMBAL_MANAGER_PITCHYAW: self._manage,
-            DO_SET_ROI: self._region,
-            DO_SET_ROI_LOCATION: self._look_at,
-            DO_SET_ROI_NONE: self._look_away,
-            SET_CAMERA_ZOOM: partial(self._set_lens, "zoom"),
-            SET_CAMERA_FOCUS: partial(self._set_lens, "focus"),
-            VIDEO_START_CAPTURE: partial(self._film, on=True),
-            VIDEO_STOP_CAPTURE: partial(self._film, on=False),
+        self.commands: dict[int, Callable[[PlanItem, list[Waypoint]], str]] = {
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._by_distance,
+            mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._by_time,
+            mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self._photograph,
+            mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._capture,
+            mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._begin,
+            mavlink.MAV_CMD_DO_MOUNT_CONTROL: self._mount,
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._manage,
+            mavlink.MAV_CMD_DO_SET_ROI: self._region,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._look_at,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._look_away,
+            mavlink.MAV_CMD_SET_CAMERA_ZOOM: partial(self._set_lens, "zoom"),
+            mavlink.MAV_CMD_SET_CAMERA_FOCUS: partial(self._set_lens, "focus"),
+            mavlink.MAV_CMD_VIDEO_START_CAPTURE: partial(self._film, on=True),
+            mavlink.MAV_CMD_VIDEO_STOP_CAPTURE: partial(self._film, on=False),
         }
+        """What is done by each command that is known."""
 
     def add_item(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
         """Add an item of `commands` to the waypoint before it.
@@ -159,7 +134,7 @@ class PictureItems:
             Why the item is not done, or an empty text.
         """
         try:
-            return self._does[item.command](item, waypoints)
+            return self.commands[item.command](item, waypoints)
         except (ConfigError, InvalidWaypointError) as error:
             return str(error)
 
@@ -219,7 +194,7 @@ class PictureItems:
         return ""
 
     def _photograph(self, item: PlanItem, waypoints: list[Waypoint]) -> str:
-        if item.command == DO_DIGICAM_CONTROL and item.x != _SHOOT:
+        if item.command == mavlink.MAV_CMD_DO_DIGICAM_CONTROL and item.x != _SHOOT:
             return why_not(item.command)
         if not waypoints:
             return _NOT_HERE

@@ -5,20 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.extensions.plans.commands import (
-    DO_MOUNT_CONTROL,
-    DO_SET_CAM_TRIGG_DIST,
-    DO_SET_ROI_LOCATION,
     FRAME_MISSION,
-    IMAGE_START_CAPTURE,
-    IMAGE_STOP_CAPTURE,
     MOUNT_MAVLINK_TARGETING,
-    NAV_DELAY,
     OF_RANGE,
-    SET_CAMERA_FOCUS,
-    SET_CAMERA_ZOOM,
-    VIDEO_START_CAPTURE,
-    VIDEO_STOP_CAPTURE,
 )
 from aerodaas.extensions.plans.plan import PlanItem
 from aerodaas.messages.actions import AimGimbal, RecordVideo, SetLens, TakePhoto, TriggerPhotos
@@ -52,27 +43,33 @@ class PictureWriter:
         yield from self._triggers(waypoint.action(TriggerPhotos))
         lens = waypoint.action(SetLens) or SetLens()
         if lens.zoom is not None:
-            yield _item(SET_CAMERA_ZOOM, OF_RANGE, lens.zoom)
+            yield _item(mavlink.MAV_CMD_SET_CAMERA_ZOOM, OF_RANGE, lens.zoom)
         if lens.focus is not None:
-            yield _item(SET_CAMERA_FOCUS, OF_RANGE, lens.focus)
+            yield _item(mavlink.MAV_CMD_SET_CAMERA_FOCUS, OF_RANGE, lens.focus)
         gimbal = waypoint.action(AimGimbal)
         if gimbal is not None:
             values = (math.degrees(gimbal.pitch), 0.0, -math.degrees(gimbal.yaw), 0.0)
             yield PlanItem(
-                *(0, DO_MOUNT_CONTROL, FRAME_MISSION, values, 0.0, 0.0),
+                *(0, mavlink.MAV_CMD_DO_MOUNT_CONTROL, FRAME_MISSION, values, 0.0, 0.0),
                 float(MOUNT_MAVLINK_TARGETING),
             )
         if spot is not None:
-            yield PlanItem(0, DO_SET_ROI_LOCATION, frame, (0.0, 0.0, 0.0, 0.0), *spot)
+            yield PlanItem(
+                0, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, frame, (0.0, 0.0, 0.0, 0.0), *spot
+            )
 
     def behind(self, waypoint: Waypoint) -> Iterator[PlanItem]:
         """Plan items at `waypoint`."""
         if waypoint.action(TakePhoto):
-            yield _item(IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
+            yield _item(mavlink.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
         if video := waypoint.action(RecordVideo):
-            yield _item(VIDEO_START_CAPTURE if video.on else VIDEO_STOP_CAPTURE)
+            yield _item(
+                mavlink.MAV_CMD_VIDEO_START_CAPTURE
+                if video.on
+                else mavlink.MAV_CMD_VIDEO_STOP_CAPTURE
+            )
             if waypoint.hover_duration:
-                yield _item(NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
+                yield _item(mavlink.MAV_CMD_NAV_DELAY, waypoint.hover_duration, -1.0, -1.0, -1.0)
 
     def end(self) -> Iterator[PlanItem]:
         """Plan items that end with the last waypoint."""
@@ -83,11 +80,16 @@ class PictureWriter:
         interval = None if trigger is None else trigger.interval
         # A camera by distance is not stopped by what stops one by time, and the other way round.
         if self._interval is not None and interval is None:
-            yield _item(IMAGE_STOP_CAPTURE)
+            yield _item(mavlink.MAV_CMD_IMAGE_STOP_CAPTURE)
         if distance != self._distance and (distance or self._distance):
-            yield _item(DO_SET_CAM_TRIGG_DIST, distance or 0.0, 0.0, _AT_ONCE if distance else 0.0)
+            yield _item(
+                mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+                distance or 0.0,
+                0.0,
+                _AT_ONCE if distance else 0.0,
+            )
         if interval is not None and interval != self._interval:
-            yield _item(IMAGE_START_CAPTURE, 0.0, interval, 0.0)
+            yield _item(mavlink.MAV_CMD_IMAGE_START_CAPTURE, 0.0, interval, 0.0)
         self._distance, self._interval = distance, interval
 
 

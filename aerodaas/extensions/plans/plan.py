@@ -111,7 +111,5 @@ class Plan:
     home: PlanHome | None = None
     ardupilot: bool = False
     fence: tuple[FencePolygon | FenceCircle, ...] = ()
-    rally_points: tuple[tuple[float, float, float], ...] = ()
-    """Latitude, longitude, metres above home."""
     notices: tuple[Notice, ...] = ()
     """Parts of the file that are not even items."""

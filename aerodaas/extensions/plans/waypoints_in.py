@@ -8,23 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from aerodaas.config.sections.actuators import ActuatorConfig
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.actuators import MOVES, move_of
 from aerodaas.extensions.plans.commands import (
-    DO_CHANGE_SPEED,
     FRAMES_ABOVE_GROUND,
     FRAMES_ABOVE_SEA,
     FRAMES_RELATIVE,
-    NAV_DELAY,
-    NAV_LAND,
-    NAV_LAST,
-    NAV_LOITER_TIME,
-    NAV_RETURN_TO_LAUNCH,
-    NAV_SPLINE_WAYPOINT,
-    NAV_TAKEOFF,
-    NAV_VTOL_LAND,
-    NAV_VTOL_TAKEOFF,
-    NAV_WAYPOINT,
     command_name,
     why_not,
 )
@@ -40,9 +30,13 @@ __all__ = ["Ground", "waypoints_of"]
 Ground = Callable[[float, float], float]
 """Height of the ground above the sea in metres, at a latitude and longitude in degrees."""
 
-_FLIES_TO = {NAV_WAYPOINT, NAV_SPLINE_WAYPOINT, NAV_LOITER_TIME}
-_TAKES_OFF = {NAV_TAKEOFF, NAV_VTOL_TAKEOFF}
-_LANDS = {NAV_LAND, NAV_VTOL_LAND}
+_FLIES_TO = {
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+}
+_TAKES_OFF = {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_VTOL_TAKEOFF}
+_LANDS = {mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND}
 _SPEED_TYPES = (0.0, 1.0)
 """Of DO_CHANGE_SPEED: through the air, over ground; the others are those of climb and descent."""
 _DEFAULT_SPEED = -2.0
@@ -76,17 +70,11 @@ def waypoints_of(
     flown = _ReadWaypoints(plan, home_altitude, ground, actuators)
     for item in plan.items:
         flown.add(item)
-    return flown.waypoints, [*plan.notices, *_parts(plan), *flown.notices()]
-
-
-def _parts(plan: Plan) -> list[Notice]:
-    parts = []
+    notices = [*plan.notices, *flown.notices()]
     if plan.fence:
         why = "waypoints do not hold it; `aerodaas plan fence` writes it for the environment file"
-        parts.append(Notice((), "geofence", why))
-    if plan.rally_points:
-        parts.append(Notice((), "rally points", "a drone that returns flies to its take-off"))
-    return parts
+        notices.append(Notice((), "geofence", why))
+    return flown.waypoints, notices
 
 
 class _ReadWaypoints:
@@ -125,16 +113,16 @@ class _ReadWaypoints:
             self._say(item, "the drone goes on, though autoContinue is false")
         if command in _FLIES_TO:
             self._fly(item)
-        elif command == NAV_DELAY:
+        elif command == mavlink.MAV_CMD_NAV_DELAY:
             self._delay(item)
         elif command in _TAKES_OFF:
             self._say(item, f"climbs to limits.takeoff_height, not to {_metres(item.z)}")
-        elif command == NAV_RETURN_TO_LAUNCH:
+        elif command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             self._ended = command_name(command)
         elif command in _LANDS:
             self._say(item, "the drone comes back to its take-off and lands there")
             self._ended = command_name(command)
-        elif command > NAV_LAST:
+        elif command > mavlink.MAV_CMD_NAV_LAST:
             self._do(item)
         else:
             raise ConfigError(
@@ -144,9 +132,9 @@ class _ReadWaypoints:
 
     def _do(self, item: PlanItem) -> None:
         """Take in what is done on the way."""
-        if item.command == DO_CHANGE_SPEED:
+        if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
             self._change_speed(item)
-        elif item.command in PictureItems.commands:
+        elif item.command in self._pictures.commands:
             if why := self._pictures.add_item(item, self.waypoints):
                 self._say(item, why)
         elif item.command in MOVES and self._actuators:
@@ -158,7 +146,9 @@ class _ReadWaypoints:
         self._said[command_name(item.command), why].append(item.number)
 
     def _after_end(self, item: PlanItem, ended: str) -> None:
-        if item.command in _FLIES_TO | _TAKES_OFF and ended != command_name(NAV_RETURN_TO_LAUNCH):
+        if item.command in _FLIES_TO | _TAKES_OFF and ended != command_name(
+            mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        ):
             raise ConfigError(
                 f"item {item.number}: {command_name(item.command)} stands after {ended}, and a "
                 "mission lands once: make two plans of it"
@@ -169,20 +159,20 @@ class _ReadWaypoints:
         where = f"item {item.number}"
         hover, radius, through, yaw = item.values
         here = not item.x and not item.y
-        if item.command == NAV_LOITER_TIME and here and self.waypoints:
+        if item.command == mavlink.MAV_CMD_NAV_LOITER_TIME and here and self.waypoints:
             self._hover(item, hover or 0.0)
             return
         if here:
             raise ConfigError(f"{where}: {command_name(item.command)} has no place; give it one")
         latitude, longitude = place(item.x, item.y, where)
         height, above = self._height(item, (latitude, longitude))
-        if item.command == NAV_SPLINE_WAYPOINT:
+        if item.command == mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT:
             self._say(item, "flown straight")
-        if item.command == NAV_WAYPOINT and (radius or through):
+        if item.command == mavlink.MAV_CMD_NAV_WAYPOINT and (radius or through):
             self._say(item, "its radius (params 2, 3) is not used, but limits.arrival_radius")
-        if item.command != NAV_WAYPOINT or self._ardupilot:
+        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or self._ardupilot:
             # Only PX4 has a heading here, and only of a waypoint.
-            if item.command == NAV_WAYPOINT and yaw:
+            if item.command == mavlink.MAV_CMD_NAV_WAYPOINT and yaw:
                 self._say(item, "its yaw (param 4) is not used, as ArduPilot does not turn to it")
             yaw = None
         plain = Waypoint(

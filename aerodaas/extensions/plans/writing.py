@@ -12,29 +12,18 @@ from typing import Any
 import numpy as np
 
 from aerodaas.config.sections.actuators import ActuatorConfig
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.actuators import move_item
 from aerodaas.extensions.plans.commands import (
-    DO_CHANGE_SPEED,
     FRAME_ABOVE_GROUND,
     FRAME_ABOVE_SEA,
     FRAME_MISSION,
     FRAME_RELATIVE,
-    NAV_LAST,
-    NAV_RETURN_TO_LAUNCH,
-    NAV_TAKEOFF,
-    NAV_WAYPOINT,
 )
 from aerodaas.extensions.plans.formats.waypoint_file import HEADER
 from aerodaas.extensions.plans.pictures_out import PictureWriter
-from aerodaas.extensions.plans.plan import (
-    FenceCircle,
-    FencePolygon,
-    Notice,
-    Plan,
-    PlanHome,
-    PlanItem,
-)
+from aerodaas.extensions.plans.plan import Notice, Plan, PlanHome, PlanItem
 from aerodaas.geometry.frames import GeodeticOrigin, yaw_enu_to_ned
 from aerodaas.messages.actions import LookAt, MoveActuator, RecordVideo
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
@@ -45,7 +34,7 @@ _LOWEST_TAKEOFF = 1.5
 """Metres that a take-off climbs at least."""
 _DEFAULT_SPEED = -2.0
 _GROUND_SPEED = 1.0
-_PX4, _ARDUPILOT = 12, 3
+_PX4 = 12
 """MAV_AUTOPILOT, by which the meaning of parameters is known."""
 _COPTER = 2
 """MAV_TYPE."""
@@ -151,13 +140,13 @@ def _items(
     above_home = places and waypoints[0].above is not HeightReference.SEA
     climb = max(places[0][2], _LOWEST_TAKEOFF) if above_home else _LOWEST_TAKEOFF
     start = (home.latitude, home.longitude, climb)
-    yield PlanItem(0, NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
+    yield PlanItem(0, mavlink.MAV_CMD_NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
     pictures, speed = PictureWriter(), None
     for waypoint, at in zip(waypoints, places, strict=True):
         if waypoint.speed != speed:
             speed = waypoint.speed
             values = (_GROUND_SPEED, _DEFAULT_SPEED if speed is None else speed, -1.0, 0.0)
-            yield PlanItem(0, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
+            yield PlanItem(0, mavlink.MAV_CMD_DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
         yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
         # An autopilot does what stands behind a waypoint after its stay; a video comes before it.
         stay = 0.0 if waypoint.action(RecordVideo) else waypoint.hover_duration
@@ -165,14 +154,14 @@ def _items(
         above = HeightReference(waypoint.above or HeightReference.HOME)
         frame = _FRAMES.get(above, FRAME_RELATIVE)
         yield from pictures.before(waypoint, frame, _spot(waypoint, home))
-        yield PlanItem(0, NAV_WAYPOINT, frame, held, *at)
+        yield PlanItem(0, mavlink.MAV_CMD_NAV_WAYPOINT, frame, held, *at)
         yield from pictures.behind(waypoint)
         for action in waypoint.actions:
             if isinstance(action, MoveActuator):
                 yield move_item(0, action.actuator, action.position, actuators)
     yield from pictures.end()
     still = (0.0, 0.0, 0.0, 0.0)
-    yield PlanItem(0, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
+    yield PlanItem(0, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
 
 
 def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
@@ -187,28 +176,17 @@ def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
 
 
 def _not_in_lines(plan: Plan) -> Iterator[Notice]:
-    unset = tuple(
-        one.number
-        for one in plan.items
-        if None in one.values[:3] or (one.values[3] is None and one.command > NAV_LAST)
-    )
-    if unset:
-        yield Notice(unset, "unset parameters", "a .waypoints file has none; they are 0 there")
     turned = tuple(
         one.number
         for one in plan.items
-        if one.command == NAV_WAYPOINT and one.values[3] is not None
+        if one.command == mavlink.MAV_CMD_NAV_WAYPOINT and one.values[3] is not None
     )
-    if turned and not plan.ardupilot:
+    if turned:
         yield Notice(turned, "NAV_WAYPOINT", "ArduPilot does not turn to a waypoint's yaw")
-    if plan.fence:
-        yield Notice((), "geofence", "a .waypoints file holds none; write a .plan")
-    if plan.rally_points:
-        yield Notice((), "rally points", "a .waypoints file holds none; write a .plan")
 
 
 def _waypoint_file(plan: Plan) -> str:
-    home = PlanItem(0, NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, None), *_home(plan.home))
+    home = PlanItem(0, mavlink.MAV_CMD_NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, None), *_home(plan.home))
     lines = [HEADER, _line(home)]
     lines += map(_line, plan.items)
     return "\n".join([*lines, ""])
@@ -233,7 +211,7 @@ def _qgroundcontrol(plan: Plan) -> str:
         "groundStation": "AeroDaaS",
         "mission": {
             "version": 2,
-            "firmwareType": _ARDUPILOT if plan.ardupilot else _PX4,
+            "firmwareType": _PX4,
             "vehicleType": _COPTER,
             "cruiseSpeed": 15,
             "hoverSpeed": 5,
@@ -241,24 +219,8 @@ def _qgroundcontrol(plan: Plan) -> str:
             "plannedHomePosition": _home(plan.home),
             "items": [_entry(item) for item in plan.items],
         },
-        "geoFence": {
-            "version": 2,
-            "polygons": [
-                {"version": 1, "inclusion": one.inclusion, "polygon": one.corners}
-                for one in plan.fence
-                if isinstance(one, FencePolygon)
-            ],
-            "circles": [
-                {
-                    "version": 1,
-                    "inclusion": one.inclusion,
-                    "circle": {"center": one.centre, "radius": one.radius},
-                }
-                for one in plan.fence
-                if isinstance(one, FenceCircle)
-            ],
-        },
-        "rallyPoints": {"version": 2, "points": plan.rally_points},
+        "geoFence": {"version": 2, "polygons": [], "circles": []},
+        "rallyPoints": {"version": 2, "points": []},
     }
     return json.dumps(content, indent=4) + "\n"
 

@@ -1,4 +1,4 @@
-"""`aerodaas plan`: what is in a plan, in the other format, and its fence."""
+"""`aerodaas plan`: what is in a plan, and its fence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typer.testing import CliRunner, Result
 from aerodaas.cli.app import app
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.errors import ConfigError
-from aerodaas.extensions.plans.reading import read_plan
 
 LINES = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t488.0\t1
@@ -73,14 +72,6 @@ def test_what_is_photographed_is_shown(plan: Callable[..., Result], tmp_path: Pa
     assert first.endswith("gimbal at pitch -90, yaw 0 degrees, a picture, video begins")
     looks = "a picture every 5 m on the way, looks at 47.1000000, 8.1000000, 3 m"
     assert second.endswith(f"{looks}, video ends")
-
-
-def test_a_plan_is_converted(plan: Callable[..., Result], tmp_path: Path) -> None:
-    """Into a new file, item for item; what exists is not written over."""
-    assert plan("convert", "a.waypoints", "b.plan").output == "b.plan\n"
-    assert read_plan(tmp_path / "b.plan") == read_plan(tmp_path / "a.waypoints")
-    again = plan("convert", "a.waypoints", "b.plan")
-    assert isinstance(again.exception, ConfigError)
 
 
 def test_a_fence_is_written_for_an_environment(plan: Callable[..., Result], tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Fences of plans as those of environment files, and structure scans as ways around structures."""
+"""Fences of plans as those of environment files."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from keywords import keywords
 from plan_files import plan
 
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.fences import geofence_of
 from aerodaas.extensions.plans.plan import FenceCircle, FencePolygon
-from aerodaas.extensions.plans.reading import flown_plan, read_plan
+from aerodaas.extensions.plans.reading import read_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)
@@ -90,75 +89,3 @@ def test_fences_that_are_none(tmp_path: Path, polygons: Any, circles: Any, why: 
     """A fence is read whole or not at all."""
     with pytest.raises(ConfigError, match=why):
         read_plan(fenced(tmp_path / "a.plan", polygons, circles))
-
-
-def scan(**changes: Any) -> dict[str, Any]:  # noqa: ANN401
-    """A structure scan of a block, 40 m high, in four layers."""
-    camera = {"DistanceToSurface": 25, "AdjustedFootprintFrontal": 10, "AdjustedFootprintSide": 8}
-    return {
-        "type": "ComplexItem",
-        "complexItemType": "StructureScan",
-        "version": 3,
-        "CameraCalc": camera | changes.pop("camera", {}),
-        "EntranceAltitude": 60,
-        "ScanBottomAlt": 2,
-        "StructureHeight": 40,
-        "Layers": 4,
-        "StartFromTop": False,
-        "polygon": SQUARE,
-    } | changes
-
-
-def test_a_structure_scan_is_flown_around_the_structure(tmp_path: Path) -> None:
-    """From an entrance, in rounds at its distance, a layer each, and back to the entrance."""
-    waypoints, notices = flown_plan(plan(tmp_path / "a.plan", scan()))
-    heights = [one.z for one in waypoints]
-    assert heights == [60, *[7.0] * 5, *[17.0] * 5, *[27.0] * 5, *[37.0] * 5, 60]
-    assert [one.id for one in waypoints][:4] == ["item1", "item3", "item5", "item6"]
-    places = [HOME.to_local(one.x, one.y, HOME.altitude)[:2] for one in waypoints]
-    block = shapely.Polygon([HOME.to_local(a, b, HOME.altitude)[:2] for a, b in SQUARE])
-    for index in range(4):
-        ring = places[1 + 5 * index : 6 + 5 * index]
-        assert ring[0] == pytest.approx(ring[-1])
-        assert shapely.distance(shapely.LineString(ring), block) == pytest.approx(25, abs=0.1)
-        assert ring[0] == pytest.approx((-101.06, -136.18), abs=0.1)
-        assert not shapely.LinearRing(ring).is_ccw
-    assert places[0] == pytest.approx(places[1])
-    assert places[0] == pytest.approx(places[-1])
-    assert [(one.command, len(one.numbers)) for one in notices] == [
-        ("DO_SET_ROI_WPNEXT_OFFSET", 1),
-        ("DO_SET_ROI_NONE", 1),
-    ]
-    triggered = [keywords(one).trigger_distance is not None for one in waypoints]
-    assert triggered == [False, *[False, True, True, True, True] * 4, False]
-
-
-def test_a_structure_scan_from_the_top(tmp_path: Path) -> None:
-    """Its layers hang from the structure's height."""
-    waypoints, _ = flown_plan(plan(tmp_path / "a.plan", scan(StartFromTop=True)))
-    assert sorted({one.z for one in waypoints}) == [5.0, 15.0, 25.0, 35.0, 60.0]
-    assert waypoints[1].z == 35.0
-
-
-@pytest.mark.parametrize(
-    ("changes", "why"),
-    [
-        ({"version": 2}, "not of version 3: open it in a current QGroundControl"),
-        ({"Layers": 0}, "Layers must be positive"),
-        ({"Layers": 201}, "Layers must be 1 to 200"),
-        ({"Layers": True}, "Layers must be a finite number"),
-        ({"camera": {"DistanceToSurface": -1}}, "DistanceToSurface must be positive"),
-        ({"camera": {"DistanceToSurface": 2e3}}, "DistanceToSurface must be at most 1000 m"),
-        ({"CameraCalc": []}, "CameraCalc must be an object"),
-        ({"EntranceAltitude": None}, "EntranceAltitude must be a finite number"),
-        ({"polygon": SQUARE[:2]}, "polygon must have 3 to 500 corners"),
-        ({"polygon": [*SQUARE[:3], [47]]}, "a corner must be made of"),
-        ({"polygon": [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]]}, "crosses itself"),
-    ],
-)
-def test_structure_scans_that_cannot_be_flown(
-    tmp_path: Path, changes: dict[str, Any], why: str
-) -> None:
-    """Refused by number and reason."""
-    with pytest.raises(ConfigError, match=rf"item 1 \(StructureScan\).*{why}"):
-        read_plan(plan(tmp_path / "a.plan", scan(**changes)))

@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from plan_files import HOME as PLANNED
-from plan_files import item, lines, mavwp, plan, survey, waypoint
+from plan_files import mavwp
 
 from aerodaas import AeroNavigation, VelocityCommand, Waypoint
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.reading import flown_plan, read_plan
-from aerodaas.extensions.plans.writing import write_plan
 from aerodaas.geometry.frames import GeodeticOrigin, wrap_angle
 from aerodaas.messages.waypoints import HeightReference, WaypointType
 
@@ -225,47 +223,3 @@ def test_what_no_plan_holds_is_refused(tmp_path: Path) -> None:
     assert path.read_text() == "mine"
     with pytest.raises(ConfigError, match=r"cannot write .*No such file"):
         AeroNavigation(data=[]).to_plan(tmp_path / "none" / "a.plan", HOME)
-
-
-numbers = st.floats(-1000, 1000).map(lambda one: round(one, 6))
-params = st.tuples(numbers, numbers, numbers, numbers)
-rows = st.lists(st.tuples(st.sampled_from([16, 22, 206, 178, 205]), params), max_size=6)
-
-
-@given(rows=rows)
-def test_a_converted_plan_holds_every_item(
-    tmp_path_factory: pytest.TempPathFactory, rows: list[tuple[int, tuple[float, ...]]]
-) -> None:
-    """All parameters of all commands, done here or not, in both directions."""
-    folder = tmp_path_factory.mktemp("converted")
-    first = lines(
-        folder / "a.waypoints",
-        *[f"3 {command} {' '.join(map(str, values))} 47.5 8.5 9.25" for command, values in rows],
-    )
-    read = read_plan(first)
-    assert write_plan(folder / "b.plan", read) == []
-    again = read_plan(folder / "b.plan")
-    assert again == read
-    assert write_plan(folder / "c.waypoints", again) == []
-    assert read_plan(folder / "c.waypoints") == read
-
-
-def test_conversion_says_what_lines_cannot_hold(tmp_path: Path) -> None:
-    """A fence, rally points, parameters that are not set."""
-    circle = {"inclusion": True, "circle": {"center": [47, 8], "radius": 90}}
-    path = plan(
-        tmp_path / "a.plan",
-        waypoint(0.001),
-        survey(item(205, [None, 0, 0, 0, 0, 0, 0], 2)),
-        item(1000, [0, 0, 0, None, 0, 0, 0], 2),
-        geoFence={"version": 2, "polygons": [], "circles": [circle]},
-        rallyPoints={"version": 2, "points": [[47, 8, 30]]},
-    )
-    read = read_plan(path)
-    told = [str(one) for one in write_plan(tmp_path / "a.waypoints", read)]
-    assert told[0].startswith("items 2, 3: unset parameters: a .waypoints file has none")
-    assert [one.split(":")[0] for one in told[1:]] == ["geofence", "rally points"]
-    assert write_plan(tmp_path / "b.plan", read) == []
-    assert read_plan(tmp_path / "b.plan") == read
-    assert read.home is not None
-    assert (read.home.latitude, read.home.longitude, read.home.altitude) == PLANNED

@@ -21,7 +21,7 @@ command_name(16)  # loads MAVLink's names, which takes longer than any input may
 
 
 def seeds() -> Iterable[bytes]:
-    """Plans of simple items, a survey, a structure scan, a fence and rally points; lines."""
+    """Plans of simple items, a survey, a fence and rally points; lines."""
     items = [
         _item(22, [15.0, 0.0, 0.0, None, 47.0, 8.0, 10.0]),
         _item(178, [1, 5.0, -1, 0, 0, 0, 0]),
@@ -40,28 +40,13 @@ def seeds() -> Iterable[bytes]:
     }
     yield _plan([items[0], survey, items[-1]])
     corners = [[47.0, 8.0], [47.0, 8.001], [47.001, 8.0005]]
-    scan = {
-        "type": "ComplexItem",
-        "complexItemType": "StructureScan",
-        "version": 3,
-        "CameraCalc": {
-            "DistanceToSurface": 10,
-            "AdjustedFootprintFrontal": 10,
-            "AdjustedFootprintSide": 10,
-        },
-        "EntranceAltitude": 40,
-        "ScanBottomAlt": 2,
-        "StructureHeight": 30,
-        "Layers": 3,
-        "polygon": corners,
-    }
     fence = {
         "version": 2,
         "polygons": [{"inclusion": True, "polygon": corners}],
         "circles": [{"inclusion": False, "circle": {"center": corners[0], "radius": 20}}],
     }
     rally = {"version": 2, "points": [[47.0, 8.0, 30.0]]}
-    yield _plan([scan], geoFence=fence, rallyPoints=rally)
+    yield _plan(items, geoFence=fence, rallyPoints=rally)
     yield (
         b"QGC WPL 110\n"
         b"0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t488.0\t1\n"

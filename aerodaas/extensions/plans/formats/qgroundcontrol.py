@@ -23,7 +23,6 @@ from aerodaas.extensions.plans.plan import (
     PlanHome,
     PlanItem,
 )
-from aerodaas.extensions.plans.structure_scan import structure_scan
 
 __all__ = ["parse_qgroundcontrol"]
 
@@ -71,12 +70,14 @@ def parse_qgroundcontrol(content: object) -> Plan:
         items += _items(entry, len(items), notices)
         if len(items) > MOST_ITEMS:
             raise ConfigError(f"has more than {MOST_ITEMS} items: split it")
+    rally = _object(whole_plan.get("rallyPoints") or {}, "rallyPoints")
+    if rally.get("points"):
+        notices.append(Notice((), "rally points", "a drone that returns flies to its take-off"))
     return Plan(
         tuple(items),
         home=_home(mission.get("plannedHomePosition")),
         ardupilot=mission.get("firmwareType") == _ARDUPILOT,
         fence=tuple(_fence(whole_plan.get("geoFence"), notices)),
-        rally_points=tuple(_rally(whole_plan.get("rallyPoints"))),
         notices=tuple(notices),
     )
 
@@ -97,8 +98,6 @@ def _items(entry: object, before: int, notices: list[Notice]) -> Iterator[PlanIt
         for inner in stored:
             before += 1
             yield _simple(_object(inner, f"item {before}"), before)
-    elif kind == "StructureScan":
-        yield from structure_scan(item, before + 1)
     elif kind in _LANDINGS:
         why = "the drone comes back to its take-off and lands there"
         notices.append(Notice((before + 1,), str(kind), why))
@@ -198,18 +197,6 @@ def _fence(value: object, notices: list[Notice]) -> Iterator[FencePolygon | Fenc
             place(*_pair(circle.get("center"), where), where),
             radius,
         )
-
-
-def _rally(value: object) -> Iterator[tuple[float, float, float]]:
-    if value is None:
-        return
-    points = _entries(_object(value, "rallyPoints").get("points", []), "rallyPoints.points")
-    for number, point in enumerate(points, 1):
-        where = f"rally point {number}"
-        entries = _entries(point, where)
-        if len(entries) != 3:  # noqa: PLR2004 - latitude, longitude, altitude
-            raise ConfigError(f"{where} must be latitude, longitude and altitude")
-        yield (*place(entries[0], entries[1], where), finite(entries[2], f"{where}: altitude"))
 
 
 def _object(value: object, where: str) -> dict[str, Any]:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
-from aerodaas.extensions.plans.commands import FRAME_ABOVE_SEA, NAV_WAYPOINT, command_name
+from aerodaas.extensions.plans.commands import (
+    FRAME_ABOVE_SEA,
+    command_name,
+)
 from aerodaas.extensions.plans.formats.numbers import finite
 from aerodaas.extensions.plans.plan import MOST_ITEMS, Plan, PlanHome, PlanItem
 
@@ -30,9 +34,9 @@ def parse_waypoint_file(text: str) -> Plan:
     if not items:
         raise ConfigError("it holds no items, not even number 0, which is home: save it again")
     first_item = items[0]
-    if (first_item.command, first_item.frame) != (NAV_WAYPOINT, FRAME_ABOVE_SEA):
+    if (first_item.command, first_item.frame) != (mavlink.MAV_CMD_NAV_WAYPOINT, FRAME_ABOVE_SEA):
         raise ConfigError(
-            f"its item 0 must be home, command {NAV_WAYPOINT} in frame {FRAME_ABOVE_SEA}, but is "
+            f"its item 0 must be home, command 16 in frame {FRAME_ABOVE_SEA}, but is "
             f"{command_name(first_item.command)} in frame {first_item.frame}: put a line for home "
             "before it, and number the others from 1"
         )
