@@ -68,10 +68,6 @@ PEERS = {
         ("fastddsgen",),
         ("g++",),
     ),
-    "AERODAAS_TEST_TELLO": Peer(
-        "applications for the emulated Tello, five minutes each of a machine with nothing beside "
-        "them: situation_awareness,search_and_rescue"
-    ),
     "AERODAAS_TEST_DATA": Peer(
         "a folder of real pictures and models: tests/analytics/detection/test_real_models.py"
     ),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
@@ -150,35 +149,6 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Iterator[Process]:
     yield process
     process.pipe.close()
     os.close(process.read)
-
-
-def test_how_a_guard_is_started(started: Process) -> None:
-    """Its own file, isolated, with the Tello's socket and address; out of the reach of Ctrl-C."""
-    ((command, how),) = started.started
-    assert command == [
-        sys.executable,
-        "-I",
-        "-S",
-        dead_man.__file__,
-        "42",
-        "192.168.10.1",
-        "8889",
-    ]
-    assert how["pass_fds"] == [42]
-    assert how["start_new_session"] is True
-    assert how["stdin"] == -1
-    assert how["bufsize"] == 0
-    assert os.get_blocking(started.pipe.fileno()) is False
-
-
-def test_what_a_guard_is_told(started: Process) -> None:
-    """A letter with every `rc`, and a goodbye; then it is waited for."""
-    for moving in (True, False, True):
-        started.guard.restart(moving=moving)
-    started.guard.close()
-    assert started.words() == b"msmq"
-    assert started.words() == b"", "the pipe is closed"
-    assert started.waited == [5.0]
 
 
 def _full(started: Process) -> None:

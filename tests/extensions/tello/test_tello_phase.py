@@ -116,21 +116,6 @@ def test_calm_packets_count_in_a_row() -> None:
     assert flight.phase.risen
 
 
-def test_a_request_begins_the_counting_anew() -> None:
-    """Nine before a take-off is asked for again are of the one before."""
-    flight = Flight()
-    flight.to(VehicleMode.TAKING_OFF)
-    flight.turn(9 / 8, 1.0)
-    flight.to(VehicleMode.TAKING_OFF)
-    flight.turn(9 / 8, 1.0)
-    risen = [flight.phase.risen]
-    flight.phase.rose()
-    risen.append(flight.phase.risen)
-    flight.to(VehicleMode.HOLDING)
-    risen.append(flight.phase.risen)
-    assert risen == [False, True, False]
-
-
 def test_a_refused_take_off_leaves_it_on_the_ground() -> None:
     """With the reason, until the next; a reply that comes later, or to nothing, says nothing."""
     phase = FlightPhase()
@@ -266,17 +251,3 @@ def test_a_flight_that_begins_by_itself_has_not_ended() -> None:
     flight.turn(0.125, 0.0)
     flight.stand(1.5)
     assert [flight.phase.ended] == [FlightEnd.LANDED]
-
-
-def test_a_take_off_forgets_the_flight_before() -> None:
-    """Its lift, its fall and its end: what does not lift has not flown."""
-    flight = Flight()
-    flight.turn(2.0, 1.0, down=3.0)
-    flight.to(VehicleMode.LANDING)
-    flight.stand(1.5)
-    flight.to(VehicleMode.TAKING_OFF)
-    assert flight.phase.ended is None
-    flight.to(VehicleMode.LANDING)
-    flight.stand(4.0)
-    assert [flight.phase.mode] == [VehicleMode.GROUNDED]
-    assert flight.phase.ended is None

@@ -7,10 +7,8 @@ import random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from aerodaas.extensions.tello.commands import BodyMotion, Sticks, StickScale
+from aerodaas.extensions.tello.commands import Sticks, StickScale
 from aerodaas.extensions.tello.reckoning import DeadReckoning
 from aerodaas.extensions.tello.state import parse_state
 from aerodaas.geometry.frames import wrap_angle
@@ -104,27 +102,3 @@ def test_without_packets_the_uncertainty_grows_quickly() -> None:
     before = run.reckoning.sigma
     run.fly(Sticks(), 4.0, packets=False)
     assert run.reckoning.sigma > before + 1.0
-
-
-@settings(max_examples=50)
-@given(st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-2, 2)), max_size=20))
-def test_sticks_and_motions_undo_each_other_within_a_percent(
-    asked: list[tuple[float, float, float]],
-) -> None:
-    """What is sent is what was asked, clamped to 100 % and rounded to one."""
-    for ahead, left, rate in asked:
-        sticks = SCALE.sticks(BodyMotion(np.array([ahead, left, 0.0]), rate))
-        assert max(abs(sticks.ahead), abs(sticks.right), abs(sticks.clockwise)) <= 100
-        back = SCALE.motion(sticks)
-        for given_, flown, full in (
-            (ahead, back.velocity[0], SCALE.speed),
-            (left, back.velocity[1], SCALE.speed),
-            (rate, back.yaw_rate, SCALE.turn),
-        ):
-            assert flown == pytest.approx(min(max(given_, -full), full), abs=0.0051 * full)
-
-
-@given(st.sampled_from([math.nan, math.inf, -math.inf]))
-def test_sticks_of_nonsense_are_centred(value: float) -> None:
-    """No number that is not finite reaches the wire."""
-    assert SCALE.sticks(BodyMotion(np.array([value, value, value]), value)) == Sticks()

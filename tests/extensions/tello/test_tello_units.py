@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from aerodaas.extensions.tello.battery import BatteryGauge
 from aerodaas.extensions.tello.commands import (
@@ -16,11 +18,14 @@ from aerodaas.extensions.tello.commands import (
     TAKE_OFF,
     VERSION,
     BodyMotion,
+    Command,
     Sticks,
     StickScale,
     ports,
 )
 from aerodaas.extensions.tello.state import parse_state
+from tools.tello_vehicle.flight import TelloFlight
+from tools.tello_vehicle.options import TelloOptions
 
 SCALE = StickScale(speed=2.0, climb=0.5, turn=1.25)
 FIELDS = {
@@ -190,3 +195,74 @@ def test_the_middle_of_the_newest_nine_figures(percents: list[int], charge: floa
     for percent in percents:
         gauge.add(percent)
     assert gauge.battery.fraction == charge
+
+
+WHOLE = packet()
+
+
+@given(st.binary(max_size=300))
+def test_noise_is_no_state(noise: bytes) -> None:
+    """Random bytes are refused, without an exception."""
+    assert parse_state(noise) is None
+
+
+@given(st.integers(0, len(WHOLE) - 1))
+def test_a_truncated_packet_never_gives_a_wrong_figure(length: int) -> None:
+    """A cut packet is refused, or it has lost nothing that we read: never bat:8 of bat:87."""
+    whole = parse_state(WHOLE)
+    assert parse_state(WHOLE[:length]) in {None, whole}
+
+
+@given(st.integers(0, len(WHOLE) - 1), st.integers(0, 255))
+def test_a_changed_byte_never_gives_an_unbelievable_state(index: int, value: int) -> None:
+    """One byte off: refused, or figures within their ranges."""
+    content = bytearray(WHOLE)
+    content[index] = value
+    state = parse_state(bytes(content))
+    if state is not None:
+        assert 0 <= state.battery <= 100
+        assert all(abs(axis) <= 30.0 for axis in state.velocity)
+        assert abs(state.yaw) <= math.pi
+        assert math.isfinite(state.height)
+
+
+@given(st.floats(0.0, 1.0), st.floats(-180.0, 180.0))
+def test_the_emulated_tello_sends_what_we_read(charge: float, yaw: float) -> None:
+    """Both ends agree on the format, whatever the figures."""
+    flight = TelloFlight(TelloOptions(battery=charge, start_yaw=yaw, start=(3.0, 4.0, 0.5)))
+    state = parse_state(flight.state().encode())
+    assert state is not None
+    assert state.battery == round(100 * charge)
+    assert state.yaw == 0.0, "it looks where it was switched on"
+
+
+@pytest.mark.parametrize(
+    ("command", "reply", "taken"),
+    [
+        (TAKE_OFF, "ok", True),
+        (TAKE_OFF, "error Motor stop", True),
+        (TAKE_OFF, "30", False),
+        (VERSION, "30", True),
+        (VERSION, "ok", False),
+        (VERSION, "unknown command: sdk?", True),
+        (ENTER, "87", False),
+    ],
+)
+def test_a_reply_to_another_kind_of_command_is_not_taken(
+    command: Command, reply: str, *, taken: bool
+) -> None:
+    """Replies carry no id, but numbers answer questions only."""
+    assert command.accepts(reply) is taken
+
+
+@given(
+    st.binary(max_size=40) | st.sampled_from([b"ok", b"OK", b"30", b"error", b"unknown command: x"])
+)
+def test_noise_is_never_a_commands_success(noise: bytes) -> None:
+    """Whatever comes: a request is done by `ok` alone, a question by a number alone."""
+    reply = noise.decode("ascii", "replace").strip()
+    for command in (ENTER, TAKE_OFF, LAND, STREAM_ON, ports(8891, 11112)):
+        if command.accepts(reply) and command.succeeded(reply):
+            assert reply.lower() == "ok"
+    if VERSION.accepts(reply) and VERSION.succeeded(reply):
+        assert int(reply) >= 0
