@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import overload
 
 import cv2
 import numpy as np
@@ -34,34 +33,20 @@ class Picture:
     caption: str
 
     def jpeg(self) -> bytes:
-        """The picture, coded."""
+        """The picture as JPEG."""
         return bytes(cv2.imencode(".jpg", self.image, _QUALITY)[1])
 
 
-class Pictures(Sequence[Picture]):
+class Pictures(tuple[Picture, ...]):
     """Pictures that a notebook shows side by side, in as many rows as they need."""
 
-    def __init__(self, pictures: Iterable[Picture]) -> None:
-        self._pictures = tuple(pictures)
-
-    @overload
-    def __getitem__(self, index: int) -> Picture: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Picture, ...]: ...
-    def __getitem__(self, index: int | slice) -> Picture | tuple[Picture, ...]:
-        """One of them, or several."""
-        return self._pictures[index]
-
-    def __len__(self) -> int:
-        """Count them."""
-        return len(self._pictures)
+    __slots__ = ()
 
     def __repr__(self) -> str:
         """Their captions, where nothing can be drawn."""
         return f"Pictures({', '.join(one.caption for one in self)})"
 
     def _repr_html_(self) -> str:
-        """All of them, in one line as far as there is room."""
         return render_page(Path(__file__).with_name("pictures.html"), pictures=self)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import itertools
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,8 +30,6 @@ __all__ = ["live_table", "recorded_table"]
 _TIME = "seconds"
 """Name of the index: mission seconds of capture."""
 _AXES = ("east", "north", "up")
-_PIXELS = ("image", "depth", "camera", "odometry", "nearest")
-"""Fields of a frame and of detections that make no columns."""
 Row = dict[str, Any]
 
 
@@ -64,13 +63,13 @@ def live_table(
         )
     rows: list[Row] = []
     until = time.monotonic() + seconds
-    taken = 0
-    while (items is None or taken < items) and (left := until - time.monotonic()) > 0:
+    for _ in itertools.count() if items is None else range(items):
+        if (left := until - time.monotonic()) <= 0:
+            break
         try:
             message = next_message(left)
         except (TimeoutError, StopIteration):
             break
-        taken += 1
         rows += ({_TIME: to_seconds(message.header.stamp), **row} for row in _rows(message.item))
     return _frame(rows)
 
@@ -139,24 +138,20 @@ def _rows(item: object) -> Iterator[Row]:
 
 def _cells(prefix: str, item: object) -> Iterator[tuple[str, Any]]:
     """Names and values of what fits into cells."""
-    if isinstance(item, Frame):
-        yield from (("width", item.width), ("height", item.height))
     fields: dict[str, Any] = {}
     if isinstance(item, Header):
         # The stamp is the index.
         fields = {"id": item.id, "source": item.source}
+    elif isinstance(item, Frame):
+        fields = {"width": item.width, "height": item.height, "header": item.header}
     elif dataclasses.is_dataclass(item):
         fields = {one.name: getattr(item, one.name) for one in dataclasses.fields(item)}
     elif isinstance(item, dict):
-        fields = {str(key): value for key, value in item.items()}
+        fields = item
     for name, value in fields.items():
-        if isinstance(item, Frame) and name in _PIXELS:
-            continue
         whole = f"{prefix}{name}"
         if isinstance(value, np.ndarray) and value.shape == (len(_AXES),):
-            yield from (
-                (f"{whole}_{axis}", part) for axis, part in zip(_AXES, value.tolist(), strict=True)
-            )
+            yield from zip((f"{whole}_{axis}" for axis in _AXES), value.tolist(), strict=True)
         elif isinstance(value, enum.Enum):
             yield whole, value.value
         elif value is None or isinstance(value, bool | int | float | str):
