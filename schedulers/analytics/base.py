@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from aerodaas.clock import NANOSECONDS
@@ -305,7 +305,3 @@ class AnalyticsScheduler:
         """
         self.resources = resources
         return ()
-
-    def observe(self) -> Mapping[str, float]:
-        """Figures worth plotting over time, such as queue lengths and estimates in ms."""
-        return {}

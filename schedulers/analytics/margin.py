@@ -23,7 +23,7 @@ Python, twice a second or when surprised; every other event takes O(log n) in th
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from math import exp
@@ -220,15 +220,6 @@ class Margin(AnalyticsScheduler):
         self.cloud.silent_since = None
         self._stale = True
         return super().resources_changed(resources, now)
-
-    def observe(self) -> Mapping[str, float]:
-        """Tasks waiting, the network's delay, and whether the cloud is silent."""
-        return {
-            "waiting": sum(len(model.waiting) for model in self._models.values()),
-            "planned": len(self._steps),
-            "network delay (ms)": self.cloud.beliefs.delay / MILLISECOND,
-            "cloud silent": float(self.cloud.silent_since is not None),
-        }
 
     def _model(self, profile: Profile) -> _Model:
         """Begin to watch a model."""

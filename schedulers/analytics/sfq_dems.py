@@ -6,7 +6,7 @@ reservation in loss networks", Probability in the Engineering and Informational 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from aerodaas.clock import NANOSECONDS
@@ -138,15 +138,6 @@ class SfqDems(AnalyticsScheduler):
                 decisions += [Drop(one.task, "the cloud is gone") for one in tenant.held]
                 tenant.held.clear()
         return decisions + self._fill(now)
-
-    def observe(self) -> Mapping[str, float]:
-        """Lengths of the queues, over all tenants."""
-        tenants = self._tenants.values()
-        return {
-            "edge queue": sum(len(one.dems.queue) for one in tenants),
-            "tentative queue": sum(len(one.dems.tentative) for one in tenants),
-            "held from the cloud": sum(len(one.held) for one in tenants),
-        }
 
     def _active(self, now: int) -> list[_Tenant]:
         return [one for one in self._tenants.values() if now - one.seen <= _ACTIVE]

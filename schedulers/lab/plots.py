@@ -1,4 +1,4 @@
-"""Plots of the lab: bars per scheduler, the timeline of one edge, queues and estimates."""
+"""Plots of the lab: bars per scheduler, and the timeline of one edge."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Result, TaskOutcome, TaskPlace
 from aerodaas.schedulers.lab.run import LabResult
-from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace
 
-__all__ = ["plot_bars", "plot_observations", "plot_timeline"]
+__all__ = ["plot_bars", "plot_timeline"]
 
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 """Okabe and Ito (2008): distinguishable with every kind of colour vision."""
@@ -122,64 +120,6 @@ def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float
         fig.tight_layout()
         fig.savefig(path)
         plt.close(fig)
-
-
-def plot_observations(traces: Mapping[str, Trace], sample: SamplePath, path: Path) -> None:
-    """Queue lengths and estimates over time, one column per scheduler that lets itself be seen.
-
-    Args:
-        traces: Runs by scheduler, recorded; those without observations have no column.
-        sample: The path that they ran on, for the true delay of its network.
-        path: File of the picture; none is made where no scheduler lets itself be seen.
-    """
-    seen = {name: trace for name, trace in traces.items() if _keys(trace)}
-    if not seen:
-        return
-    delay = sample.network.cloud_time
-    with plt.style.context(_STYLE):
-        fig, grid = plt.subplots(
-            2, len(seen), figsize=(5.5 * len(seen), 6), sharex=True, squeeze=False
-        )
-        for (name, trace), (top, bottom) in zip(seen.items(), grid.T, strict=True):
-            seconds = [one.at / NANOSECONDS for one in trace.observations]
-            for axis, estimates in ((top, False), (bottom, True)):
-                keys = [key for key in _keys(trace) if key.endswith("(ms)") == estimates]
-                for key, colour in zip(keys, PALETTE, strict=False):
-                    values = [one.figures.get(key, float("nan")) for one in trace.observations]
-                    axis.plot(seconds, values, color=colour, linewidth=1, label=key)
-                axis.set_ylabel("ms" if estimates else "tasks")
-            added = [((delay(10**9, one.at) or 0) - 10**9) / 1e6 for one in trace.observations]
-            lost = [delay(10**9, one.at) is None for one in trace.observations]
-            bottom.plot(
-                seconds,
-                [float("nan") if gone else ms for ms, gone in zip(added, lost, strict=True)],
-                color="black",
-                linestyle=":",
-                label="true network delay (ms)",
-            )
-            if any(lost):
-                bottom.fill_between(
-                    seconds,
-                    0,
-                    1,
-                    where=lost,
-                    transform=bottom.get_xaxis_transform(),
-                    color="grey",
-                    alpha=0.3,
-                    label="outage",
-                )
-            for axis in (top, bottom):
-                axis.set_ylim(bottom=0)
-                axis.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-            top.set_title(name, fontsize=10, pad=34)
-            bottom.set_xlabel("seconds")
-        fig.tight_layout()
-        fig.savefig(path)
-        plt.close(fig)
-
-
-def _keys(trace: Trace) -> list[str]:
-    return list(dict.fromkeys(key for one in trace.observations for key in one.figures))
 
 
 def _bar(axis: Axes, result: Result, row: float, height: float, colours: Mapping[str, str]) -> None:

@@ -11,7 +11,6 @@ from itertools import count
 from math import inf
 
 from aerodaas.schedulers.analytics.base import (
-    MILLISECOND,
     AnalyticsScheduler,
     Drop,
     Resources,
@@ -24,18 +23,9 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.dispatch import Dispatch
 from aerodaas.schedulers.lab.sample import SamplePath
 
-__all__ = ["SchedulerObservation", "Trace", "simulate"]
+__all__ = ["Trace", "simulate"]
 
 _FINISH, _LOST, _TIMER = range(3)
-_EVERY = 50 * MILLISECOND
-
-
-@dataclass(slots=True)
-class SchedulerObservation:
-    """Internal figures of a scheduler at one moment."""
-
-    at: int
-    figures: dict[str, float]
 
 
 @dataclass(slots=True)
@@ -50,8 +40,7 @@ class Trace:
     end: int = 0
     """When the last event happened, nanoseconds."""
     decisions: list[tuple[int, RunOnEdge | SendToCloud | Drop]] = field(default_factory=list)
-    """Filled on request, as are the observations."""
-    observations: list[SchedulerObservation] = field(default_factory=list)
+    """Filled on request."""
 
 
 class _SimulatedHost:
@@ -105,7 +94,7 @@ def simulate(
         path: The path of one edge.
         scheduler: The scheduler, which stays unchanged.
         resources: The edge executor and the cloud; by default those of the class.
-        record: Whether to keep every decision, and observe the scheduler every 50 ms.
+        record: Whether to keep every decision.
 
     Raises:
         SchedulerError: If a decision cannot be carried out.
@@ -116,15 +105,11 @@ def simulate(
     dispatch.start(0)
     heap, trace = host.heap, host.trace
     now = 0
-    look_at = 0
     for task in path.tasks:
         now = task.arrival
         if heap and heap[0][0] <= now:
             _deliver(dispatch, heap, now)
         dispatch.arrived(task, now)
-        if record and now >= look_at:
-            trace.observations.append(SchedulerObservation(now, dict(dispatch.scheduler.observe())))
-            look_at = now + _EVERY
     trace.end = max(now, _deliver(dispatch, heap, inf))
     trace.undecided = list(dispatch.undecided.values())
     return trace

@@ -199,11 +199,7 @@ def _loads(
 def _plot(result: LabResult, names: list[str], resources: Resources, folder: Path) -> None:
     require_extra("plots", "a plot")
     # Matplotlib takes most of a second to import, which a table alone need not pay.
-    from aerodaas.schedulers.lab.plots import (  # noqa: PLC0415
-        plot_bars,
-        plot_observations,
-        plot_timeline,
-    )
+    from aerodaas.schedulers.lab.plots import plot_bars, plot_timeline  # noqa: PLC0415
     from aerodaas.schedulers.lab.sample import SamplePath  # noqa: PLC0415
     from aerodaas.schedulers.lab.simulator import simulate  # noqa: PLC0415
 
@@ -214,13 +210,11 @@ def _plot(result: LabResult, names: list[str], resources: Resources, folder: Pat
     plot_bars(result, folder / f"{stem}_bars.png")
     path = SamplePath.draw(result.workload, 0, result.seeds[0], result.times, result.network)
     middle = result.workload.duration / 2e9
-    traces = {}
     for name in names:
-        traces[name] = simulate(path, load_scheduler(name), resources, record=True)
+        trace = simulate(path, load_scheduler(name), resources)
         title = f"{name} on edge 0 of {result.workload.name}, seed {result.seeds[0]}"
         file = folder / f"{stem}_timeline_{_file_name(name)}.png"
-        plot_timeline(traces[name], file, title, middle, middle + 6)
-    plot_observations(traces, path, folder / f"{stem}_over_time.png")
+        plot_timeline(trace, file, title, middle, middle + 6)
     typer.echo(f"plots in {folder}")
 
 

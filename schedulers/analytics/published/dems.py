@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from heapq import heappop, heappush
 from itertools import accumulate
 
@@ -78,10 +78,6 @@ class Dems(Dem):
             return super().executor_idle(now)
         del self.tentative[stolen]
         return [self.run(stolen, now, STOLEN)]
-
-    def observe(self) -> Mapping[str, float]:
-        """The queues' lengths."""
-        return {**super().observe(), "tentative queue": len(self.tentative)}
 
     def _steal(self, now: int) -> Task | None:
         room = self._room(now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from aerodaas.clock import NANOSECONDS
@@ -122,14 +122,6 @@ class DemsA(Dems):
         elif result.place is TaskPlace.CLOUD and result.outcome in _ANSWERED:
             model.observe(taken)
         return super().task_finished(result, now)
-
-    def observe(self) -> Mapping[str, float]:
-        """The queues' lengths and the estimates."""
-        estimates = {
-            f"cloud time of {name} (ms)": model.cloud_time / MILLISECOND
-            for name, model in self._models.items()
-        }
-        return {**super().observe(), **estimates}
 
     def _model(self, task: Task) -> _Estimate:
         model = self._models.get(task.profile.model)

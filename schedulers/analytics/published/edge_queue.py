@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
@@ -154,7 +154,3 @@ class EdgeQueue(AnalyticsScheduler):
         if result.started + result.task.profile.edge_time == self.free_at:
             self.free_at = now
         return ()
-
-    def observe(self) -> Mapping[str, float]:
-        """Length of the queue."""
-        return {"edge queue": len(self.queue)}

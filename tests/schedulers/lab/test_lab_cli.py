@@ -38,7 +38,7 @@ def test_a_comparison_with_ones_own_class(tmp_path: Path) -> None:
     assert "of bound" in text
     found = json.loads(out.read_text())[0]["schedulers"]
     assert found[f"{mine}:Mine"]["means"]["completion"]["value"] == 0
-    assert len(list(plots.glob("*.png"))) == 4
+    assert len(list(plots.glob("*.png"))) == 3
 
 
 def test_options_given_several_times_all_count(tmp_path: Path) -> None:
