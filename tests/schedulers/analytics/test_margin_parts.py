@@ -21,11 +21,9 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates
-from aerodaas.schedulers.analytics.forecast import Forecast
 from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, JobQueue, plan
-from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.quality import QualityWatch
 from aerodaas.testing.scheduler_kit import play
 
@@ -76,36 +74,12 @@ def test_estimates_never_stop_following() -> None:
     assert beliefs.belief(M).mean / MS == pytest.approx(202)
 
 
-def test_the_fourth_regular_arrival_is_the_first_to_be_forecast_from() -> None:
-    """Of arrivals every 100, the third gap makes three that agree."""
-    forecast = Forecast()
-    forecasts = []
-    for at in (0, 100, 200, 300):
-        forecast.arrived("drone", at)
-        forecasts.append(list(forecast.due(at, 10_000)))
-    assert forecasts == [[], [], [], [(400, "drone")]]
-
-
-@pytest.mark.parametrize("cost", ["edge_cost", "cloud_cost"])
-@pytest.mark.parametrize("value", [-0.1, float("inf"), float("nan")])
-def test_costs_that_cannot_be_are_refused(cost: str, value: float) -> None:
-    """The message names the model and the cost."""
-    with pytest.raises(SchedulerError, match=f"'m': {cost} must not be negative"):
-        Profile("m", 100, 10, 1, 1, *((value, 0) if cost == "edge_cost" else (0, value)))
-
-
 def test_a_small_gain_and_a_short_time_out_are_allowed() -> None:
     """Half a unit on one of the two, and a nanosecond; a gain of nothing on both is not."""
     assert Profile("m", 100, 10, 1, 1, 99.5, 200).edge_gain == 0.5
     assert Resources(cloud_timeout=1).cloud_timeout == 1
     with pytest.raises(SchedulerError, match="would never run"):
         Profile("m", 100, 10, 1, 1, 100, 100)
-
-
-def test_no_more_tasks_than_slots_are_in_the_cloud_at_once() -> None:
-    """Of five at once in two slots, the last starts third."""
-    ends = play(CloudOnly(), [(0, M)] * 5, resources=Resources(cloud_slots=2))
-    assert [end.started for end in ends] == [0, 0, 200, 200, 400]
 
 
 def watch(total: int, done: int, missed: int, success: float = 0.9) -> QualityWatch:
@@ -278,14 +252,6 @@ def test_a_plan_runs_nothing_for_nothing() -> None:
     """A loss of the benefit gains nothing, for certain."""
     assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 100)])) == []
     assert chosen(JobQueue(TimeEstimate(100, 1e-6), [Job("job", 0, 500, 100, 99)])) == ["job"]
-
-
-def test_a_plan_prefers_a_quick_gain_to_a_long_small_one() -> None:
-    """Each must start at once, so one of the two is lost."""
-    quick = JobQueue(TimeEstimate(10, 1e-6), [Job("quick", 0, 11, 100, 0)])
-    long = JobQueue(TimeEstimate(200, 1e-6), [Job("long", 0, 201, 5, 0)])
-    assert chosen(quick, long) == ["quick"]
-    assert chosen(long, quick) == ["quick"]
 
 
 def test_a_plan_takes_a_lane_s_jobs_in_their_order_and_passes_over_the_hopeless() -> None:

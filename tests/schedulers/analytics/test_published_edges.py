@@ -72,13 +72,6 @@ def test_any_gain_at_all_is_worth_the_cloud(cost: float, sent: bool) -> None:  #
     assert ends[1].place == ("cloud" if sent else "nowhere")
 
 
-def test_without_a_cloud_cloud_only_drops() -> None:
-    """There is no slot that it could wait for."""
-    scheduler = CloudOnly()
-    scheduler.start(Resources(cloud_slots=0), 0)
-    assert [type(one) for one in scheduler.task_arrived(task(model("m")), 0)] == [Drop]
-
-
 @pytest.mark.parametrize(("deadline", "place"), [(150, "cloud"), (151, "edge")])
 def test_edge_and_cloud_want_to_be_done_before_the_deadline(deadline: float, place: str) -> None:
     """Behind the block a task of 100 is done at 150."""

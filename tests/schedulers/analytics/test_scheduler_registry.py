@@ -103,6 +103,7 @@ def test_what_cannot_be_loaded_is_named(wanted: str, error: type[Exception], wor
         ({"deadline": -5}, "deadline must be positive"),
         ({"edge_time": 0}, "edge_time"),
         ({"cloud_cost": -1.0}, "cloud_cost"),
+        ({"edge_cost": float("nan")}, "edge_cost"),
         ({"edge_cost": 20.0, "cloud_cost": 10.0}, "never run"),
         ({"benefit": float("nan")}, "never run"),
     ],

@@ -174,15 +174,6 @@ def test_networks_that_make_no_sense_are_refused(name: str) -> None:
         Network.named(name, MINUTE)
 
 
-def test_a_bad_trace_is_refused(tmp_path: Path) -> None:
-    """Times that do not ascend, bandwidths that are not positive, lines that are short."""
-    for text in ("0,1\n0,2\n", "0,0\n", "0\n", "", "0,x\n"):
-        file = tmp_path / "bad.csv"
-        file.write_text(text)
-        with pytest.raises(SchedulerError, match=r"bad\.csv"):
-            Network.named(f"trace:{file}", MINUTE)
-
-
 @given(st.integers(0, 120), st.integers(1, 2000), st.integers(0, 50))
 def test_the_earliest_end_is_a_bound(start: int, nominal: int, later: int) -> None:
     """No start at or after `start` ends before it."""
