@@ -13,7 +13,6 @@ from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
-from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording, vehicle_states
@@ -171,13 +170,3 @@ def test_text_cannot_steer_the_terminal() -> None:
 def test_json_within_the_bounds_is_unchanged() -> None:
     """Also text outside ASCII, as escapes of two halves."""
     assert decode_json(b'{"a": ["\\ud83d\\ude00", 1, null]}') == {"a": ["\U0001f600", 1, None]}
-
-
-def test_the_recording_of_pictures_without_loss_is_read_whole(tmp_path: Path) -> None:
-    """Checks cost nothing that is whole: every message of a flight of ours passes."""
-    path = tmp_path / "flight.mcap"
-    config = RecordingConfig(images="png")
-    written = record(path, SyntheticFlight(rate=2, hover=0.5, frames=1), config=config)
-    with Recording.open(path) as recording:
-        assert sum(1 for _ in recording.records()) == written.messages
-        assert recording.damaged == 0

@@ -120,14 +120,6 @@ def test_any_time_gives_the_last_picture_captured(film: FrameIndex, times: list[
             assert one["item"]["of"]["header"]["stamp"] == CAPTURED[number]
 
 
-def test_each_picture_is_there_to_the_nanosecond(film: FrameIndex) -> None:
-    """At its capture and just before the next one; in order, and from the end."""
-    for order in (range(0, COUNT, 7), range(COUNT - 1, -1, -1)):
-        for number in order:
-            for time in (CAPTURED[number], *CAPTURED[number + 1 : number + 2] - 1):
-                assert film.at(STREAM, int(time))[-1][0]["captured"] == CAPTURED[number]
-
-
 def test_there_is_no_other_stream(film: FrameIndex) -> None:
     """Nor a picture of what is none."""
     for name in ("tello/other", FOUND, ""):

@@ -6,49 +6,10 @@ from io import BytesIO
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
-from mcap_files import END, Said, write_file
+from mcap_files import END
 
-from aerodaas.recording.decoding.index import load, read_index
+from aerodaas.recording.decoding.index import read_index
 from aerodaas.recording.reader import Recording, Topic
-
-FLIGHT = [Said("/a", 1_100, 0), Said("/b", 1_200, 1), Said("/a", 1_300, 2), Said("/a", 1_400, 3)]
-
-
-def test_loose_messages_are_gathered_into_blocks_of_about_a_megabyte(tmp_path: Path) -> None:
-    """Of three of 600 kB, two make a block and the third its own; each block knows its own."""
-    path = tmp_path / "a.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, use_chunking=False)
-        writer.start()
-        schema = writer.register_schema("own.Said", "jsonschema", b"{}")
-        one, two = (writer.register_channel(topic, "json", schema) for topic in ("/1", "/2"))
-        for channel, time in ((two, 30), (one, 10), (one, 20)):
-            writer.add_message(channel, time, b'"%s"' % (b"x" * 600_000), time)
-        writer.finish()
-    with path.open("rb") as file:
-        blocks = read_index(file, path.stat().st_size).blocks
-        assert [(it.start, it.end, it.channels) for it in blocks] == [
-            (10, 30, {one, two}),
-            (20, 20, {one}),
-        ]
-        assert [len(list(load(file, block))) for block in blocks] == [2, 1]
-    with Recording.open(path) as recording:
-        assert [it.stamp for it in recording.records()] == [0, 10, 20]
-
-
-def test_blocks_of_a_file_with_chunks_are_its_chunks(tmp_path: Path) -> None:
-    """The same whether its index told of them or they were found: place, times and channels."""
-    whole = write_file(tmp_path / "a.mcap", FLIGHT, "small chunks")
-    cut = write_file(tmp_path / "b.mcap", FLIGHT, "small chunks", finish=False)
-    found = []
-    for path in (whole, cut):
-        with path.open("rb") as file:
-            index = read_index(file, path.stat().st_size)
-        blocks = [block for block in index.blocks if block.channels]
-        found.append(([(b.offset, b.length, b.start, b.end, b.channels) for b in blocks], index))
-    assert found[0][0] == found[1][0]
-    assert [times[2:4] for times in found[0][0]] == [(it.time, it.time) for it in FLIGHT]
-    assert found[0][1].counts == found[1][1].counts == {1: 3, 2: 1}
 
 
 class Watched(BytesIO):

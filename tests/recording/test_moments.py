@@ -15,7 +15,7 @@ from aerodaas.messages.frames import Frame, Header
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.report.flight import Band, RecordedDetection, RecordedFlight, RobotFlight
-from aerodaas.recording.report.moments import Moment, MomentPicture, key_moments, picture_moments
+from aerodaas.recording.report.moments import Moment, key_moments, picture_moments
 from aerodaas.recording.report.overlay import draw_detections
 
 SECOND = 1_000_000_000
@@ -39,13 +39,6 @@ def told(found: list[Moment]) -> list[tuple[float, str]]:
     return [(moment.stamp / SECOND, moment.reason) for moment in found]
 
 
-def test_a_flight_without_frames_has_no_moments() -> None:
-    """Whatever happened in it."""
-    made = RecordedFlight(sightings=[seen(1, "dog", 0.5)], alerts=[(1.0, "low", "battery low")])
-    made.robots["tello"] = RobotFlight(bands=[Band("landed", 0.0, 1.0)])
-    assert key_moments(made) == []
-
-
 def test_without_events_they_are_spread_evenly() -> None:
     """Of 101 frames, 5 are the first, each quarter's and the last; one frame is shown once."""
     assert told(key_moments(flight(*range(101)), 5)) == [
@@ -57,14 +50,6 @@ def test_without_events_they_are_spread_evenly() -> None:
     ]
     assert told(key_moments(flight(3), 5)) == [(3, CAMERA)]
     assert told(key_moments(flight(3, 4), 5)) == [(3, CAMERA), (4, CAMERA)]
-
-
-@pytest.mark.parametrize("most", [0, 1, 2, 12])
-def test_there_are_at_most_as_many_as_asked_for(most: int) -> None:
-    """None of none; twelve unless one says otherwise."""
-    made = flight(*range(50))
-    assert len(key_moments(made, most)) == most
-    assert len(key_moments(made)) == 12
 
 
 def test_the_frame_shown_is_the_first_from_then_on() -> None:
@@ -92,14 +77,6 @@ def test_first_and_surest_sightings_come_before_all_else() -> None:
     made.alerts = [(7.0, "low", "battery low")]
     assert told(key_moments(made, 2)) == [(1, "first dog"), (4, "surest dog")]
     assert told(key_moments(made, 3))[2] == (7, "alert: battery low")
-
-
-def test_a_frame_chosen_twice_is_shown_for_the_first_reason() -> None:
-    """The only sighting of a cat is its first and its surest: one moment, the first."""
-    made = flight(*range(10))
-    made.sightings = [seen(3, "cat", 0.5)]
-    made.alerts = [(3.0, "low", "battery low"), (4.0, "far", "too far")]
-    assert told(key_moments(made, 2)) == [(3, "first cat"), (4, "alert: too far")]
 
 
 @pytest.mark.parametrize(("most", "labels"), [(1, 1), (7, 1), (8, 2), (12, 3)])
@@ -163,13 +140,6 @@ def test_a_state_is_shown_by_its_own_robots_first_camera() -> None:
     (found,) = key_moments(made, 1)
     assert found == Moment(2 * SECOND, CAMERA, "landed")
     assert "lost" not in {reason for _, reason in told(key_moments(made))}
-
-
-def test_a_caption_says_when_and_why() -> None:
-    """Seconds to a tenth."""
-    image = np.zeros((2, 2, 3), np.uint8)
-    picture = MomentPicture(Moment(12_340_000_000, CAMERA, "first dog"), image)
-    assert picture.caption == "12.3 s: first dog"
 
 
 def test_pictures_are_fetched_and_what_was_found_is_drawn(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 from mcap.writer import Writer
-from rewritten import rewritten
 from synthetic_flight import SyntheticFlight, record
 
 from aerodaas.clock import seconds
@@ -116,24 +115,6 @@ def test_statuses_are_those_of_the_mission(path: Path) -> None:
     }  # fmt: skip
     gaps = [later.stamp - one.stamp for one, later in pairwise(told.statuses)]
     assert max(gaps) < 1.2e9
-
-
-def test_who_flew_by_hand_is_told(path: Path, tmp_path: Path) -> None:
-    """As live; a name that is none is nobody's."""
-
-    def change(topic: str, data: bytes) -> bytes:
-        if not topic.endswith("/mission"):
-            return data
-        value = json.loads(data)
-        return json.dumps(
-            {**value, "pilot": "asha" if value["state"] == "enroute" else ""}
-        ).encode()
-
-    told = read(rewritten(path, tmp_path / "by_hand.mcap", change=change)).tracks["tello"]
-    assert {(one.state == "enroute", one.pilot) for one in told.statuses} == {
-        (True, "asha"),
-        (False, ""),
-    }
 
 
 def test_what_it_was_flown_in_and_what_happened(path: Path) -> None:

@@ -99,25 +99,6 @@ def pixel(page: Page, x: int, y: int) -> list[int]:
     return found
 
 
-def test_a_moment_later_the_same_picture_keeps_its_boxes(browser: Browser, path: Path) -> None:
-    """Four pictures a second: two moments a hundredth apart share one."""
-    asked = "performance.getEntriesByType('resource').filter(one => one.name.includes('/picture'))"
-    flight, pictures = facts(path)
-    stamp = next(one.stamp for one in flight.sightings if one.stamp > 20e9)
-    assert stamp in pictures
-    with served(path) as address:
-        page = browser.open(address)
-        page.until("document.querySelector('.timeline')")
-        page.run(SEEK.format(stamp / 1e9 + 0.01))
-        until_stamp(page, stamp, 1)
-        before = page.run(f"{asked}.length")
-        page.run(SEEK.format(stamp / 1e9 + 0.02))
-        page.until(f"{asked}.length > {before}")
-        # Until it has been decoded and drawn.
-        page.run("new Promise(done => setTimeout(done, 300))")
-        until_stamp(page, stamp, 1)
-
-
 def test_it_opens_at_its_first_picture(browser: Browser, tmp_path: Path) -> None:
     """Not on a black one; what comes before is there, too, and a moment that is named is shown."""
     path = tmp_path / "late.mcap"
@@ -221,23 +202,6 @@ def test_it_is_played_by_keyboard_and_linked_to_a_moment(browser: Browser, path:
         # A link followed within the page.
         page.run("location.hash = '#t=12.25'")
         page.until(f"{TIME} === 12.25")
-        assert page.complaints() == []
-
-
-def test_one_that_breaks_off_says_so(browser: Browser, path: Path, tmp_path: Path) -> None:
-    """On a phone, too, where nothing is cut off."""
-    cut = tmp_path / "cut.mcap"
-    data = path.read_bytes()
-    cut.write_bytes(data[: int(len(data) * 0.6)])
-    with served(cut) as address:
-        page = browser.open(address, 400, 800)
-        page.until(
-            "document.querySelector('[data-testid=remark]')?.innerText.includes('breaks off')"
-        )
-        for width in (400, 1600):
-            for scheme in ("light", "dark"):
-                page.resize(width, 800, scheme)
-                assert page.run("document.documentElement.scrollWidth - innerWidth") <= 0
         assert page.complaints() == []
 
 

@@ -18,7 +18,7 @@ from aerodaas.config.model import RecordingConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.errors import RecordingError
 from aerodaas.messages.detections import Detection, Detections
-from aerodaas.messages.envelope import Message, TraceSpan
+from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.mission import Decision, MissionState, MissionStatus, SetpointRecord
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
@@ -129,20 +129,6 @@ def test_same_flight_gives_the_same_records(tmp_path: Path) -> None:
                 ]
             )
     assert contents[0] == contents[1]
-
-
-def test_times_are_of_the_mission_on_a_real_date(tmp_path: Path) -> None:
-    """log_time is when it was published, publish_time when it was measured."""
-    path = tmp_path / "times.mcap"
-    recorded(path, Battery(0.5))
-    with path.open("rb") as file:
-        (message,) = (
-            message
-            for _, channel, message in make_reader(file).iter_messages()
-            if channel.topic == "/tello/it/battery"
-        )
-    assert message.log_time == PROVENANCE.started_ns + 2_100_000_000
-    assert message.publish_time == PROVENANCE.started_ns + HEADER.stamp
 
 
 def test_frame_with_camera(tmp_path: Path) -> None:
@@ -346,50 +332,6 @@ def test_anything_else_becomes_json(tmp_path: Path) -> None:
     assert second.value == 17
 
 
-def test_item_that_cannot_be_written_costs_only_itself(tmp_path: Path) -> None:
-    """An item that contradicts its type is counted and named in the log; the rest goes on."""
-    broken = Detections(HEADER, (Detection(("x",), "a", 0.5),), 1, 1)  # type: ignore[arg-type]
-    path = tmp_path / "broken.mcap"
-    found = recorded(path, broken, "still here")
-    texts = [record.value.message for record in found["/log"]]
-    assert texts[0].startswith("cannot record a Detections")
-    assert texts[1] == "still here"
-    assert found["/drops"][0].value.total == 1
-
-
-def test_latency_of_each_hop(tmp_path: Path) -> None:
-    """Waiting and working times add up to the whole; a message without an item has them too."""
-    spans = (
-        TraceSpan("camera", 2_000_000, 5_000_000),
-        TraceSpan("detector", 6_000_000, 26_000_000),
-    )
-    path = tmp_path / "latency.mcap"
-    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
-        recorder.write(Message("tello/x", 0, 5, HEADER, 1_000_000, spans, None))
-    with Recording.open(path) as recording:
-        (found,) = recording.records()
-    assert found.topic == "/latency"
-    assert found.value.total_ms == 25.0
-    assert [(hop.wait_ms, hop.work_ms) for hop in found.value.hops] == [
-        (1, 3),
-        (1, 20),
-    ]
-
-
-def test_drops_are_told_and_kept(tmp_path: Path) -> None:
-    """The summary, the channel and the metadata agree."""
-    path = tmp_path / "drops.mcap"
-    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
-        recorder.drops("tello/camera", 2)
-        recorder.drops("tello/camera")
-        summary = recorder.close()
-    assert summary.drops == {"tello/camera": 3}
-    assert "3 dropped" in str(summary)
-    with Recording.open(path) as recording:
-        assert [record.value.total for record in recording.records()] == [2, 3]
-        assert recording.metadata["aerodaas.drops"] == {"tello/camera": "3"}
-
-
 def test_provenance_comes_back(tmp_path: Path) -> None:
     """Version, seed, configuration and source are in the file before the first message."""
     path = tmp_path / "provenance.mcap"
@@ -410,22 +352,3 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"there\.mcap already exists"):
         FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE)
     assert path.read_text() == "mine"
-
-
-def test_folder_that_cannot_be(tmp_path: Path) -> None:
-    """A path through a file names the path."""
-    (tmp_path / "file").touch()
-    with pytest.raises(RecordingError, match=r"cannot create .*run\.mcap"):
-        FlightRecorder(
-            tmp_path / "file" / "run.mcap", config=RecordingConfig(), provenance=PROVENANCE
-        )
-
-
-def test_closing_twice_and_writing_afterwards(tmp_path: Path) -> None:
-    """A late message is no reason to fail at the end of a flight."""
-    recorder = FlightRecorder(tmp_path / "x.mcap", config=RecordingConfig(), provenance=PROVENANCE)
-    first = recorder.close()
-    recorder.write(Message("late", 0, 1, HEADER, 0, (), "too late"))
-    recorder.flush()
-    assert recorder.close() is first
-    assert first.size == (tmp_path / "x.mcap").stat().st_size

@@ -106,15 +106,6 @@ def test_drops_are_told_at_the_latest_time_known(tmp_path: Path) -> None:
         assert recording.metadata["aerodaas.drops"] == {"cam": "3", "gps": "5"}
 
 
-def test_without_drops_nothing_is_said_of_them(tmp_path: Path) -> None:
-    """Neither a channel nor metadata."""
-    path = tmp_path / "a.mcap"
-    assert "dropped" not in str(written(path, message(1)))
-    with Recording.open(path) as recording:
-        assert list(recording.metadata) == ["aerodaas"]
-        assert list(recording.topics) == ["/log"]
-
-
 HOP = TraceSpan("cam", 2_000_000, 5_000_000)
 SECOND_HOP = TraceSpan("find", 6_000_000, 8_500_000)
 

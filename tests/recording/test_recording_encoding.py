@@ -62,12 +62,6 @@ def test_topics_are_clean(stream: str, kind: str) -> None:
     assert re.fullmatch(r"/[A-Za-z0-9_/\-]*", topic(stream, kind).replace("/own.", "/"))
 
 
-def test_topic_does_not_repeat_itself() -> None:
-    """A stream named after what it carries is its own topic."""
-    assert topic("tello/@state", "state") == "/tello/state"
-    assert topic("tello/cam.1", "image") == "/tello/cam_1/image"
-
-
 @pytest.mark.parametrize(
     ("stream", "kind", "name"),
     [
@@ -89,13 +83,6 @@ def test_topics_keep_the_projects_own_streams_apart(stream: str, kind: str, name
     assert topic(stream, kind) == name
     if "@" not in stream and "." not in stream and stream.rpartition("/")[2] != kind:
         assert stream_of(name.removesuffix(f"/{kind}")) == stream.strip("/").replace(" ", "_")
-
-
-def test_streams_of_topics() -> None:
-    """The sign of a name that is the project's own is taken off the last part alone."""
-    assert stream_of("/tello/own.state") == "tello/state"
-    assert stream_of("cam") == "cam"
-    assert stream_of("own.it/own.cam") == "own.it/cam"
 
 
 def test_integers_of_any_size_and_texts_of_any_length_stay() -> None:

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 from numpy.typing import NDArray
-from synthetic_flight import PROVENANCE, SyntheticFlight, record
+from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
 from aerodaas.errors import SourceError
@@ -25,7 +25,6 @@ from aerodaas.recording.pictures import frames, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.replay.mcap_camera import McapCamera
-from aerodaas.recording.report.report import write_report
 
 RATE = 10
 SIZE = (177, 321)
@@ -155,14 +154,6 @@ def test_time_that_runs_backwards_begins_anew() -> None:
     stamps = [5_000_000_000, 5_100_000_000, 4_000_000_000, 4_100_000_000, 9_000_000_000]
     keys = [is_key_frame(encoder.encode(image, stamp)) for stamp in stamps]
     assert keys == [True, False, True, False, True]
-
-
-def test_the_report_shows_it(tmp_path: Path) -> None:
-    """The page has its key moments."""
-    path = tmp_path / "flight.mcap"
-    record(path, SyntheticFlight(frames=1, rate=10), config=CONFIG)
-    report = write_report(path, tmp_path / "report")
-    assert "tello/camera" in report.page.read_text()
 
 
 def camera_of(path: Path) -> McapCamera:

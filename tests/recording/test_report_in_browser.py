@@ -93,17 +93,3 @@ def test_pages_load_without_complaint(recorded: Path, tmp_path: Path, width: int
         assert found["tooWide"] == 0
         assert found["scrolls"] <= 0
         assert found["brokenNames"] == []
-
-
-@pytest.mark.slow
-@needs_peer("AERODAAS_BROWSER")
-def test_a_dark_browser_gets_a_dark_page(recorded: Path, tmp_path: Path) -> None:
-    """With light ink, and the other way round."""
-    page = write_report(recorded, tmp_path).page
-    for dark in (True, False):
-        found, _ = look(page, 800, dark=dark)
-        shown, ink = (
-            sum(map(int, re.findall(r"\d+", found[what])[:3])) / (3 * 255)
-            for what in ("page", "ink")
-        )
-        assert (shown < 0.2 and ink > 0.8) if dark else (shown > 0.8 and ink < 0.2)
