@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import math
 import os
 import socket
 import time
@@ -48,7 +47,6 @@ __all__ = [
     "FlownMission",
     "Stepped",
     "flight",
-    "fly_pictures",
     "free_port",
     "inject",
     "told",
@@ -61,10 +59,6 @@ _STEP = 0.025
 """Seconds between two turns of both ends."""
 _TURN = 0.05
 """Seconds between two turns of the control loop."""
-_PICTURES = (
-    Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
-    Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
-)
 
 
 _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
@@ -381,11 +375,6 @@ class FlownMission:
 def told(mission: Mission, *kinds: str) -> list[str]:
     """Texts of a mission's alerts, or of those of some kinds."""
     return [alert.text for alert in mission.alerts if not kinds or alert.kind in kinds]
-
-
-def fly_pictures(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
-    """A whole mission of two pictures; `each` is called at each turn."""
-    return ends.mission(_PICTURES, MissionConfig(photo_timeout=4.0), ends.vehicle).fly(each)
 
 
 def inject(ends: Stepped, message: Any, ids: tuple[int, int] = (1, 1)) -> None:  # noqa: ANN401

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.messages.actions import Action, TriggerPhotos, action_kinds
+from aerodaas.messages.actions import Action, action_kinds
 from aerodaas.messages.appearance import ZONE_BYTES, ZONES
 from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.frames import Frame
@@ -25,8 +25,6 @@ _SPECIAL: dict[Any, dict[str, Any]] = {
     },
     Detections: {"nearest": np.full((2, 3), 5, np.uint16)},
     Frame: {"image": np.full((2, 3, 3), 7, np.uint8), "depth": np.full((2, 3), 9, np.uint16)},
-    # Distance and interval take the place of one another.
-    TriggerPhotos: {"interval": None},
 }
 
 
@@ -60,6 +58,9 @@ def filled(hint: Any, **given: Any) -> Any:  # noqa: ANN401, PLR0911 - an annota
         return list(hint)[-1]
     hints = typing.get_type_hints(hint)
     special = {**_SPECIAL.get(hint, {}), **given}
+    if hint is action_kinds().get("trigger_photos"):
+        # Distance and interval take the place of one another.
+        special = {"interval": None, **special}
     return hint(
         **{one: special[one] if one in special else filled(hints[one]) for one in names(hint)}
     )

@@ -316,3 +316,15 @@ def square(side: float = 10.0, height: float = 1.5, hover: float = 0.0) -> list[
 def length(track: list[Vector]) -> float:
     """Metres flown."""
     return math.fsum(float(np.linalg.norm(b - a)) for a, b in pairwise(track))
+
+
+def passed_at(one: Flight, waypoint_id: str) -> float:
+    """Speed at which a waypoint itself is passed, where it was highest on the way there."""
+    speeds = [0.0]
+    while (current := one.status.target) is None or current.id != waypoint_id:
+        one.turn()
+    while (current := one.status.target) is not None and current.id == waypoint_id:
+        sent = one.turn().sent
+        if isinstance(sent, PositionSetpoint) and np.array_equal(sent.position, current.position):
+            speeds.append(sent.passing_speed)
+    return max(speeds)

@@ -3,16 +3,8 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
-from aerodaas.messages.actions import (
-    AimGimbal,
-    LookAt,
-    MoveActuator,
-    RecordVideo,
-    SetLens,
-    TakePhoto,
-    TriggerPhotos,
-)
 from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["keywords"]
@@ -20,12 +12,12 @@ __all__ = ["keywords"]
 
 def keywords(waypoint: Waypoint) -> SimpleNamespace:
     """What `Waypoint` was given, or could have been given, to do this."""
-    trigger, aim = waypoint.action(TriggerPhotos), waypoint.action(AimGimbal)
-    look, lens = waypoint.action(LookAt), waypoint.action(SetLens)
-    video = waypoint.action(RecordVideo)
-    moves = [one for one in waypoint.actions if isinstance(one, MoveActuator)]
+    done: dict[str, Any] = {action.type: action for action in waypoint.actions}
+    trigger, aim, look = (done.get(kind) for kind in ("trigger_photos", "aim_gimbal", "look_at"))
+    lens, video = done.get("set_lens"), done.get("record_video")
+    moves: list[Any] = [one for one in waypoint.actions if one.type == "move_actuator"]
     return SimpleNamespace(
-        photo=waypoint.action(TakePhoto) is not None,
+        photo="take_photo" in done,
         trigger_distance=trigger and trigger.distance,
         trigger_interval=trigger and trigger.interval,
         gimbal_pitch=aim and aim.pitch,

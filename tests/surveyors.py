@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from emulated import Stepped
 from flights import PERIOD, Flight, KinematicVehicle
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.messages.payload import (
@@ -28,7 +29,17 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.navigation.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
 
-__all__ = ["Camera", "Clock", "Gimbal", "Surveyor", "lost", "simulated", "surveying"]
+__all__ = [
+    "Camera",
+    "Clock",
+    "Gimbal",
+    "Surveyor",
+    "fly_pictures",
+    "lost",
+    "patience",
+    "simulated",
+    "surveying",
+]
 
 
 class Clock:
@@ -150,6 +161,20 @@ class Surveyor(KinematicVehicle):
 def lost(made: Flight) -> list[str]:
     """What people were told of pictures."""
     return [alert.text for alert in made.mission.alerts if alert.kind == "photo"]
+
+
+def patience(timeout: float) -> MissionConfig:
+    """Options by which gimbal and camera get `timeout` seconds at a waypoint."""
+    return MissionConfig.model_validate({"photo_timeout": timeout})
+
+
+def fly_pictures(ends: Stepped, each: Callable[[Mission], None] = lambda _: None) -> Mission:
+    """A whole mission of two pictures; `each` is called at each turn."""
+    stops = [
+        Waypoint("a", 3, 0, 2, gimbal_pitch=-math.pi / 2, photo=True),
+        Waypoint("b", 3, 3, 2, gimbal_pitch=-0.5, gimbal_yaw=0.7, photo=True),
+    ]
+    return ends.mission(stops, patience(4.0), ends.vehicle).fly(each)
 
 
 def surveying(

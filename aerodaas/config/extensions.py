@@ -178,14 +178,16 @@ class Extension:
     `Recording`, and returns a list of `ReportSection`."""
     ports: Mapping[int, str] = field(default_factory=dict)
     """UDP ports that `aerodaas doctor` tries, and what listens there."""
+    requires: tuple[str, ...] = ()
+    """Names of the extensions, theirs included, without which it is left out."""
 
 
 @cache
 def extensions() -> Mapping[str, Extension]:
     """Every extension by its name: the project's own first, each group in order of the alphabet.
 
-    An installed package's extension that cannot be imported is left out with a warning, so that
-    everything else still works.
+    One that requires another that is missing, and an installed package's that cannot be imported,
+    is left out with a warning, so that everything else still works.
 
     Raises:
         ConfigError: If two extensions have one name, or add one plug-in.
@@ -204,6 +206,10 @@ def extensions() -> Mapping[str, Extension]:
                         f"the extensions {other!r} and {name!r} both add {plugin!r} to {kind}: "
                         "uninstall one of them"
                     )
+    for name, extension in list(found.items()):
+        if missing := [other for other in extension.requires if other not in found]:
+            _log.warning("the extension %r is left out without %s", name, ", ".join(missing))
+            del found[name]
     return found
 
 

@@ -1,8 +1,8 @@
 """Actions: what a drone does at a waypoint, or on the way there.
 
-The order of a waypoint's actions does not matter, except among those of actuators: the gimbal and
-the lens are set on the way; once they are, a picture is taken there, then a video begins or ends,
-then actuators move.
+Extensions bring the kinds. The order of a waypoint's actions matters among those of one kind only:
+the gimbal and the lens are set on the way; once they are, a picture is taken there, then a video
+begins or ends, then actuators move.
 """
 
 from __future__ import annotations
@@ -40,18 +40,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "LARGEST",
-    "LEAST_TRIGGER",
     "Action",
     "ActionKeywords",
     "Actions",
-    "AimGimbal",
-    "LookAt",
     "MoveActuator",
     "Number",
-    "RecordVideo",
-    "SetLens",
-    "TakePhoto",
-    "TriggerPhotos",
+    "Place",
     "action_kinds",
     "actions_of",
     "json_of_actions",
@@ -60,14 +54,8 @@ __all__ = [
 LARGEST = 1e9
 """Largest number of a waypoint either way: 64 bits hold as many seconds in nanoseconds; Earth is
 smaller in metres."""
-LEAST_TRIGGER = 0.1
-"""Metres, and seconds, between two pictures: no camera is faster than its drone's loop."""
-_HALF_TURN = 3.1416
-"""pi, and the rounding of who writes it by hand."""
 
 Number: TypeAlias = Annotated[float, StrictlyTyped(), Ge(-LARGEST), Le(LARGEST)]
-Angle: TypeAlias = Annotated[Number, Ge(-_HALF_TURN), Le(_HALF_TURN), Unit("radians")]
-Percent: TypeAlias = Annotated[Number, Ge(0.0), Le(100.0), Unit("percent")]
 Place: TypeAlias = tuple[float, float, float]
 
 
@@ -81,6 +69,23 @@ class Action:
     """What the drone does by it, as it is said after "it"."""
     stops: ClassVar[bool] = True
     """Whether the drone stays at the waypoint until it is done."""
+    order: ClassVar[int] = 3
+    """Actions of a lower number come first: 1 is for pictures and video, 2 for actuators."""
+    keywords: ClassVar[tuple[str, ...]] = ()
+    """Those of `ActionKeywords` that it is given by."""
+
+    @classmethod
+    def from_keywords(cls, given: Mapping[str, Any]) -> Iterator[Action]:
+        """The actions of this kind that keywords say.
+
+        Args:
+            given: Its `keywords`, or some of them; a value may be of any type.
+
+        Raises:
+            InvalidWaypointError: For a value that it cannot have.
+        """
+        del given
+        return iter(())
 
     @property
     def slot(self) -> str:
@@ -136,121 +141,12 @@ def _ranges(kind: type[Action]) -> Mapping[str, tuple[float, float, str, bool]]:
 
 @shared_pickle
 @dataclass(frozen=True, slots=True)
-class TakePhoto(Action):
-    """Take one picture at the waypoint, once the gimbal looks where it is to."""
-
-    purpose: ClassVar[str] = "takes pictures"
-    type: Literal["take_photo"] = field(default="take_photo", repr=False)
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class TriggerPhotos(Action):
-    """Take pictures on the way to the waypoint, by distance or by time, without a stop."""
-
-    purpose: ClassVar[str] = "takes pictures"
-    stops: ClassVar[bool] = False
-    distance: Annotated[Number, Ge(LEAST_TRIGGER), Unit("metres")] | None = None
-    """Metres between pictures along the straight line from where the way begins."""
-    interval: Annotated[Number, Ge(LEAST_TRIGGER), Unit("seconds")] | None = None
-    """Seconds between pictures, on the way and during the stay."""
-    type: Literal["trigger_photos"] = field(default="trigger_photos", repr=False)
-
-    def __post_init__(self) -> None:
-        """Refuse both, or none."""
-        Action.__post_init__(self)
-        if (self.distance is None) == (self.interval is None):
-            raise InvalidWaypointError("give it trigger_distance or trigger_interval, not both")
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class AimGimbal(Action):
-    """Turn the gimbal on the way to the waypoint."""
-
-    purpose: ClassVar[str] = "turns the gimbal"
-    pitch: Angle = 0.0
-    """0 at the horizon, negative downwards: -pi/2 looks straight down."""
-    yaw: Angle = 0.0
-    """From the nose, counter-clockwise."""
-    type: Literal["aim_gimbal"] = field(default="aim_gimbal", repr=False)
-
-    @property
-    def slot(self) -> str:
-        """The gimbal."""
-        return "gimbal"
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class LookAt(Action):
-    """Keep the gimbal, or the nose where the gimbal cannot turn, on a place.
-
-    From the way to the waypoint on, until one has another place or turns the gimbal.
-    """
-
-    purpose: ClassVar[str] = "turns the gimbal"
-    stops: ClassVar[bool] = False
-    x: Number
-    """Counted as the waypoint's own, as y and z are."""
-    y: Number
-    z: Number
-    type: Literal["look_at"] = field(default="look_at", repr=False)
-
-    @property
-    def slot(self) -> str:
-        """The gimbal."""
-        return "gimbal"
-
-    @property
-    def place(self) -> Place:
-        """Point of interest: a waypoint has one."""
-        return self.x, self.y, self.z
-
-    def moved(self, place: Place) -> LookAt:
-        """Look at another place."""
-        return LookAt(*place)
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class SetLens(Action):
-    """Set the camera's zoom and focus on the way to the waypoint; None leaves one as it is."""
-
-    purpose: ClassVar[str] = "sets the camera's lens"
-    zoom: Percent | None = None
-    """0 sees most."""
-    focus: Percent | None = None
-    """0 is near, 100 far."""
-    type: Literal["set_lens"] = field(default="set_lens", repr=False)
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class RecordVideo(Action):
-    """Begin or end the camera's recording on its own card, at the waypoint after the picture.
-
-    A recording that the mission has begun ends with it.
-    """
-
-    purpose: ClassVar[str] = "begins or ends a video"
-    on: Annotated[bool, StrictlyTyped()] = True
-    """Whether it begins."""
-    type: Literal["record_video"] = field(default="record_video", repr=False)
-
-    def __post_init__(self) -> None:
-        """Refuse what is no flag."""
-        on: object = self.on
-        if not isinstance(on, bool):
-            raise InvalidWaypointError(f"video must be True, False or None, not {on!r}")
-
-
-@shared_pickle
-@dataclass(frozen=True, slots=True)
 class MoveActuator(Action):
     """Have an actuator take a position at the waypoint, after picture and video."""
 
     purpose: ClassVar[str] = "moves actuators"
+    order: ClassVar[int] = 2
+    keywords: ClassVar[tuple[str, ...]] = ("actuate",)
     actuator: str
     """Its id in the environment file."""
     position: str
@@ -261,6 +157,16 @@ class MoveActuator(Action):
         names: tuple[object, object] = (self.actuator, self.position)
         if not all(isinstance(name, str) for name in names):
             raise InvalidWaypointError(f"actuator and position are texts, not {names!r}")
+
+    @classmethod
+    def from_keywords(cls, given: Mapping[str, Any]) -> Iterator[Action]:
+        """One of each actuator."""
+        moves = given["actuate"]
+        pairs = tuple(moves.items()) if isinstance(moves, Mapping) else moves
+        if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
+            message = f'actuate is positions by actuator, {{"hook": "release"}}, not {moves!r}'
+            raise InvalidWaypointError(message)
+        return (cls(*pair) for pair in pairs)
 
     @property
     def slot(self) -> str:
@@ -273,15 +179,9 @@ class MoveActuator(Action):
         return self.actuator, self.position
 
 
-_KINDS = (TriggerPhotos, LookAt, AimGimbal, SetLens, TakePhoto, RecordVideo, MoveActuator)
-
-
 def action_kinds() -> Mapping[str, type[Action]]:
-    """Classes of actions by their type in JSON, in the order in which a drone does them.
-
-    Those of extensions are the last.
-    """
-    kinds: list[type[Any]] = [*_KINDS, *added("actions")]
+    """Classes of actions by their type in JSON, in the order in which a drone does them."""
+    kinds: list[type[Any]] = sorted((MoveActuator, *added("actions")), key=lambda kind: kind.order)
     return {str(fields(kind)[-1].default): kind for kind in kinds}
 
 
@@ -348,39 +248,26 @@ def actions_of(keywords: Mapping[str, Any]) -> tuple[Action, ...]:
     Raises:
         InvalidWaypointError: For an unknown keyword, and a value that it cannot have.
     """
+    kinds = action_kinds().values()
     if unknown := sorted(keywords.keys() - ActionKeywords.__annotations__.keys()):
         raise InvalidWaypointError(f"a waypoint has no {', '.join(unknown)}")
-    return tuple(_actions_of(keywords))
+    known = {name for kind in kinds for name in kind.keywords}
+    absent = [name for name in keywords if name not in known and not _is_empty(keywords[name])]
+    if absent:
+        raise InvalidWaypointError(
+            f"this installation has no extension for {', '.join(absent)}: install aerodaas anew, "
+            "whole"
+        )
+    return tuple(
+        action
+        for kind in kinds
+        if not keywords.keys().isdisjoint(kind.keywords)
+        for action in kind.from_keywords(keywords)
+    )
 
 
-def _actions_of(given: Mapping[str, Any]) -> Iterator[Action]:
-    photo = given.get("photo", False)
-    if not isinstance(photo, bool):
-        raise InvalidWaypointError(f"photo must be True or False, not {photo!r}")
-    if photo:
-        yield TakePhoto()
-    triggers = given.get("trigger_distance"), given.get("trigger_interval")
-    if triggers != (None, None):
-        yield TriggerPhotos(*triggers)
-    pitch, yaw = given.get("gimbal_pitch"), given.get("gimbal_yaw")
-    if (pitch, yaw) != (None, None):
-        yield AimGimbal(0.0 if pitch is None else pitch, 0.0 if yaw is None else yaw)
-    place = given.get("look_at")
-    if place is not None:
-        if not (isinstance(place, tuple | list) and len(place) == len("xyz")):
-            raise InvalidWaypointError(f"look_at must be three numbers (x, y, z), not {place!r}")
-        yield LookAt(*place)
-    lens = given.get("zoom"), given.get("focus")
-    if lens != (None, None):
-        yield SetLens(*lens)
-    if (video := given.get("video")) is not None:
-        yield RecordVideo(video)
-    moves = given.get("actuate", ())
-    pairs = tuple(moves.items()) if isinstance(moves, Mapping) else moves
-    if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
-        message = f'actuate is positions by actuator, {{"hook": "release"}}, not {moves!r}'
-        raise InvalidWaypointError(message)
-    yield from (MoveActuator(*pair) for pair in pairs)
+def _is_empty(value: object) -> bool:
+    return value is None or value is False or value in ((), [], {})
 
 
 def _is_pair(value: object) -> bool:

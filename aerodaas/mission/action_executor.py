@@ -3,26 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from aerodaas.config.extensions import added
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import failure_line
+from aerodaas.geometry.frames import Vector
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 
-__all__ = ["ActionExecutor", "ActionRunner", "added_executors"]
+__all__ = ["ActionExecutor", "ActionRunner", "Course", "added_executors"]
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Where a drone flies next on the way to a stop."""
+
+    place: Vector
+    """The stop, a corner before it, or a place on a line towards it; ENU metres."""
+    heading: float | None = None
+    """Of the nose, radians counter-clockwise from east; None as the drone flies."""
+    brakes: bool = True
+    """Whether the drone flies towards the place so that it could stop there."""
 
 
 class ActionExecutor:
-    """Performs some kinds of actions in one mission; every method returns at once.
+    """Performs some kinds of actions in one mission, which calls it once a turn.
+
+    Every method returns at once.
 
     One of an extension (`Extension.action_executors`) is constructed with the vehicle, the robot's
     section of the environment file and the mission's log, for its alerts. The vehicle may be any
     object: an executor asks whether it is one that it can use.
     """
+
+    order: ClassVar[int] = 3
+    """As `Action.order`: an executor of a lower number comes first."""
 
     def objection(self, waypoint: Waypoint) -> str:
         """Why an action of a waypoint is not possible; empty if all are."""
@@ -46,19 +65,46 @@ class ActionExecutor:
         del stop, odometry, now
         return False
 
+    def steer(self, course: Course, odometry: Odometry, now: int) -> Course:
+        """Return where the drone flies for the sake of the stop's actions.
+
+        Args:
+            course: Course without them.
+            odometry: Where the drone is, how it moves and where it faces.
+            now: Mission clock, nanoseconds.
+        """
+        del odometry, now
+        return course
+
+    def stops_at(self, stop: QueuedWaypoint, following: QueuedWaypoint, radius: float) -> bool:
+        """Whether the drone has to stop at the end of a leg, besides for actions that `stops`.
+
+        Args:
+            stop: The stop where the leg ends.
+            following: The stop after it.
+            radius: Distance from the leg's end at which the drone turns, metres.
+        """
+        del stop, following, radius
+        return False
+
+    def ongoing(self) -> str:
+        """What goes on between waypoints by our setpoints, as a clause; empty for nothing."""
+        return ""
+
     def end(self, now: int) -> None:
         """End what goes on after the mission, at `now` (ns)."""
 
 
 def added_executors(vehicle: object, robot: RobotConfig, log: MissionLog) -> list[ActionExecutor]:
-    """Executors of one mission that extensions add.
+    """Executors of one mission that extensions add, in their order.
 
     Args:
         vehicle: The vehicle.
         robot: Its section of the environment file.
         log: The mission's log.
     """
-    return [executor(vehicle, robot, log) for executor in added("action_executors")]
+    kinds = sorted(added("action_executors"), key=lambda kind: kind.order)
+    return [executor(vehicle, robot, log) for executor in kinds]
 
 
 class ActionRunner(ActionExecutor):
@@ -81,6 +127,20 @@ class ActionRunner(ActionExecutor):
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Attend to a stop by each, until the drone has to stay for one."""
         return any(self._call(one.attend, stop, odometry, now) for one in self._executors)
+
+    def steer(self, course: Course, odometry: Odometry, now: int) -> Course:
+        """Have each change the course."""
+        for executor in self._executors:
+            course = self._call(executor.steer, course, odometry, now) or course
+        return course
+
+    def stops_at(self, stop: QueuedWaypoint, following: QueuedWaypoint, radius: float) -> bool:
+        """Whether the drone has to stop for one."""
+        return any(executor.stops_at(stop, following, radius) for executor in self._executors)
+
+    def ongoing(self) -> str:
+        """The first that goes on; empty for none."""
+        return next(filter(None, (executor.ongoing() for executor in self._executors)), "")
 
     def end(self, now: int) -> None:
         """End each."""

@@ -1,4 +1,4 @@
-"""A mission's log: waypoints given up, alerts, distance flown."""
+"""A mission's log: waypoints given up, alerts, pictures, distance flown."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry.frames import Vector, length
 from aerodaas.messages.frames import Header
 from aerodaas.messages.mission import RECENT
+from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 
 __all__ = ["MissionLog", "subject", "words"]
@@ -26,7 +27,7 @@ _AGAIN = 10 * NANOSECONDS
 
 @dataclass
 class MissionLog:
-    """Alerts, abandoned waypoints and distance of one mission."""
+    """Alerts, pictures, abandoned waypoints and distance of one mission."""
 
     source: str
     """Source of the alerts' headers."""
@@ -40,6 +41,10 @@ class MissionLog:
     distance: float = 0.0
     """Metres flown, counted in strides of half a metre."""
     _counted_at: Vector | None = None
+    photos: list[Photo] = field(default_factory=list)
+    """Every picture that was taken, oldest first."""
+    photos_lost: int = 0
+    """How many pictures were asked for and not taken."""
     alerts: list[Alert] = field(default_factory=list)
     """Every alert of the mission, oldest first."""
     _told: dict[tuple[str, str], int] = field(default_factory=dict)

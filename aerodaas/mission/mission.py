@@ -21,10 +21,11 @@ from aerodaas.geometry.frames import GeodeticOrigin, Vector
 from aerodaas.messages.actuators import ActuatedVehicle
 from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
 from aerodaas.messages.mission_mode import MissionModeVehicle
+from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
-from aerodaas.mission.action_executor import ActionRunner, added_executors
+from aerodaas.mission.action_executor import ActionRunner, Course, added_executors
 from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
     Actuate,
@@ -75,7 +76,6 @@ from aerodaas.mission.navigation.planning import Planning
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.navigation.route import Route
 from aerodaas.mission.payload.actuation import Actuation
-from aerodaas.mission.payload.photographer import Photographer
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
@@ -139,12 +139,11 @@ class Mission:
         self._obeyed = obeyed
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
-        self.photographer = Photographer(payload, self._log, robot.mission.photo_timeout)
         # Once: to ask a protocol about an object looks up all its members each time.
         actuated = payload if isinstance(payload, ActuatedVehicle) else None
         self.actuation = Actuation(actuated, robot, self._log)
         added = added_executors(payload, robot, self._log)
-        self._actions = ActionRunner((self.photographer, self.actuation, *added), self._log)
+        self._actions = ActionRunner((*added, self.actuation), self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -163,7 +162,7 @@ class Mission:
         )
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
-        self._cornering = Cornering(self._navigator, self.photographer, self._route, limits)
+        self._cornering = Cornering(self._navigator, self._actions, self._route, limits)
         autonomous = payload if isinstance(payload, MissionModeVehicle) else None
         self.handover = Handover(autonomous, robot, self._route, clearance, self._log)
         self._command_handler = CommandHandler(self._navigator, self._log)
@@ -203,6 +202,11 @@ class Mission:
         return self._log.alerts
 
     @property
+    def photos(self) -> Sequence[Photo]:
+        """All pictures taken, oldest first; the sequence only grows."""
+        return self._log.photos
+
+    @property
     def status(self) -> MissionStatus:
         """The mission's complete status."""
         stops = list(self._navigator.queue)
@@ -224,7 +228,7 @@ class Mission:
             self._log.waypoint_counts(stop.id for stop in stops),
             self._manual.operator(self._now),
             self._forecast.outlook(self._now),
-            (len(self.photographer.photos), self.photographer.lost),
+            (len(self._log.photos), self._log.photos_lost),
             self._unfinished,
         )
 
@@ -308,9 +312,8 @@ class Mission:
         return Answer(not objection, objection)
 
     def _hand_over(self, command: HandOver | TakeBack) -> Answer:
-        objection = "the gimbal is kept on a place" if self.photographer.looks else ""
-        queue = list(self._navigator.queue)
-        return self.handover.handle(command, self.state, queue, self._last, self._now, objection)
+        queue, ongoing = list(self._navigator.queue), self._actions.ongoing()
+        return self.handover.handle(command, self.state, queue, self._last, self._now, ongoing)
 
     def take_back(self, reason: str) -> None:
         """Fly by setpoints again, if the autopilot flies the waypoints."""
@@ -573,9 +576,11 @@ class Mission:
         doing = MissionState.LOITERING if stays else MissionState.ENROUTE
         self._to(diverted or doing, f"{'at' if stays else 'flying to'} {stop.id}")
         self._anchor = None
-        place, heading = self.photographer.steer(routed, state.odometry, self._now)
-        passing = self._cornering.passing_speed(self._leg, routed, place, state.odometry)
-        flown = self._leg.setpoint(place, position, limits.cruise_speed, heading, passing)
+        course = self._actions.steer(Course(routed), state.odometry, self._now)
+        passing = self._cornering.passing_speed(self._leg, course, state.odometry)
+        flown = self._leg.setpoint(
+            course.place, position, limits.cruise_speed, course.heading, passing
+        )
         return Fly(flown, stop.cause)
 
     def _after_failure(self, failure: str, state: VehicleState) -> MotionRequest:

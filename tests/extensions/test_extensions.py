@@ -317,10 +317,13 @@ drone.start_mission()
 IMPORTS = """
 import importlib, pkgutil
 import aerodaas
+from aerodaas.config.extensions import extensions
 
 programs = ("__main__", "templates", "apps")
 for module in pkgutil.walk_packages(aerodaas.__path__, "aerodaas."):
-    if not set(module.name.split(".")) & set(programs):
+    _, *folders = module.name.split(".")
+    left_out = folders[0] == "extensions" and not set(folders[1:2]) <= set(extensions())
+    if not set(folders) & set(programs) and not left_out:
         importlib.import_module(module.name)
 """
 

@@ -45,7 +45,7 @@ def test_pictures_at_waypoints(autopilot: Autopilot) -> None:
             pytest.skip("this autopilot carries no gimbal and camera")
         flight.run(180.0)
         assert flight.mission.state is S.LANDED, flight.story
-        photos = flight.mission.photographer.photos
+        photos = flight.mission.photos
         alerts = [alert.text for alert in flight.mission.alerts]
         assert [photo.label for photo in photos] == ["nadir", "aside", "ahead"], alerts
         asked = [(-math.pi / 2, 0.0), (-0.5, 0.7), (0.0, 0.0)]

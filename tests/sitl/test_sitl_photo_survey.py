@@ -49,7 +49,7 @@ def test_pictures_lie_where_they_were_asked_for(autopilot: Autopilot, speed: flo
         assert fix is not None
         flight.run(240.0)
         assert flight.mission.state is S.LANDED, flight.story
-        photos = flight.mission.photographer.photos
+        photos = flight.mission.photos
         alerts = [alert.text for alert in flight.mission.alerts]
         count = round(LONG / SPACING) + 1
         asked = [("b", 0.0, SPACING * n) for n in range(count)]
@@ -82,7 +82,7 @@ def test_the_gimbal_keeps_looking_at_a_place(autopilot: Autopilot) -> None:
             pytest.skip("this autopilot carries no gimbal and camera")
         flight.run(240.0)
         assert flight.mission.state is S.LANDED, flight.story
-        photos = flight.mission.photographer.photos
+        photos = flight.mission.photos
         off = []
         for photo in photos:
             assert photo.gimbal is not None

@@ -134,8 +134,6 @@ class MissionConfig(Extensible):
     """Wait for a scheduler's first plan before flying the order given."""
     stall_timeout: Positive = 60.0
     """A waypoint that comes no nearer for so long is given up."""
-    photo_timeout: Positive = 10.0
-    """Seconds that gimbal and camera get at a waypoint; then the drone flies on without them."""
     actuator_timeout: Positive = 15.0
     """Seconds that each actuator gets at a waypoint; then it has failed."""
     on_actuator_failure: Literal["continue", "pause", "return"] = "continue"

@@ -11,15 +11,15 @@ import typer
 
 from aerodaas.cli.options import ExampleGroup
 from aerodaas.errors import ConfigError
-from aerodaas.messages.actions import (
+from aerodaas.extensions.payload.actions import (
     AimGimbal,
     LookAt,
     RecordVideo,
     SetLens,
     TakePhoto,
     TriggerPhotos,
-    action_kinds,
 )
+from aerodaas.messages.actions import action_kinds
 from aerodaas.text.printable import printable
 
 if TYPE_CHECKING:

@@ -15,6 +15,15 @@ from functools import partial
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.extensions.payload.actions import (
+    LEAST_TRIGGER,
+    AimGimbal,
+    LookAt,
+    RecordVideo,
+    SetLens,
+    TakePhoto,
+    TriggerPhotos,
+)
 from aerodaas.extensions.plans.commands import (
     MOUNT_MAVLINK_TARGETING,
     MOUNT_NEUTRAL,
@@ -24,16 +33,7 @@ from aerodaas.extensions.plans.commands import (
 from aerodaas.extensions.plans.formats.numbers import LatLon, place
 from aerodaas.extensions.plans.plan import PlanItem
 from aerodaas.geometry.frames import wrap_angle
-from aerodaas.messages.actions import (
-    LEAST_TRIGGER,
-    AimGimbal,
-    LookAt,
-    MoveActuator,
-    RecordVideo,
-    SetLens,
-    TakePhoto,
-    TriggerPhotos,
-)
+from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.waypoints import HeightReference, Waypoint
 
 __all__ = ["Height", "PictureItems", "same_place"]

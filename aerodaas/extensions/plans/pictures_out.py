@@ -6,13 +6,19 @@ import math
 from collections.abc import Iterator
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.extensions.payload.actions import (
+    AimGimbal,
+    RecordVideo,
+    SetLens,
+    TakePhoto,
+    TriggerPhotos,
+)
 from aerodaas.extensions.plans.commands import (
     FRAME_MISSION,
     MOUNT_MAVLINK_TARGETING,
     OF_RANGE,
 )
 from aerodaas.extensions.plans.plan import PlanItem
-from aerodaas.messages.actions import AimGimbal, RecordVideo, SetLens, TakePhoto, TriggerPhotos
 from aerodaas.messages.waypoints import Waypoint
 
 __all__ = ["PictureWriter"]

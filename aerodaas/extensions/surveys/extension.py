@@ -5,5 +5,6 @@ from aerodaas.config.extensions import Extension
 EXTENSION = Extension(
     name="surveys",
     summary="Surveys that photograph an area for a map.",
+    requires=("payload",),
     routes=("aerodaas.extensions.surveys.service:survey_router",),
 )

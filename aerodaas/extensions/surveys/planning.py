@@ -16,11 +16,11 @@ from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, LimitsConfig, RobotConfig, SensorConfig
 from aerodaas.config.sections.robot import SIMULATED_INTERVAL
 from aerodaas.errors import SchedulerError
+from aerodaas.extensions.payload.photo_trigger import PhotoTrigger
 from aerodaas.geometry.energy import EnergyModel
 from aerodaas.geometry.frames import Vector
 from aerodaas.geometry.free_path import Place
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.payload.photo_trigger import PhotoTrigger
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.schedulers.trajectory.coverage import cover
 from aerodaas.schedulers.trajectory.survey_camera import SurveyCamera

@@ -15,14 +15,13 @@ import numpy as np
 from aerodaas.config.sections.robot import LimitsConfig
 from aerodaas.geometry.braking import braking_distance, braking_speed
 from aerodaas.geometry.frames import Vector, length
-from aerodaas.messages.actions import TriggerPhotos
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.action_executor import ActionRunner, Course
 from aerodaas.mission.navigation.leg import Leg
 from aerodaas.mission.navigation.navigator import Navigator
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.navigation.route import Route
-from aerodaas.mission.payload.photographer import Photographer
 
 __all__ = ["Cornering", "corner_speed"]
 
@@ -68,26 +67,25 @@ class Cornering:
     """Speeds at which the drone of one mission passes its waypoints."""
 
     navigator: Navigator
-    photographer: Photographer
+    actions: ActionRunner
     route: Route
     limits: LimitsConfig
     _stops: tuple[QueuedWaypoint, QueuedWaypoint] | None = field(default=None, init=False)
     _leaving: Vector | None = field(default=None, init=False)
 
-    def passing_speed(self, leg: Leg, routed: Vector, place: Vector, odometry: Odometry) -> float:
-        """Speed at which the drone passes `place` on its way, m/s; 0 where it stops there.
+    def passing_speed(self, leg: Leg, course: Course, odometry: Odometry) -> float:
+        """Speed at which the drone passes the place of `course`, m/s; 0 where it stops there.
 
         Args:
             leg: The leg under way.
-            routed: Where the way leads, the end of `leg` or a corner before it, ENU metres.
-            place: That, or one ahead on a line of pictures, ENU metres.
+            course: Course on it.
             odometry: Where the drone is and how it moves.
         """
         stop, following = leg.stop, self.navigator.following
         way = stop.waypoint.position - odometry.position
         distance = length(way)
-        rest = length(stop.waypoint.position - place)
-        if place is not routed and rest > _ROUNDING and self.photographer.flies_along_line(stop):
+        rest = length(stop.waypoint.position - course.place)
+        if not course.brakes and rest > _ROUNDING:
             limits = self.limits
             stops = braking_speed(rest, limits.max_acceleration, limits.reaction_time)
             return min(stop.waypoint.speed or limits.cruise_speed, stops)
@@ -97,8 +95,7 @@ class Cornering:
             or rest > _ROUNDING
             or not leg.is_facing(odometry.yaw)
             or _stays(stop.waypoint)
-            or _takes_pictures_by_distance(following.waypoint)
-            or self.photographer.ends_with_picture(stop, self.limits.arrival_radius)
+            or self.actions.stops_at(stop, following, self.limits.arrival_radius)
         ):
             return 0.0
         leaving = self._way_on(stop, following)
@@ -124,8 +121,3 @@ class Cornering:
 def _stays(waypoint: Waypoint) -> bool:
     """Whether there is something to do at a waypoint for which the drone stays there."""
     return waypoint.hover_duration > 0.0 or any(action.stops for action in waypoint.actions)
-
-
-def _takes_pictures_by_distance(waypoint: Waypoint) -> bool:
-    trigger = waypoint.action(TriggerPhotos)
-    return trigger is not None and trigger.distance is not None

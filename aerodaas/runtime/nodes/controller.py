@@ -252,7 +252,7 @@ class VehicleController:
         self._turned = now
         self._publish(setpoint_stream(self.id), record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
-        photos = self.mission.photographer.photos
+        photos = self.mission.photos
         while self._photographed < len(photos):
             self._publish(photo_stream(self.id), photos[self._photographed], now)
             self._photographed += 1

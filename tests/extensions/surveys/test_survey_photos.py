@@ -41,8 +41,8 @@ def test_pictures_are_taken_where_they_were_planned(wind: float, speed: float) -
     assert survey.photos is not None
     assert survey.photos.warning == ""
     flown = simulated(*survey.waypoints, noise=0.0, wind=wind)
-    photos = flown.photographer.photos
-    assert flown.photographer.lost == 0
+    photos = flown.photos
+    assert flown.status.photos[1] == 0
     assert len(photos) == len(survey.photos.places)
     across, along = camera.footprint(8.0)
     lines: dict[str, list[np.ndarray]] = {}

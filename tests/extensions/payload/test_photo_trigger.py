@@ -10,18 +10,18 @@ import pytest
 from flights import Flight, add, flight
 from hypothesis import given
 from hypothesis import strategies as st
-from surveyors import Surveyor, lost, simulated
+from surveyors import Surveyor, lost, patience, simulated
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.model import LimitsConfig, MissionConfig
+from aerodaas.config.model import LimitsConfig
+from aerodaas.extensions.payload.photo_trigger import PhotoTrigger
+from aerodaas.extensions.payload.photographer import PhotoCapture
 from aerodaas.geometry.frames import Vector
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.log import MissionLog
-from aerodaas.mission.payload.photo_trigger import PhotoTrigger
-from aerodaas.mission.payload.photographer import PhotoCapture
 
 TURN = NANOSECONDS // 20
 
@@ -153,7 +153,7 @@ def test_places_that_were_passed_unseen_are_counted() -> None:
     shutter = PhotoCapture(Surveyor(), log, 4.0)
     shutter.trigger("line", 3, 0)
     shutter.poll(0)
-    assert (len(shutter.photos), shutter.lost) == (1, 2)
+    assert (len(log.photos), log.photos_lost) == (1, 2)
     (alert,) = log.alerts
     assert alert.text.startswith("on the way to line: a picture is missed")
     assert alert.text.endswith("their places were passed before the camera was asked")
@@ -188,7 +188,7 @@ LINE = (
 def surveyed(vehicle: Surveyor, *waypoints: Waypoint, timeout: float = 4.0) -> Flight:
     """A whole flight."""
     limits = LimitsConfig(arrival_radius=0.3)
-    options = MissionConfig(photo_timeout=timeout)
+    options = patience(timeout)
     made = flight(add(*(waypoints or LINE)), vehicle=vehicle, limits=limits, options=options)
     made.run()
     made.expect(MissionState.LANDED)
@@ -199,9 +199,9 @@ def test_the_drone_does_not_stop_for_pictures_on_the_way() -> None:
     """Its speed along the line stays what was asked for."""
     vehicle = Surveyor()
     made = flight(add(*LINE), vehicle=vehicle)
-    made.run(until=lambda: len(made.mission.photographer.photos) == 2)
+    made.run(until=lambda: len(made.mission.photos) == 2)
     slowest = math.inf
-    while len(made.mission.photographer.photos) < 4:
+    while len(made.mission.photos) < 4:
         made.turn()
         slowest = min(slowest, float(np.linalg.norm(vehicle.velocity)))
     assert slowest > 1.5
@@ -306,7 +306,7 @@ def test_pictures_by_time_go_on_during_the_stay() -> None:
     taken, missed = made.status.photos
     assert missed == 0
     assert 8 <= taken <= 12
-    stamps = [photo.stamp for photo in made.mission.photographer.photos]
+    stamps = [photo.stamp for photo in made.mission.photos]
     assert all(b - a == NANOSECONDS for a, b in pairwise(stamps))
 
 
@@ -314,7 +314,7 @@ def test_an_interrupted_line_is_gone_on_with() -> None:
     """No place is photographed twice; those that were passed on the detour are counted."""
     vehicle = Surveyor()
     made = flight(add(*LINE), vehicle=vehicle)
-    made.run(until=lambda: len(made.mission.photographer.photos) == 2)
+    made.run(until=lambda: len(made.mission.photos) == 2)
     made.tell(add(Waypoint("urgent", 3, 5, 3, priority=1)))
     made.run()
     made.expect(MissionState.LANDED)
@@ -338,7 +338,7 @@ def test_pictures_of_a_survey_lie_within_half_a_metre(
         wind=wind,
     )
     assert mission.state is MissionState.LANDED
-    photos = mission.photographer.photos
+    photos = mission.photos
     asked = [("b", x, 0.0) for x in range(0, 41, 5)] + [("d", x, 10.0) for x in range(40, -1, -5)]
     assert [photo.label for photo in photos] == [label for label, _, _ in asked]
     for photo, (_, x, y) in zip(photos, asked, strict=True):

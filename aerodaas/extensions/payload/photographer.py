@@ -8,14 +8,20 @@ an alert; the drone flies on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.config.checked import added_settings
+from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
-from aerodaas.geometry.frames import Vector
-from aerodaas.messages.actions import AimGimbal, LookAt, SetLens, TakePhoto
+from aerodaas.extensions.payload.actions import AimGimbal, LookAt, SetLens, TakePhoto, TriggerPhotos
+from aerodaas.extensions.payload.filming import Filming
+from aerodaas.extensions.payload.photo_trigger import PhotoTrigger
+from aerodaas.extensions.payload.point_of_interest import PointOfInterest, fresh, near
+from aerodaas.extensions.payload.settings import PayloadMission
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import (
     Gimbal,
@@ -28,12 +34,9 @@ from aerodaas.messages.payload import (
 )
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.action_executor import ActionExecutor
+from aerodaas.mission.action_executor import ActionExecutor, Course
 from aerodaas.mission.log import MissionLog, words
 from aerodaas.mission.navigation.queue import QueuedWaypoint
-from aerodaas.mission.payload.filming import Filming
-from aerodaas.mission.payload.photo_trigger import PhotoTrigger
-from aerodaas.mission.payload.point_of_interest import PointOfInterest, fresh, near
 
 __all__ = ["NO_CAMERA", "PhotoCapture", "PhotoRequest", "Photographer"]
 
@@ -62,11 +65,10 @@ class PhotoCapture:
     """The camera of a vehicle; raises nothing but what `take` says."""
 
     def __init__(self, vehicle: PayloadVehicle | None, log: MissionLog, timeout: float) -> None:
-        """Use `vehicle`'s camera; a picture is awaited for `timeout` seconds. `log` gets alerts."""
-        self.photos: list[Photo] = []
-        """All pictures taken, in order; the list only grows."""
-        self.lost = 0
-        """How many pictures were not taken."""
+        """Use `vehicle`'s camera; a picture is awaited for `timeout` seconds.
+
+        `log` gets pictures and alerts.
+        """
         self._vehicle = vehicle
         self._log = log
         self._timeout = timeout
@@ -144,14 +146,14 @@ class PhotoCapture:
             reason: Why it is not taken, as the alert says it.
             now: Mission clock, nanoseconds.
         """
-        self.lost += 1
+        self._log.photos_lost += 1
         self._log.alert(now, "photo", f"{label}: no picture: {reason}")
 
     def _on_outcome(self, outcome: PhotoOutcome, now: int) -> None:
         number = outcome.number
         request = None if number is None else self._awaited.get(number)
         if isinstance(outcome, Photo):
-            self.photos.append(outcome)
+            self._log.photos.append(outcome)
             if request is not None and number is not None:
                 request.photo = outcome
                 del self._awaited[number]
@@ -166,7 +168,7 @@ class PhotoCapture:
 
     def _miss(self, label: str, count: int, reason: str, now: int) -> None:
         """Count pictures on the way that are not taken; each reason is told once."""
-        self.lost += count
+        self._log.photos_lost += count
         if (subject := words(reason)) not in self._told:
             self._told.add(subject)
             text = f"on the way to {label}: a picture is missed, and more are counted: {reason}"
@@ -209,16 +211,18 @@ def _targets(waypoint: Waypoint) -> tuple[bool, GimbalTarget | None, LensTarget 
 
 
 class Photographer(ActionExecutor):
-    """Photographer of one mission, called by it once a turn."""
+    """Photographer of one mission."""
 
-    def __init__(self, vehicle: object, log: MissionLog, timeout: float) -> None:
+    order: ClassVar[int] = 1
+
+    def __init__(self, vehicle: object, robot: RobotConfig, log: MissionLog) -> None:
         """Use gimbal and camera of `vehicle`, if it has any (see `PayloadVehicle`).
 
-        `timeout` in seconds is what both get at a waypoint, together; alerts go to `log`.
+        Both get the `photo_timeout` of `robot` at a waypoint, together; alerts go to `log`.
         """
         self._vehicle = vehicle if isinstance(vehicle, PayloadVehicle) else None
         self._log = log
-        self._timeout = timeout
+        self._timeout = timeout = added_settings(robot.mission, PayloadMission).photo_timeout
         self._shutter = PhotoCapture(self._vehicle, log, timeout)
         self._filming = Filming(self._vehicle, log, timeout)
         self._point_of_interest = PointOfInterest()
@@ -228,55 +232,41 @@ class Photographer(ActionExecutor):
         self._lens: LensTarget | None = None
         """What the camera's lens was last told."""
 
-    @property
-    def photos(self) -> list[Photo]:
-        """All pictures taken, in order; the list only grows."""
-        return self._shutter.photos
+    def ongoing(self) -> str:
+        """The look at a place."""
+        looks = self._point_of_interest.place is not None
+        return "the gimbal is kept on a place" if looks else ""
 
-    @property
-    def lost(self) -> int:
-        """How many pictures were asked for and not taken."""
-        return self._shutter.lost
-
-    @property
-    def looks(self) -> bool:
-        """Whether gimbal or nose are kept on a place."""
-        return self._point_of_interest.place is not None
-
-    def steer(self, place: Vector, odometry: Odometry, now: int) -> tuple[Vector, float | None]:
-        """Where to fly for the pictures' sake on the way to `place`, and where the nose looks.
+    def steer(self, course: Course, odometry: Odometry, now: int) -> Course:
+        """Fly on the line of pictures, with the nose along it or towards the place in view.
 
         Args:
-            place: Where the way leads, ENU metres; stays unless it is the waypoint's own.
+            course: Course to the stop; one that leads around something stays as it is.
             odometry: Where the drone is, how it moves and where it faces.
             now: Mission clock, nanoseconds.
-
-        Returns:
-            The place in ENU metres, and the heading in radians counter-clockwise from east; None as
-            the drone flies.
         """
         task, heading = self._served, self._point_of_interest.heading
-        if task is None:
-            return place, heading
-        straight = np.array_equal(place, task.stop.waypoint.position)
+        course = replace(course, heading=heading)
+        if task is None or not np.array_equal(course.place, task.stop.waypoint.position):
+            return course
         turns = heading is None and task.stop.waypoint.yaw is None
-        ahead = task.trigger.place_ahead(odometry, now, turns=turns) if straight else None
+        ahead = task.trigger.place_ahead(odometry, now, turns=turns)
         if ahead is None:
-            return place, heading
-        return ahead, task.trigger.bearing if heading is None else heading
+            return course
+        bearing = task.trigger.bearing if heading is None else heading
+        return Course(ahead, bearing, brakes=not task.trigger.aligned)
 
-    def flies_along_line(self, stop: QueuedWaypoint) -> bool:
-        """Whether the drone flies along the line of pictures by distance on the leg to `stop`."""
-        trigger = self._trigger_of(stop)
-        return trigger is not None and trigger.aligned
-
-    def ends_with_picture(self, stop: QueuedWaypoint, radius: float) -> bool:
-        """Whether a picture by distance is due near the end of the leg to `stop`.
+    def stops_at(self, stop: QueuedWaypoint, following: QueuedWaypoint, radius: float) -> bool:
+        """Whether a picture by distance is due near the end of the leg, or the next leg takes some.
 
         Args:
             stop: The stop where the leg ends.
-            radius: Distance from its end, metres.
+            following: The stop after it.
+            radius: Distance from the leg's end, metres.
         """
+        coming = following.waypoint.action(TriggerPhotos)
+        if coming is not None and coming.distance is not None:
+            return True
         trigger = self._trigger_of(stop)
         return trigger is not None and trigger.ends_with_place(radius)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import pytest
 from flights import PERIOD, Flight, KinematicVehicle, add, flight
-from surveyors import Camera, Surveyor, surveying
+from surveyors import Camera, Surveyor, patience, surveying
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.model import EnvironmentConfig, MissionConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.errors import VehicleError
@@ -35,7 +35,7 @@ def camera_of(vehicle: Surveyor) -> Camera:
 
 def begun(vehicle: KinematicVehicle, *waypoints: Waypoint) -> Flight:
     """A flight over `waypoints` that has 4 s for the camera."""
-    options = MissionConfig(photo_timeout=4.0)
+    options = patience(4.0)
     return flight(add(*(waypoints or (BEGIN, FINISH))), vehicle=vehicle, options=options)
 
 

@@ -9,17 +9,16 @@ import pytest
 from flights import add, flight
 from hypothesis import given
 from hypothesis import strategies as st
-from surveyors import Gimbal, Surveyor, lost, simulated
+from surveyors import Gimbal, Surveyor, lost, patience, simulated
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.config.model import MissionConfig
+from aerodaas.extensions.payload.point_of_interest import PointOfInterest, direction_to
 from aerodaas.geometry.frames import rotation_from_rpy, wrap_angle
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import GimbalTarget
 from aerodaas.messages.vehicle import PositionSetpoint
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.payload.point_of_interest import PointOfInterest, direction_to
 
 coordinate = st.floats(-500.0, 500.0)
 place = st.tuples(coordinate, coordinate, coordinate)
@@ -113,7 +112,7 @@ def test_a_gimbal_keeps_looking_at_the_place() -> None:
     # The test's gimbal turns at 1 rad/s, and the nose turns away under it at each corner.
     assert np.median(offsets) < 0.06
     assert vehicle.yaw == pytest.approx(3 * math.pi / 4, abs=0.5)
-    (photo,) = made.mission.photographer.photos
+    (photo,) = made.mission.photos
     assert photo.gimbal is not None
     assert photo.gimbal.pitch == pytest.approx(math.atan2(-6, 8), abs=0.08)
     made.run()
@@ -159,7 +158,7 @@ def test_a_waypoints_own_yaw_is_kept() -> None:
     made = flight(add(asked), vehicle=vehicle)
     made.run(until=lambda: bool(made.status.photos[0]))
     assert vehicle.yaw == pytest.approx(1.0, abs=0.2)
-    (photo,) = made.mission.photographer.photos
+    (photo,) = made.mission.photos
     assert photo.gimbal is not None
     assert wrap_angle(vehicle.yaw + photo.gimbal.yaw - math.pi / 2) == pytest.approx(0, abs=0.1)
 
@@ -183,7 +182,7 @@ def test_a_picture_waits_until_the_gimbal_looks_there() -> None:
     assert vehicle.gimbal is not None
     vehicle.gimbal.stuck = True
     asked = Waypoint("south", 0, -8, 6, look_at=(0.0, 0.0, 0.0), photo=True)
-    made = flight(add(asked), vehicle=vehicle, options=MissionConfig(photo_timeout=2.0))
+    made = flight(add(asked), vehicle=vehicle, options=patience(2.0))
     made.run()
     made.expect(MissionState.LANDED)
     assert made.status.photos == (0, 1)
@@ -244,7 +243,7 @@ def test_a_simulated_drone_photographs_what_it_flies_around() -> None:
         noise=0.0,
         wind=0.0,
     )
-    photos = mission.photographer.photos
+    photos = mission.photos
     assert len(photos) > 8
     off = []
     for photo in photos:

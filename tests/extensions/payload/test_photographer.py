@@ -6,9 +6,8 @@ import math
 
 import pytest
 from flights import Flight, KinematicVehicle, add, flight
-from surveyors import Surveyor, lost
+from surveyors import Surveyor, lost, patience
 
-from aerodaas.config.model import MissionConfig
 from aerodaas.errors import VehicleError
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.payload import GimbalTarget, LensTarget
@@ -28,7 +27,7 @@ def flown(vehicle: KinematicVehicle, *waypoints: Waypoint, timeout: float = 4.0)
     made = flight(
         add(*(waypoints or STOPS)),
         vehicle=vehicle,
-        options=MissionConfig(photo_timeout=timeout),
+        options=patience(timeout),
     )
     made.run()
     return made
@@ -47,7 +46,7 @@ def test_each_picture_is_taken_once_the_gimbal_looks_there() -> None:
     unharmed(made)
     assert vehicle.photo_camera is not None
     assert vehicle.photo_camera.asked == ["north", "east"]
-    first, second = made.mission.photographer.photos
+    first, second = made.mission.photos
     assert first.gimbal is not None
     assert second.gimbal is not None
     assert abs(first.gimbal.pitch - DOWN) < 0.06
@@ -72,7 +71,7 @@ def test_the_drone_stays_until_the_picture_is_there() -> None:
     vehicle = Surveyor()
     assert vehicle.photo_camera is not None
     vehicle.photo_camera.silent = True
-    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=patience(4.0))
     made.run_to(MissionState.LOITERING)
     began = made.seconds
     made.run(until=lambda: made.mission.state is not MissionState.LOITERING)
@@ -126,7 +125,7 @@ def test_a_vehicle_without_any_of_it_flies_on() -> None:
 def test_components_that_vanish_in_mid_flight() -> None:
     """What was taken before stays; what follows is lost and told."""
     vehicle = Surveyor()
-    made = flight(add(*STOPS), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made = flight(add(*STOPS), vehicle=vehicle, options=patience(4.0))
     made.run(until=lambda: made.status.visits == 1)
     vehicle.gimbal = vehicle.photo_camera = None
     made.run()
@@ -177,7 +176,11 @@ def test_a_failsafe_does_not_wait_for_a_picture() -> None:
     vehicle = Surveyor()
     assert vehicle.photo_camera is not None
     vehicle.photo_camera.silent = True
-    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=100.0))
+    made = flight(
+        add(STOPS[0]),
+        vehicle=vehicle,
+        options=patience(100.0),
+    )
     made.run_to(MissionState.LOITERING)
     vehicle.charge = 0.2
     made.run(2.0)
@@ -202,7 +205,7 @@ def test_the_time_out_begins_anew_after_an_interruption() -> None:
     vehicle = Surveyor()
     assert vehicle.gimbal is not None
     vehicle.gimbal.stuck = True
-    made = flight(add(STOPS[0]), vehicle=vehicle, options=MissionConfig(photo_timeout=4.0))
+    made = flight(add(STOPS[0]), vehicle=vehicle, options=patience(4.0))
     made.run_to(MissionState.LOITERING)
     made.tell(add(Waypoint("urgent", 3, 5, 2, priority=1, hover_duration=5)))
     made.run(until=lambda: "urgent" in made.status.visited)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
-from emulated import Stepped, fly_pictures, told
+from emulated import Stepped, told
 from hypothesis import given
 from hypothesis import strategies as st
+from surveyors import fly_pictures
 
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
@@ -203,7 +204,7 @@ def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
         mission = fly_pictures(ends)
         assert mission.state is MissionState.LANDED, mission.status.reason
         assert told(mission, "photo") == []
-        first, second = mission.photographer.photos
+        first, second = mission.photos
         assert first.gimbal is not None
         assert second.gimbal is not None
         assert first.gimbal.pitch == pytest.approx(-math.pi / 2, abs=0.06)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from aerodaas.clock import seconds
 from aerodaas.errors import VehicleError, failure_line
-from aerodaas.messages.actions import RecordVideo
+from aerodaas.extensions.payload.actions import RecordVideo
 from aerodaas.messages.payload import VideoCamera
 from aerodaas.messages.vehicle import PayloadVehicle
 from aerodaas.mission.log import MissionLog

@@ -6,7 +6,8 @@ import socket
 from collections.abc import Callable
 
 import pytest
-from emulated import Stepped, fly_pictures, told
+from emulated import Stepped, told
+from surveyors import fly_pictures
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.mission import MissionState

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.extensions.payload.actions import TriggerPhotos
 from aerodaas.geometry.frames import Vector, length, wrap_angle
-from aerodaas.messages.actions import TriggerPhotos
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
 

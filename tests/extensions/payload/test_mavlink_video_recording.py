@@ -6,8 +6,8 @@ import logging
 
 import pytest
 from emulated import Stepped, told
+from surveyors import patience
 
-from aerodaas.config.model import MissionConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 from aerodaas.messages.payload import VideoCamera
@@ -25,7 +25,7 @@ STILL, NOT = (
 )
 BEGIN = Waypoint("a", 3, 0, 2, video=True)
 FINISH = Waypoint("b", 3, 3, 2, video=False)
-OPTIONS = MissionConfig(photo_timeout=4.0)
+OPTIONS = patience(4.0)
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""Gimbal, pictures and video of a mission."""
