@@ -107,7 +107,7 @@ _CORE = (
     ),
     Command(
         "lab",
-        "aerodaas.cli.lab.command_line:app",
+        "aerodaas.cli.lab.app:app",
         "Compare analytics schedulers in simulation: thousands of drone-minutes in seconds.",
     ),
     Command(

@@ -15,7 +15,7 @@ import typer
 
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.cli.app import run_typer
-from aerodaas.cli.lab.sweep import write_csv
+from aerodaas.cli.lab.options import write_csv
 from aerodaas.config.extras import require_extra
 from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import plain

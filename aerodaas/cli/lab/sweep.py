@@ -1,18 +1,28 @@
-"""The work of `aerodaas lab sweep`: cases, tables, files and plots."""
+"""`aerodaas lab sweep`: cases, tables, files and plots."""
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
-from aerodaas.cli.lab.study import spread_of, workload_of
+from aerodaas.cli.lab.options import (
+    WORKLOAD,
+    Address,
+    Duration,
+    Edges,
+    Jobs,
+    Names,
+    names_of,
+    spread_of,
+    workload_of,
+    write_csv,
+)
 from aerodaas.config.extras import has_extra
 from aerodaas.errors import ConfigError, UnknownIdError
 from aerodaas.schedulers.lab.metrics import seeds_needed
@@ -20,17 +30,9 @@ from aerodaas.schedulers.lab.sweep import PARAMETERS, SweepResult, run_sweep
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
 
-__all__ = ["parse_sweeps", "sweep", "write_csv"]
+__all__ = ["parse_sweeps", "sweep"]
 
-
-def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Write at least one row as CSV; the columns are those of the first. Raises OSError."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-
-
+_FIGURES = ("qos per s", "completion")
 _BETWEEN = re.compile(r",(?=\s*[A-Za-z])")
 """Commas between words; those within one stand before a number, as in `outage:30-45,80-81`."""
 _WORDS = {"network", "times"}
@@ -38,30 +40,67 @@ _CSV, _SUMMARY, _PARQUET = "runs.csv", "summary.csv", "runs.parquet"
 
 
 def sweep(
-    scheduler: str,
-    sweeps: Sequence[str],
     *,
-    workload: str,
-    seeds: int,
-    baseline: str | None,
-    network: str,
-    times: str,
-    duration: float | None,
-    edges: int | None,
-    cloud_slots: int | None,
-    figures: Sequence[str],
-    bound: bool,
-    jobs: int | None,
-    address: str | None,
-    out: Path,
+    sweeps: Annotated[
+        list[str],
+        typer.Option(
+            "--sweep",
+            help="`drones=10,20,40`; given several times, all combinations. Of `drones`, `edges`, "
+            "`models` (A: six, P: four), `network`, `times`, `cloud_slots`, `duration`, and "
+            "`scheduler.KEYWORD`, which goes to the constructors that have it.",
+        ),
+    ],
+    scheduler: Names = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(help="What the others are compared with. Default: the first scheduler."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 20,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--figure",
+            "-f",
+            help="What is printed and plotted, may be given several times: `qos per s`, "
+            "`completion`, `qoe per s`, … Default: the first two. The files have all.",
+        ),
+    ] = None,
+    workload: Annotated[
+        str, typer.Option("--workload", "-w", help="What is not swept, as for `run`.")
+    ] = WORKLOAD,
+    network: Annotated[str, typer.Option(help="As for `run`, where it is not swept.")] = "steady",
+    times: Annotated[str, typer.Option(help="As for `run`, where they are not swept.")] = "nominal",
+    duration: Duration = None,
+    edges: Edges = None,
+    cloud_slots: Annotated[
+        int | None, typer.Option(help="Executions in the cloud at once; default 32.", min=0)
+    ] = None,
+    bound: Annotated[
+        bool, typer.Option("--bound", help="Compute the clairvoyant bound, too; it takes longer.")
+    ] = False,
+    jobs: Jobs = None,
+    address: Address = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and plots.")] = Path(
+        "sweep"
+    ),
 ) -> None:
-    """Simulate all cases, print the comparisons, and write tables and plots into `out`."""
-    names = [name.strip() for name in scheduler.split(",")]
-    spread, wanted = spread_of(address, names)
+    """Compare schedulers in every combination of some parameters.
+
+    All see the same sample paths, so they are compared seed by seed: differences from the baseline
+    have 95 % intervals (Student's t) and the p of a paired permutation test, corrected by Holm;
+    `*` is significant. The folder gets every run as a row of `runs.csv` (`runs.parquet` where
+    pyarrow is), the comparisons, and plots for a paper.
+
+        aerodaas lab sweep --sweep drones=2,4,8 -s dems,margin,mine.py:Mine
+        aerodaas lab sweep --sweep network=steady,trapezium --sweep cloud_slots=4,16 -s dems,gems
+        aerodaas lab sweep --sweep scheduler.slack=10,50,100 -s mine.py:Mine,dems --baseline dems
+    """
+    spread, schedulers = spread_of(address, names_of(scheduler))
+    figures = figure or list(_FIGURES)
     with show_progress() as progress:
         bar = progress.add_task("edges", total=None)
         result = run_sweep(
-            wanted,
+            schedulers,
             parse_sweeps(sweeps),
             workload=workload_of(workload, duration, edges),
             seeds=range(seeds),
@@ -74,8 +113,8 @@ def sweep(
             spread=spread,
             progress=lambda done, total: progress.update(bar, completed=done, total=total),
         )
-    for figure in figures:
-        _show(result, figure)
+    for name in figures:
+        _show(result, name)
     _advise(result)
     files = _write(result, out)
     if has_extra("plots"):

@@ -12,9 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import aerodaas
-from aerodaas.cli.lab.command_line import Address, Jobs
-from aerodaas.cli.lab.study import spread_of
-from aerodaas.cli.lab.sweep import write_csv
+from aerodaas.cli.lab.options import Address, Jobs, spread_of, write_csv
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.leaderboard.ranking import (
     CASES,

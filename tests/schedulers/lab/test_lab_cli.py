@@ -8,7 +8,8 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab.command_line import app
+from aerodaas.cli.lab.app import app
+from aerodaas.errors import AeroDaaSError
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop
@@ -93,6 +94,8 @@ def test_mistakes_are_explained() -> None:
         (("--network", "fog"), "no network is called 'fog'"),
         (("--times", "normal"), "nominal, lognormal or gamma"),
     ):
-        code, text = _run("run", "--seeds", "1", "--duration", "2", "--jobs", "1", *arguments)
-        assert code == 2
-        assert words in text
+        wrong = ["run", "--seeds", "1", "--duration", "2", "--jobs", "1", *arguments]
+        error = CliRunner().invoke(app, wrong).exception
+        assert isinstance(error, AeroDaaSError)
+        assert error.exit_code == 2
+        assert words in str(error)

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab.command_line import app
+from aerodaas.cli.lab.app import app
 from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.lab import Workload, run_lab
 
 _MINE = """
@@ -58,6 +59,5 @@ def test_what_a_scheduler_raises_there_is_told_here(runtime: None, tmp_path: Pat
     arguments = ["run", "-w", "1D-P", "--edges", "2", "-s", f"{mine}:Mine", "--seeds", "1"]
     arguments += ["--duration", "3", "--address", _address()]
     outcome = CliRunner().invoke(app, arguments, env={"COLUMNS": "220"})
-    assert outcome.exit_code == 2
-    assert "Mine with seed 0 on edge 0: RuntimeError: drone0" in outcome.output
-    assert "Traceback" not in outcome.output
+    assert isinstance(outcome.exception, SchedulerError)
+    assert "Mine with seed 0 on edge 0: RuntimeError: drone0" in str(outcome.exception)

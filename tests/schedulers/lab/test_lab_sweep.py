@@ -14,7 +14,7 @@ import pytest
 from matplotlib.axes import Axes
 from typer.testing import CliRunner
 
-from aerodaas.cli.lab.command_line import app
+from aerodaas.cli.lab.app import app
 from aerodaas.cli.lab.sweep import parse_sweeps
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import extras
@@ -219,7 +219,9 @@ def test_sweeps_are_read() -> None:
 
 def run(*words: str) -> tuple[int, str]:
     """The command."""
-    outcome = CliRunner().invoke(app, ["sweep", *words], env={"COLUMNS": "100"})
+    outcome = CliRunner().invoke(
+        app, ["sweep", *words], env={"COLUMNS": "100"}, catch_exceptions=False
+    )
     return outcome.exit_code, outcome.output
 
 
@@ -249,12 +251,13 @@ def test_the_command_writes_tables_and_plots(tmp_path: Path) -> None:
 
 def test_the_command_explains_mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit status 2 and a sentence; without Matplotlib the tables are written all the same."""
-    assert run("--sweep", "drons=1")[0] == 2
+    with pytest.raises(UnknownIdError):
+        run("--sweep", "drons=1")
     blocked = tmp_path / "file"
     blocked.write_text("mine")
     words = ("--sweep", "drones=1", "-s", "edf", "--duration", "2", "--seeds", "1", "--jobs", "1")
-    code, text = run(*words, "-o", str(blocked))
-    assert (code, "cannot write into" in text) == (2, True)
+    with pytest.raises(ConfigError, match="cannot write into"):
+        run(*words, "-o", str(blocked))
     monkeypatch.setattr("aerodaas.cli.lab.sweep.has_extra", lambda _: False)
     code, text = run(*words, "-o", str(tmp_path / "out"))
     assert (code, "pip install 'aerodaas[plots]'" in text) == (0, True)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.cli.lab.study import workload_of
+from aerodaas.cli.lab.options import workload_of
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import MILLISECOND

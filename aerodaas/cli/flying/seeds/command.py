@@ -11,7 +11,7 @@ import typer
 
 from aerodaas.cli.flying.seeds.figures import rows, show
 from aerodaas.cli.flying.seeds.runs import ApplicationRun, SeededRun, fly_seeds
-from aerodaas.cli.lab.sweep import write_csv
+from aerodaas.cli.lab.options import write_csv
 from aerodaas.config.options import RunOptions
 from aerodaas.environment.mission_run import recording_folder
 from aerodaas.errors import ConfigError, MissionError

@@ -1,76 +1,128 @@
-"""The work of `aerodaas lab`: simulations, tables and plots."""
+"""`aerodaas lab run` and `list`: simulations, tables and plots."""
 
 from __future__ import annotations
 
-import csv
 import json
 import random
-from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from aerodaas.clock import NANOSECONDS
+from aerodaas.cli.lab.options import (
+    WORKLOAD,
+    Address,
+    Duration,
+    Edges,
+    Jobs,
+    Names,
+    names_of,
+    spread_of,
+    workload_of,
+    write_csv,
+)
 from aerodaas.config.extras import require_extra
-from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
+from aerodaas.schedulers.analytics.base import MILLISECOND, Resources
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
-from aerodaas.schedulers.lab import (
-    ExecutionTimes,
-    LabResult,
-    Network,
-    Workload,
-    load_workload,
-    read_arrivals,
-    run_lab,
-)
-from aerodaas.schedulers.lab.arrival_trace import TRACE
+from aerodaas.schedulers.lab import ExecutionTimes, LabResult, Network, Workload, run_lab
 from aerodaas.schedulers.lab.metrics import Score, score
-from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
 
-__all__ = ["registered", "spread_of", "study", "workload_of"]
+__all__ = ["list_all", "run"]
 
 _BOUND_EDGES = 10
 """Most edges for which the clairvoyant bound is computed unasked."""
 
 
-def study(
-    scheduler: str,
-    workload: str,
+def run(
     *,
-    flown: Path | None,
-    seeds: int,
-    network: str,
-    times: str,
-    duration: float | None,
-    edges: int | None,
-    cloud_slots: int | None,
-    bound: bool | None,
-    jobs: int | None,
-    address: str | None,
-    plots: Path | None,
-    json_path: Path | None,
-    csv_path: Path | None,
+    workload: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--workload",
+            "-w",
+            help="Comma-separated, or given several times: `3D-A` is 3 drones with all six models "
+            "on one edge, `4D-P` four models, `80D-A/7` 80 drones over 7 edges; or a JSON file; "
+            "or `trace:FILE`, arrivals in a CSV; "
+            f"`six` for all of the published ones. Default: {WORKLOAD}.",
+        ),
+    ] = None,
+    flown: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="A recorded flight (`flight.mcap`) instead of a workload: its tasks as they "
+            "came, with the execution times observed.",
+        ),
+    ] = None,
+    scheduler: Names = None,
+    seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 10,
+    network: Annotated[
+        str,
+        typer.Option(
+            help="`steady`, `trapezium[:MS]` (latency rises and falls), `outage[:30-45,80-81]` "
+            "(seconds), `trace:FILE` (measured bandwidth: Mahimahi, Pensieve, or a CSV of seconds, "
+            "Mbit/s); joined by `+`.",
+        ),
+    ] = "steady",
+    times: Annotated[
+        str,
+        typer.Option(
+            help="`nominal`, or drawn around the table's times with a coefficient of variation: "
+            "`lognormal:0.15`, `gamma:0.15`; `lognormal:0.15@0.95` takes the table's times as "
+            "95th percentiles instead of means."
+        ),
+    ] = "nominal",
+    duration: Duration = None,
+    edges: Edges = None,
+    cloud_slots: Annotated[
+        int | None,
+        typer.Option(help="Executions in the cloud at once; default 32, or the flight's.", min=0),
+    ] = None,
+    bound: Annotated[
+        bool | None,
+        typer.Option(help="Compute the clairvoyant bound; by default for up to 10 edges."),
+    ] = None,
+    jobs: Jobs = None,
+    address: Address = None,
+    plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
+    json_path: Annotated[
+        Path | None, typer.Option("--json", help="File for every figure and its interval.")
+    ] = None,
+    csv_path: Annotated[
+        Path | None, typer.Option("--csv", help="The same, one figure to a row.")
+    ] = None,
 ) -> None:
-    """Compare schedulers and print the tables; the arguments are those of `aerodaas lab run`."""
+    """Simulate schedulers on the same sample paths and compare them.
+
+    Prints, per workload, means over the seeds with 95 % confidence intervals. *of bound* is the
+    QoS utility as a share of what a clairvoyant could reach at most on the very same paths.
+
+        aerodaas lab run -w 2D-A,4D-A -s ec_edf,dems,margin --times lognormal:0.15 --plots out
+
+        aerodaas lab run --edges 1000 --seeds 1 --address auto -s dems,margin
+
+        aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
+    """
     results: list[LabResult] = []
-    names = [name.strip() for name in scheduler.split(",")]
-    loads, resources, as_flown = _loads(workload, flown, duration, edges)
+    names = names_of(scheduler)
+    workloads = ",".join(workload or [WORKLOAD])
+    loads, resources, as_flown = _loads(workloads, flown, duration, edges)
     if cloud_slots is not None:
         resources = Resources(cloud_slots=cloud_slots)
-    spread, wanted = spread_of(address, names)
+    spread, schedulers = spread_of(address, names)
     for load in loads:
         with show_progress() as progress:
             bar = progress.add_task(load.name, total=seeds * load.edges)
             result = run_lab(
                 load,
-                wanted,
+                schedulers,
                 range(seeds),
                 network=Network.named(network, load.duration),
                 times=ExecutionTimes.named(times),
@@ -89,23 +141,25 @@ def study(
     if json_path is not None:
         json_path.write_text(json.dumps([r.as_json() for r in results], indent=1))
     if csv_path is not None:
-        _write_csv(results, csv_path)
+        write_csv(csv_path, [row for result in results for row in _tidy_rows(result)])
 
 
-def _write_csv(results: list[LabResult], path: Path) -> None:
-    """Write every figure as a row of its own, as pandas and R want it."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(("workload", "network", "times", "scheduler", "figure", "mean", "margin"))
-        for result in results:
-            case = (result.workload.name, result.network.name, result.times.name)
-            for name in result.scores:
-                for figure, mean in result.figures(name).items():
-                    writer.writerow((*case, name, figure, mean.value, mean.margin))
+def _tidy_rows(result: LabResult) -> list[dict[str, Any]]:
+    """Every figure as a row of its own, as pandas and R want it."""
+    case = {
+        "workload": result.workload.name,
+        "network": result.network.name,
+        "times": result.times.name,
+    }
+    return [
+        {**case, "scheduler": name, "figure": figure, "mean": mean.value, "margin": mean.margin}
+        for name in result.scores
+        for figure, mean in result.figures(name).items()
+    ]
 
 
-def registered() -> None:
-    """Print the registered schedulers, the published models and the workloads' names."""
+def list_all() -> None:
+    """Show the registered schedulers, the published models and the workloads' names."""
     table = Table("name", "scheduler", title="Schedulers")
     for name in scheduler_names():
         text = (type(load_scheduler(name)).__doc__ or "").strip().splitlines()[0]
@@ -149,29 +203,6 @@ def _show(result: LabResult) -> None:
         rows.append(Row(name, cells, bold=figures["qos per s"].value == best))
     headings = [f"{column} %" if column in shares else column for column in columns]
     show_figures(title, "scheduler", headings, rows)
-
-
-def workload_of(name: str, duration: float | None, edges: int | None) -> Workload:
-    """The workload of a name, a JSON file or a trace; raises UnknownIdError, SchedulerError."""
-    lasts = None if duration is None else round(duration * NANOSECONDS)
-    if name.startswith(TRACE):
-        found = read_arrivals(name.removeprefix(TRACE), lasts)
-    else:
-        found = load_workload(name) if name.endswith(".json") else Workload.named(name)
-    if edges is not None:
-        found = found.on_edges(edges)
-    return found if lasts is None else found.lasting(lasts)
-
-
-def spread_of(
-    address: str | None, names: list[str]
-) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
-    """Executor that shares the seeds over a cluster, if there is one, and the schedulers for it."""
-    if address is None:
-        return None, names
-    from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
-
-    return spread_over(address), [shipped(name) for name in names]
 
 
 def _loads(

@@ -1,0 +1,94 @@
+"""Options of the lab's commands, and the workloads and executors that they name."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import AnalyticsScheduler
+from aerodaas.schedulers.lab import Workload, load_workload, read_arrivals
+from aerodaas.schedulers.lab.arrival_trace import TRACE
+from aerodaas.schedulers.lab.run import Spread
+
+__all__ = [
+    "WORKLOAD",
+    "Address",
+    "Duration",
+    "Edges",
+    "Jobs",
+    "Names",
+    "names_of",
+    "spread_of",
+    "workload_of",
+    "write_csv",
+]
+
+WORKLOAD = "3D-A"
+SCHEDULERS = "ec_edf,dems,gems,margin"
+Names = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scheduler",
+        "-s",
+        help="Comma-separated, or given several times: registered names (`aerodaas lab list`), "
+        "`module:Class` or `file.py:Class`. `dems_published` and the like behave as the published "
+        f"code. Default: {SCHEDULERS}.",
+    ),
+]
+
+Duration = Annotated[
+    float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
+]
+Edges = Annotated[
+    int | None,
+    typer.Option(
+        help="Simulate so many edges, each with the workload's drones; all cores share them.",
+        min=1,
+    ),
+]
+Jobs = Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1)]
+Address = Annotated[
+    str | None,
+    typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the edges and seeds."),
+]
+
+
+def names_of(scheduler: list[str] | None) -> list[str]:
+    """Names of `--scheduler`; the default ones where it is not given."""
+    return [name.strip() for name in ",".join(scheduler or [SCHEDULERS]).split(",")]
+
+
+def workload_of(name: str, duration: float | None, edges: int | None) -> Workload:
+    """The workload of a name, a JSON file or a trace; raises UnknownIdError, SchedulerError."""
+    lasts = None if duration is None else round(duration * NANOSECONDS)
+    if name.startswith(TRACE):
+        found = read_arrivals(name.removeprefix(TRACE), lasts)
+    else:
+        found = load_workload(name) if name.endswith(".json") else Workload.named(name)
+    if edges is not None:
+        found = found.on_edges(edges)
+    return found if lasts is None else found.lasting(lasts)
+
+
+def spread_of(
+    address: str | None, names: list[str]
+) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
+    """Executor that shares the seeds over a cluster, if there is one, and the schedulers for it."""
+    if address is None:
+        return None, names
+    from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
+
+    return spread_over(address), [shipped(name) for name in names]
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write at least one row as CSV; the columns are those of the first. Raises OSError."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
