@@ -20,7 +20,6 @@ from aerodaas.errors import VehicleError
 from aerodaas.messages.actuators import MoveResult
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.commands import ReleaseParachute
 from aerodaas.mission.mission import Mission
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.actuators import EmulatedActuators
@@ -154,16 +153,6 @@ def test_what_is_withdrawn_is_repeated_no_more(ends: Stepped) -> None:
         assert ends.vehicle.actuators.results() == []
 
 
-def test_a_queue_that_is_full_refuses(ends: Stepped) -> None:
-    """Rather than forget."""
-    with ends:
-        carried(ends).conduct = "silent"
-        for _ in range(17):
-            ends.vehicle.actuators.move("hook", "release")
-        with pytest.raises(VehicleError, match="16 commands"):
-            ends.vehicle.actuators.move("hook", "release")
-
-
 @pytest.mark.parametrize("position", ["release", "released", "2", ""])
 def test_no_position_fires_a_parachute(ends: Stepped, position: str) -> None:
     """Nor is one fired that may not be."""
@@ -210,43 +199,3 @@ def test_a_mission_drops_its_load(ends: Stepped) -> None:
             (2.0, 0.0),
             (9.0, 1100.0),
         ]
-
-
-def test_a_load_that_does_not_come_off_costs_no_flight(ends: Stepped) -> None:
-    """It is told, and nothing is sent once the drone flies on."""
-    with ends:
-        late: list[int] = []
-
-        def each(mission: Mission) -> None:
-            carried(ends).conduct = "silent" if mission.status.visits == 0 else "obey"
-            if mission.status.visits == 1:
-                late.append(len([one for one in carried(ends).asked if one[1] == 9.0]))
-
-        mission = fly(ends, each)
-        assert mission.state is MissionState.LANDED, mission.status.reason
-        (text,) = [alert.text for alert in mission.alerts if alert.kind == "actuator"]
-        assert text == "a: hatch: open: not done: not told within 4 s that it is done; nor hook"
-        assert (mavlink.MAV_CMD_DO_SET_SERVO, 9.0, 1900.0) not in carried(ends).asked[late[0] :]
-
-
-def test_a_parachute_ends_the_flight_hands_off(ends: Stepped) -> None:
-    """After its acknowledgement nothing is commanded any more."""
-    with ends:
-        heard: list[int] = []
-
-        def each(mission: Mission) -> None:
-            if mission.state is MissionState.ENROUTE and not heard:
-                assert mission.handle(ReleaseParachute("chute"), 0).accepted
-                heard.append(0)
-
-        mission = fly(ends, each)
-        assert mission.state is MissionState.ABORTED
-        assert mission.status.reason == "the parachute chute was released"
-        assert carried(ends).asked == [(mavlink.MAV_CMD_DO_PARACHUTE, 2.0, 0.0)]
-        before = len(ends.autopilot.heard)
-        ends.watch(2.0)
-        kinds = {message.get_type() for _, message in ends.autopilot.heard[before:]}
-        assert "SET_POSITION_TARGET_LOCAL_NED" not in kinds
-        assert mavlink.MAV_CMD_DO_SET_MODE not in {
-            getattr(message, "command", None) for _, message in ends.autopilot.heard[before:]
-        }

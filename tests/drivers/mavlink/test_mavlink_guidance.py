@@ -251,18 +251,3 @@ def test_what_flies_aside_from_its_line_is_told_to_fly_back(speed: float, beyond
     track = flown_leaning([(0, 0), (150, 0), (150, 60)], speed, 2.0, lines=True)
     assert 0.0 < track[:, 0].max() - 150.0 < beyond
     assert abs(track[-1, 0] - 150.0) < 0.4
-
-
-@pytest.mark.parametrize(("aside", "back"), [(0.3, 0.0), (-0.3, 0.0), (1.3, -0.5), (-1.3, 0.5)])
-def test_a_little_aside_is_no_excess(aside: float, back: float) -> None:
-    """What wind and an estimate do to a vehicle on its line is the autopilot's own affair."""
-    setpoint = PositionSetpoint(np.array([100.0, 0.0, 0.0]), None, 5.0, 0.0, np.zeros(3))
-    seen = MovingTarget(3.0, 1.5).towards(
-        setpoint,
-        5.0,
-        vehicle=np.array([10.0, 0.0, 0.0]),
-        velocity=np.array([5.0, aside, 0.0]),
-        facing=0.0,
-        now=100.0,
-    )
-    assert seen.velocity[1] == pytest.approx(back)

@@ -110,12 +110,6 @@ def test_bytes_of_a_serial_line_are_everybodys() -> None:
         assert both.hear((half, None)) == [[(half, None)]] * 2
 
 
-def test_who_forwards_hears_all() -> None:
-    """A ground station beside us is to see every vehicle."""
-    with shared(1, 2, hears_all=1) as both:
-        assert both.hear((packet(2), HERE)) == [[(packet(2), HERE)]] * 2
-
-
 def test_a_flood_in_one_vehicles_name_costs_the_other_nothing() -> None:
     """Each has a queue of its own, and what is nobody's never fills it."""
     with shared(1, 2, 3) as all_three:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from autopilot import STILL, Family
+from autopilot import STILL
 from emulated import FAMILIES, Flight, Stepped
 
 from aerodaas.drivers.mavlink import connecting
@@ -62,32 +62,6 @@ def test_motors_stopped_in_the_air_are_no_landing(world: Stepped) -> None:
     assert not told(world.until(VehicleMode.HOLDING, VehicleMode.GUIDED), "motors")
 
 
-def test_motors_stopped_during_a_landing_are_no_landing_either(world: Stepped) -> None:
-    """Sinking in its landing mode, it has not landed yet."""
-    world.vehicle.land()
-    world.until(VehicleMode.LANDING)
-    world.watch(2.0)
-    height = float(world.autopilot.truth.position[2])
-    assert height > 4.0
-    world.autopilot.stop_motors()
-    state = world.turn()
-    while state.armed:
-        state = world.turn()
-    assert state.mode is not VehicleMode.GROUNDED or world.autopilot.truth.position[2] < 0.1
-    assert told(state, "motors: stopped in flight")
-
-
-def test_a_landing_is_one(world: Stepped) -> None:
-    """Down by its own mode: grounded in the very moment it is disarmed, without a fault."""
-    world.vehicle.land()
-    state = world.turn()
-    while state.armed:
-        state = world.turn()
-    assert state.mode is VehicleMode.GROUNDED
-    assert state.ended is FlightEnd.LANDED
-    assert state.faults == ()
-
-
 def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
     """Told, disarmed, and its new frame is laid over the earth before a position is believed."""
     world.autopilot.restart()
@@ -104,21 +78,6 @@ def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
         assert not np.isfinite(position).all() or np.allclose(position, lying, atol=1.0)
     assert states[-1].odometry.position == pytest.approx(lying, abs=1.0)
     assert states[-1].mode is VehicleMode.GROUNDED
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_an_autopilot_that_starts_anew_on_the_ground(flight: Flight, family: Family) -> None:
-    """It stands where it stood, whatever its new frame says, and flies from there."""
-    options = AutopilotOptions(family=family, estimator_origin=(20.0, -9.0, 3.0))
-    with flight(options) as world:
-        world.watch(8.0)
-        world.autopilot.restart()
-        state = world.watch(15.0)[-1]
-        assert told(state, "autopilot: it started anew")
-        assert not told(state, "in flight")
-        assert state.odometry.position == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
-        assert world.vehicle.preflight() == []
-        assert world.guide(2.0).odometry.height == pytest.approx(2.0, abs=0.3)
 
 
 def test_an_autopilot_that_starts_anew_while_being_connected(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from autopilot import Family, robot_of
-from emulated import FAMILIES, LOOPBACK, Flight, free_port, wait_for
+from emulated import FAMILIES, LOOPBACK, Flight, free_port
 
 from aerodaas.cli.app import main
 from aerodaas.config.model import EnvironmentConfig
@@ -21,8 +21,6 @@ from aerodaas.drivers.mavlink.discovery import hear_vehicles
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.protocol.schemas import LinkState
-from aerodaas.service.monitor.watcher import VehicleWatcher
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 KEY = bytes(range(32))
@@ -68,25 +66,6 @@ def test_one_that_obeys_the_unsigned_is_connected() -> None:
         mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_RESULT_DENIED, target_system=245
     )
     connecting.require_answer(commander, "drone", lambda: commander.on_ack(answer, 0.0))
-
-
-def test_the_fleets_state_says_so() -> None:
-    """The monitor calls it lost, with the reason and the remedy; never connected."""
-    with signing() as environment:
-        seen: list[LinkState] = []
-        watcher = VehicleWatcher(environment.robots[0], environment, lambda: None)
-        watcher.start()
-        watcher.want(wanted=True)
-
-        def lost() -> bool:
-            seen.append(watcher.report.link)
-            return watcher.report.link is LinkState.LOST
-
-        wait_for(lost)
-        assert TRUTH in watcher.report.reason
-        assert LinkState.CONNECTED not in seen
-        watcher.want(wanted=False)
-        wait_for(lambda: not watcher.report.held)
 
 
 def test_preflight_says_so(

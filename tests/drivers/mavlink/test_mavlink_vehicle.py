@@ -15,9 +15,7 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.errors import ConfigError, VehicleError
 from aerodaas.messages.vehicle import (
-    ClockedVehicle,
     PositionSetpoint,
-    Vehicle,
     VehicleMode,
     VelocitySetpoint,
 )
@@ -31,17 +29,6 @@ def vehicle_at(port: int, **settings: object) -> MavlinkVehicle:
     """A driver that is not connected yet."""
     robot = robot_of(port, **settings)
     return MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
-
-
-def test_it_is_a_vehicle_with_honest_capabilities() -> None:
-    """What it offers can be asked before anything is connected."""
-    vehicle = vehicle_at(1)
-    assert isinstance(vehicle, Vehicle)
-    assert isinstance(vehicle, ClockedVehicle)
-    assert vehicle.capabilities.returns_home
-    assert vehicle.preflight() == ["not connected"]
-    with pytest.raises(VehicleError, match="not connected"):
-        vehicle.read()
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -91,31 +78,6 @@ def test_a_bad_link_costs_no_flight(
         motions = ends.firmware.motions
     assert motions.count("arm") == 1
     assert motions.count("take off") == 1
-
-
-def test_the_speed_asked_for_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither autopilot takes a speed with a place, so the target itself moves at it."""
-    with Stepped(monkeypatch) as ends:
-        ends.guide()
-        fastest = 0.0
-        for _ in range(80):
-            ends.stream(PositionSetpoint(np.array([12.0, 0.0, 2.0]), None, 1.0), 0.05)
-            fastest = max(fastest, float(np.linalg.norm(ends.autopilot.truth.velocity[:2])))
-        assert 0.8 < fastest < 1.3
-
-
-@pytest.mark.parametrize(
-    ("family", "words"),
-    [("px4", "estimator: position not stable"), ("ardupilot", "PreArm: Need Position Estimate")],
-)
-def test_a_refusal_comes_with_its_reason(
-    monkeypatch: pytest.MonkeyPatch, family: Family, words: str
-) -> None:
-    """The arming checks' own words: events of PX4, STATUSTEXT of ArduPilot."""
-    options = AutopilotOptions(family=family, ready_after=1e6)
-    refused = pytest.raises(VehicleError, match=f"position within 5 s.*{words}")
-    with refused, Stepped(monkeypatch, options, ready_timeout=5.0):
-        pass
 
 
 def test_nobody_there() -> None:
@@ -212,20 +174,6 @@ def test_reconnecting_in_flight_takes_off_no_second_time(
             assert not ends.autopilot.armed
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_an_uploaded_fence_is_enforced(monkeypatch: pytest.MonkeyPatch, family: Family) -> None:
-    """Uploaded with its action: crossing it, the vehicle protects itself, and we are told."""
-    limits = {"geofence": {"polygon": [[-4, -4], [4, -4], [4, 4], [-4, 4]], "ceiling": 20}}
-    options = AutopilotOptions(family=family)
-    with Stepped(monkeypatch, options, fence="return", limits=limits) as ends:
-        ends.guide()
-        with pytest.raises(VehicleError, match="flies it"):
-            ends.stream(VelocitySetpoint(np.array([2.0, 0.0, 0.0])), 8.0)
-        assert 3.0 < float(ends.autopilot.truth.position[0]) < 9.0
-        ends.until(VehicleMode.FAILSAFE, timeout=3.0)
-        assert ends.autopilot.mode in {VehicleMode.RETURNING, VehicleMode.LANDING}
-
-
 def test_a_target_left_alone_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     """Killed on the way to a far place, the vehicle stops within metres, not at the place."""
     with Stepped(monkeypatch, AutopilotOptions(family="ardupilot")) as ends:
@@ -287,16 +235,6 @@ def test_settings_are_checked_by_name(settings: dict[str, object], complaint: st
     robot = RobotConfig(id="m", driver="mavlink", settings=settings)
     with pytest.raises(ConfigError, match=f"robot m: settings: {complaint}"):
         MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
-
-
-def test_a_camera_without_a_stream_is_none() -> None:
-    """MAVLink has no pictures of its own, so that such a camera can only be left out."""
-    sensors = [{"id": "bare"}, {"id": "rtsp", "settings": {"path": "rtsp://10.0.0.2/eye"}}]
-    robot = RobotConfig.model_validate({"id": "m", "driver": "mavlink", "sensors": sensors})
-    environment = EnvironmentConfig(robots=[robot])
-    assert [environment.has_pictures(sensor) for sensor in robot.sensors] == [False, True]
-    simulated = EnvironmentConfig(robots=[robot.model_copy(update={"driver": "simulated"})])
-    assert all(simulated.has_pictures(sensor) for sensor in robot.sensors)
 
 
 def test_home_frame_needs_a_home() -> None:

@@ -99,28 +99,6 @@ def test_a_camera_that_knows_the_former_requests_alone(ends: Stepped) -> None:
     assert newer.count(mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION) == 1
 
 
-def test_a_full_card_is_the_cameras_and_told_once(ends: Stepped) -> None:
-    """By the level of its policy, and not among other faults again."""
-    with ends:
-        payload(ends).free = 20.0
-        ready(ends)
-        ends.watch(3.0)
-        item = camera_item(ends)
-        assert item is not None
-        assert (item.verdict, item.value) == (
-            Verdict.WARNING,
-            "its card is full: 20 MiB are left",
-        )
-        assert "a card with room" in item.remedy
-        refused = camera_item(ends, camera="refuse")
-        assert refused is not None
-        assert refused.verdict is Verdict.REFUSED
-        assert camera_item(ends, camera="ignore") is None
-        checklist = Checklist(ends.vehicle, LimitsConfig(), PreflightConfig())
-        names = [one.name for one in checklist.examine(ends.vehicle.read())]
-        assert "faults" not in names
-
-
 def test_a_picture_whose_message_is_lost_is_taken_by_the_count(ends: Stepped) -> None:
     """Within seconds, at the time of the camera's word, and without its own place."""
     with ends:

@@ -119,22 +119,6 @@ def test_one_that_vanishes_is_told_and_found_again(ends: Stepped) -> None:
         assert isinstance(ends.photo_outcome(), Photo)
 
 
-def test_one_that_answered_nothing_is_asked_anew_when_it_is_back(ends: Stepped) -> None:
-    """A camera that hangs as it starts is given up, and asked again after a restart."""
-    camera = ends.autopilot.components[CAMERA]
-    camera.stalls = True
-    with ends:
-        ends.watch(40.0)
-        asked = commands(ends, CAMERA, mavlink.MAV_CMD_REQUEST_MESSAGE)
-        ends.watch(20.0)
-        assert commands(ends, CAMERA, mavlink.MAV_CMD_REQUEST_MESSAGE) == asked
-        assert ends.vehicle.photo_camera is None
-        camera.vanished, camera.stalls = True, False
-        ends.watch(7.0)
-        camera.vanished = False
-        ends.find_payload()
-
-
 def test_the_camera_with_the_lowest_id_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     """Before the autopilot's; where it vanishes the next one takes its place."""
     options = AutopilotOptions(components=(101, 103), camera=True)

@@ -15,7 +15,6 @@ from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.payload import GimbalTarget, Photo, PhotoFailure
-from aerodaas.mission.mission import Mission
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.payload import EmulatedPayload
 
@@ -211,26 +210,6 @@ def test_a_mission_takes_its_pictures(ends: Stepped) -> None:
         assert second.gimbal.pitch == pytest.approx(-0.5, abs=0.06)
         assert second.gimbal.yaw == pytest.approx(0.7, abs=0.06)
         assert [photo.label for photo in (first, second)] == ["a", "b"]
-
-
-@pytest.mark.parametrize("ends", ["px4"], indirect=True)
-@pytest.mark.parametrize("fault", ["stuck", "nonsense", "blind", "gone", "camera_refuses"])
-def test_what_fails_in_flight_costs_the_second_picture_alone(ends: Stepped, fault: str) -> None:
-    """It is told, and the drone flies on, comes home and lands."""
-
-    def strike(mission: Mission) -> None:
-        theirs = carried(ends)
-        if mission.status.visits and fault == "gone":
-            theirs.has_gimbal = theirs.has_camera = False
-        elif mission.status.visits:
-            setattr(theirs, fault, True)
-
-    with ends:
-        mission = fly_pictures(ends, strike)
-        assert mission.state is MissionState.LANDED, mission.status.reason
-        assert list(mission.status.visited) == ["a", "b"]
-        assert mission.status.photos == (1, 1)
-        assert any(text.startswith("b: no picture: ") for text in told(mission, "photo"))
 
 
 def test_a_gimbal_that_tracks_is_not_commanded_each_time(ends: Stepped) -> None:

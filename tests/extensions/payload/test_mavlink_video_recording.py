@@ -121,18 +121,6 @@ def test_a_silent_camera_is_told_and_its_status_counts_later(ends: Stepped) -> N
         assert camera.filming is True
 
 
-def test_a_refusal_leaves_what_was_known(ends: Stepped) -> None:
-    """It is told with its result; nothing is ended at the end."""
-    with ends:
-        camera = known(ends)
-        payload(ends).video_refuses = True
-        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
-        assert list(mission.status.visited) == ["a"]
-        assert told(mission, "video") == ["video not begun at a: denied"]
-        assert (camera.filming, camera.film_fault) == (False, "denied")
-        assert [one[0] for one in heard(ends)] == [START]
-
-
 def test_a_camera_without_video_is_told_at_once(ends: Stepped) -> None:
     """By the flags of its CAMERA_INFORMATION; one without any flags may have it."""
     with ends:
@@ -156,34 +144,6 @@ def test_a_video_is_ended_before_the_link_is_closed(
         assert payload(ends).recording is not None
     assert payload(ends).recording is None
     assert "has not acknowledged" not in caplog.text
-
-
-def test_an_end_that_is_not_acknowledged_is_in_the_log(
-    ends: Stepped, caplog: pytest.LogCaptureFixture
-) -> None:
-    """The link is closed after two seconds all the same."""
-    caplog.set_level(logging.WARNING)
-    with ends:
-        known(ends)
-
-        def stall(mission: Mission) -> None:
-            ends.autopilot.components[CAMERA].stalls = bool(mission.status.visited)
-
-        ends.mission([BEGIN], OPTIONS, ends.vehicle).fly(stall)
-        before = ends.now
-    assert ends.now - before < 4.0
-    assert "its camera has not acknowledged that its video is to end" in caplog.text
-
-
-def test_a_video_that_ran_before_take_off_is_left_alone(ends: Stepped) -> None:
-    """It is asked for nothing that it does already."""
-    with ends:
-        payload(ends).recording = 12.0
-        known(ends)
-        mission = ends.mission([BEGIN], OPTIONS, ends.vehicle).fly()
-        assert told(mission, "video") == []
-        assert heard(ends) == []
-    assert payload(ends).recording == 12.0
 
 
 def test_a_status_that_belies_the_beginning_is_told_once(ends: Stepped) -> None:
@@ -246,22 +206,6 @@ def test_a_camera_that_is_gone_begins_nothing_when_it_is_back(ends: Stepped) -> 
         assert heard(ends, OTHER) == []
         assert payload(ends).recording is None
         assert camera.filming is False
-
-
-def test_a_camera_that_was_off_in_between_is_told(ends: Stepped) -> None:
-    """It has acknowledged, and records no more; the other one takes over by a new order."""
-    with ends:
-        camera = recording(ends)
-        vanish(ends)
-        assert (camera.filming, camera.film_fault) == (None, "")
-        payload(ends).recording = None
-        ends.autopilot.components[CAMERA].vanished = False
-        ends.watch(14.0)
-        assert (camera.filming, camera.film_fault) == (False, NOT)
-        vanish(ends)
-        camera.film(on=True)
-        ends.wait(lambda: camera.filming)
-        assert payload(ends, OTHER).recording is not None
 
 
 def test_an_order_ends_the_one_before(ends: Stepped) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,7 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.extensions.traffic.settings import TrafficConfig
 from aerodaas.extensions.traffic.table import TrafficTable
 from aerodaas.geometry.frames import GeodeticOrigin
-from aerodaas.messages.mission import MissionState as S
-from aerodaas.messages.vehicle import Traffic, VehicleState
-from aerodaas.messages.waypoints import Waypoint
-from aerodaas.mission.mission import Mission
+from aerodaas.messages.vehicle import Traffic
 from tools.mavlink_vehicle import AutopilotOptions
 from tools.mavlink_vehicle.aircraft import EmulatedAircraft
 
@@ -278,47 +274,3 @@ def test_traffic_is_asked_for_once_and_again_after_a_restart(
         ends.autopilot.firmware.traffic.aircraft.append(EmulatedAircraft(position=(50, 0, 50)))
         ends.watch(4.0)
         assert len(ends.turn().traffic) == 1
-
-
-def fly(ends: Stepped, stop: Waypoint) -> tuple[Mission, list[VehicleState]]:
-    """A whole mission to one place, and all that was read."""
-    flight, states = ends.mission([stop]), list[VehicleState]()
-
-    def note(_: Mission) -> None:
-        assert flight.loop.state is not None
-        states.append(flight.loop.state)
-
-    return flight.fly(note), states
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_a_flight_waits_for_who_crosses_its_way(
-    family: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It keeps its distance, tells of whom, and comes to its waypoint afterwards."""
-    glider = EmulatedAircraft(1, "HB1234", (60.0, -250.0, 5.0), (0.0, 12.0, 0.0))
-    near = {"action": "hold", "distance": 40.0, "height": 30.0, "lookahead": 10.0}
-    with ends_of(monkeypatch, family, glider, limits={"traffic": near}) as ends:
-        mission, states = fly(ends, Waypoint("there", 75, 4, 3))
-        assert mission.state is S.LANDED
-        assert list(mission.status.visited) == ["there"]
-        alerts = [alert for alert in mission.alerts if alert.kind == "traffic"]
-        assert [alert.text.split()[1] for alert in alerts] == ["HB1234"]
-        apart = [
-            math.hypot(*(one.position - state.odometry.position)[:2])
-            for state in states
-            for one in state.traffic
-            if state.armed
-        ]
-        assert min(apart) > 39.0
-
-
-def test_a_ghost_that_cannot_be_stops_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Invalid reports of an aircraft on the way are counted, and nothing else."""
-    ghost = EmulatedAircraft(1, "GHOST", (10.0, 4.0, 3.0), lies={"flags": ALL & ~1})
-    with ends_of(monkeypatch, "px4", ghost, limits={"traffic": {"action": "land"}}) as ends:
-        mission, states = fly(ends, Waypoint("there", 15, 4, 3))
-        assert mission.state is S.LANDED
-        assert list(mission.status.visited) == ["there"]
-        assert mission.alerts == []
-        assert states[-1].extra["traffic_ignored"] > 10
