@@ -32,7 +32,7 @@ class Patch:
         grid = self.grid
         rounding = 1e-6
         down = (grid.north - latitudes) / grid.latitude_step
-        across = (grid.around(longitudes) - grid.west) / grid.longitude_step
+        across = (longitudes - grid.west) / grid.longitude_step
         inside = (
             (down >= -rounding)
             & (down <= grid.rows - 1 + rounding)
@@ -103,7 +103,7 @@ class Terrain:
 
     def why_unknown(self, latitude: float, longitude: float) -> str:
         """Say why the height at a place is not known."""
-        where = f"the ground at {latitude:.5f}, {math.remainder(longitude, 360.0):.5f}"
+        where = f"the ground at {latitude:.5f}, {longitude:.5f}"
         for tile in self.tiles:
             if tile.grid.holds(latitude, longitude):
                 return f"{where} is not known: {tile.name} has a hole there; fill it by another"
@@ -113,8 +113,6 @@ class Terrain:
 
     def patch(self, south: float, west: float, north: float, east: float) -> Patch:
         """Cut out an area, with a sample around it; NaN where nothing is known.
-
-        `west` and `east` may lie beyond 180 degrees, where the area crosses that meridian.
 
         Raises:
             ConfigError: If it has more than `MOST_SAMPLES`.
@@ -152,22 +150,18 @@ def _gridded(tile: Tile) -> str:
 
 
 def _copy(tile: Tile, grid: Grid, samples: NDArray[np.float32]) -> None:
-    """Put a tile's heights where nothing is known yet, also across the 180th meridian."""
-    for turned in tile.grid.turned():
-        if not grid.is_aligned(turned):
-            # Its steps make no whole turn.
-            continue
-        row, column = grid.offset(turned)
-        first_row, last_row = max(0, row), min(grid.rows, row + turned.rows)
-        first_column, last_column = max(0, column), min(grid.columns, column + turned.columns)
-        if first_row >= last_row or first_column >= last_column:
-            continue
-        part = tile.window(
-            slice(first_row - row, last_row - row),
-            slice(first_column - column, last_column - column),
-        )
-        target = samples[first_row:last_row, first_column:last_column]
-        np.copyto(target, part, where=np.isnan(target))
+    """Put a tile's heights where nothing is known yet."""
+    row, column = grid.offset(tile.grid)
+    first_row, last_row = max(0, row), min(grid.rows, row + tile.grid.rows)
+    first_column, last_column = max(0, column), min(grid.columns, column + tile.grid.columns)
+    if first_row >= last_row or first_column >= last_column:
+        return
+    part = tile.window(
+        slice(first_row - row, last_row - row),
+        slice(first_column - column, last_column - column),
+    )
+    target = samples[first_row:last_row, first_column:last_column]
+    np.copyto(target, part, where=np.isnan(target))
 
 
 def _opened(path: Path) -> Tile:

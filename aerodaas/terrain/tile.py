@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,6 @@ MOST_SAMPLES = 30_000_000
 """Most samples of a file, or of an area cut out of several: 120 MB as 32-bit numbers."""
 _HIGHEST, _DEEPEST = 9000.0, -500.0
 """Metres between which all land lies; what lies beyond is as good as a hole."""
-_TURN = 360.0
 _ALIGNED = 1e-3
 """Share of a step by which grids may be out of line: more than rounding in any file."""
 
@@ -47,20 +46,9 @@ class Grid:
         """Longitude of the last column."""
         return self.west + (self.columns - 1) * self.longitude_step
 
-    def around(self, longitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Shift longitudes by whole turns as near to the grid's middle as they may be."""
-        middle = 0.5 * (self.west + self.east)
-        return longitudes - _TURN * np.round((longitudes - middle) / _TURN)
-
     def holds(self, latitude: float, longitude: float) -> bool:
         """Whether a place lies within the outer samples."""
-        east = float(self.around(np.array(longitude)))
-        return self.south <= latitude <= self.north and self.west <= east <= self.east
-
-    def turned(self) -> Iterator[Grid]:
-        """The grid, and the same by a turn to the west and to the east."""
-        for turns in (0, -1, 1):
-            yield replace(self, west=self.west + turns * _TURN)
+        return self.south <= latitude <= self.north and self.west <= longitude <= self.east
 
     def is_aligned(self, other: Grid) -> bool:
         """Whether the samples of both are samples of one grid."""
@@ -92,10 +80,6 @@ class Tile:
     """Reads the samples, shape (rows, columns); a memory map where the format allows it."""
     void: float | None
     """The sample that means that nothing is known, if the file says one."""
-    scale: float = 1.0
-    """Metres of a sample's unit."""
-    offset: float = 0.0
-    """Metres of a sample of zero."""
 
     @property
     def name(self) -> str:
@@ -110,8 +94,6 @@ class Tile:
         """Heights of a part in metres; NaN where nothing is known."""
         part = np.asarray(self._samples[rows, columns])
         heights = part.astype(np.float32)
-        heights *= np.float32(self.scale)
-        heights += np.float32(self.offset)
         unknown = ~((heights >= _DEEPEST) & (heights <= _HIGHEST))
         heights[unknown if self.void is None else unknown | (part == self.void)] = np.nan
         return heights

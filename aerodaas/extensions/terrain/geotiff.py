@@ -29,13 +29,8 @@ _WGS84 = 4326
 _ABOVE_SEA = (None, 3855, 5773, 5798, 5714)
 """Vertical datums: none said, EGM2008, EGM96, EGM84, mean sea level."""
 _METRE = (None, 9001)
-_FOOT, _SURVEY_FOOT = 0.3048, 1200.0 / 3937.0
-_UNITS = {
-    **dict.fromkeys(("", "m", "metre", "meter", "metres", "meters"), 1.0),
-    **dict.fromkeys(("ft", "foot", "feet", "international foot"), _FOOT),
-    **dict.fromkeys(("us-ft", "ftus", "us survey foot", "us_survey_foot"), _SURVEY_FOOT),
-}
-"""Metres of GDAL's units."""
+_METRES = ("", "m", "metre", "meter", "metres", "meters")
+"""GDAL's words for the unit of heights in metres."""
 _WRITE_METRES = "write metres by `gdal_calc`"
 _MOST_ELEMENTS = 10_000
 _PIXEL_IS_POINT = 2
@@ -55,7 +50,7 @@ def geotiff_tile(path: Path) -> Tile:
         with tifffile.TiffFile(path) as file:
             page = file.pages[0]
             grid, void = _described(page, path)
-            scale, offset = _metres(page, path)
+            _require_metres(page, path)
     except ConfigError:
         raise
     except Exception as error:  # noqa: BLE001 - a stranger's bytes may raise anything
@@ -64,7 +59,7 @@ def geotiff_tile(path: Path) -> Tile:
     def read() -> NDArray[Any]:
         return _samples(path, grid)
 
-    return Tile(path, grid, read, void, scale, offset)
+    return Tile(path, grid, read, void)
 
 
 def _samples(path: Path, grid: Grid) -> NDArray[Any]:
@@ -152,11 +147,11 @@ def _check(keys: Mapping[int, int], path: Path) -> None:
         raise ConfigError(f"{path}: its heights are not in metres: convert it by `gdal_calc`")
 
 
-def _metres(page: TiffPage, path: Path) -> tuple[float, float]:
-    """Metres of a sample's unit, and of a sample of zero.
+def _require_metres(page: TiffPage, path: Path) -> None:
+    """Refuse heights in another unit, or scaled.
 
     GDAL's own words: UNITTYPE, SCALE and OFFSET in the file or, where it could not be written, in
-    one beside it. Heights are in the unit once they are scaled.
+    one beside it.
     """
     tag, beside = page.tags.get(42112), path.with_name(f"{path.name}.aux.xml")
     words: dict[str, str] = {}
@@ -166,23 +161,14 @@ def _metres(page: TiffPage, path: Path) -> tuple[float, float]:
             words = _words(parse_xml(text, "GDAL's metadata", _MOST_ELEMENTS))
         if tag is not None:
             words |= _words(parse_xml(str(tag.value).strip("\0 "), "GDAL_METADATA", _MOST_ELEMENTS))
-        unit = words.get("UNITTYPE", "").strip().lower()
-        metres, scale = _UNITS[unit], float(words.get("SCALE", 1.0))
-        offset = float(words.get("OFFSET", 0.0))
+        scaled = float(words.get("SCALE", 1.0)) != 1.0 or float(words.get("OFFSET", 0.0)) != 0.0
     except XmlError as error:
         raise ConfigError(f"{path}: GDAL's words for it {error}: {_WRITE_METRES}") from None
-    except (KeyError, ValueError) as error:
-        raise ConfigError(
-            f"{path}: its heights have an unknown unit or scale "
-            f"({printable(str(error))[:40]}): {_WRITE_METRES}"
-        ) from None
-    if not (math.isfinite(scale) and scale > 0.0 and math.isfinite(offset)):
-        raise ConfigError(f"{path}: SCALE is {scale:g}, OFFSET {offset:g}: {_WRITE_METRES}")
-    if unit and metres != 1.0 and _keys(page).get(4099) is not None:
-        raise ConfigError(
-            f"{path}: its UNITTYPE is {unit}, and its VerticalUnits are metres: {_WRITE_METRES}"
-        )
-    return metres * scale, metres * offset
+    except ValueError:
+        scaled = True
+    if scaled or words.get("UNITTYPE", "").strip().lower() not in _METRES:
+        told = ", ".join(f"{name} {printable(word)[:20]}" for name, word in words.items())
+        raise ConfigError(f"{path}: its heights are not in metres ({told}): {_WRITE_METRES}")
 
 
 def _words(root: ET.Element) -> dict[str, str]:
