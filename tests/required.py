@@ -53,7 +53,6 @@ PEERS = {
     "AERODAAS_MAVSDK": Peer("a Python with MAVSDK: tests/testing/test_mavsdk.py"),
     "AERODAAS_DJITELLOPY": Peer("a Python with djitellopy: tests/testing/test_djitellopy.py"),
     "AERODAAS_BROWSER": Peer("a Chromium or Chrome", BROWSERS),
-    "AERODAAS_FIREFOX": Peer("a Firefox", ("firefox", "firefox-esr")),
     "AERODAAS_NPM": Peer("Node.js' npm, with its registry in reach", ("npm",), ("node",)),
     "AERODAAS_SSHD": Peer(
         "OpenSSH's server, with ssh, ssh-keygen and rsync installed, too",

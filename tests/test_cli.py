@@ -477,15 +477,6 @@ def test_a_shell_completes_commands() -> None:
     assert ended.stdout.split() == ["report", "replay", "remote"]
 
 
-def test_help_teaches_by_example(aerodaas: Commands) -> None:
-    """Each command shows how it is called."""
-    assert "aerodaas run farm_survey" in aerodaas("--help").out
-    for command in ("run", "schema", "doctor"):
-        ended = aerodaas(command, "--help")
-        assert ended.code == 0
-        assert f"aerodaas {command}" in ended.out
-
-
 def test_help_loads_no_library_that_flies() -> None:
     """It is there at once: arrays, models of data, Ray and plots take several times as long."""
     code = (

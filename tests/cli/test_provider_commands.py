@@ -219,11 +219,3 @@ def test_bad_words_are_usage_errors(aerodaas: Command, words: list[str], said: s
     ended = aerodaas(*words)
     assert said in " ".join(ended.said.split())
     assert ended.code == AeroDaaSError.exit_code + 1
-
-
-@pytest.mark.parametrize(
-    "name", ["login", "fleet", "submit", "missions watch", "missions cancel", "missions fetch"]
-)
-def test_each_command_teaches_by_an_example(aerodaas: Command, name: str) -> None:
-    """Its help shows itself in use."""
-    assert f"aerodaas {name} " in " ".join(aerodaas(*name.split(), "--help").out.split())

@@ -24,16 +24,15 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.http_server.addresses import listen
 from aerodaas.mission.commands import Answer, Steer
 from aerodaas.protocol.piloting import ControlsIn
-from aerodaas.protocol.schemas import AccountIn, FleetOut, MissionPhase, Role, Scope, TokenIn
+from aerodaas.protocol.schemas import AccountIn, MissionPhase, Role, Scope, TokenIn
 from aerodaas.service import mission as missions
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.fleet.fleet_view import FleetView
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.orders import FlightOrder
 from aerodaas.service.flights.server import LeaseWatch
 from aerodaas.service.http import bodies
-from aerodaas.service.http.limits import PROVIDER, RequestLimits
+from aerodaas.service.http.limits import PROVIDER
 from aerodaas.service.http.server import web_server
 from aerodaas.service.live import controls as hand
 from aerodaas.service.live import session
@@ -356,42 +355,6 @@ def test_a_model_that_is_kept_holds_up_nobody(
         assert kept.result() == 204
 
 
-def test_who_asks_much_at_once_keeps_nobody_waiting(
-    service: Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Some answers take long, and the threads that give them are everybody's."""
-    free = threading.Event()
-    seen_by = FleetView.seen_by
-
-    def slow(view: FleetView, who: Principal) -> FleetOut:
-        if who.account == "ivan":
-            assert free.wait(ENOUGH)
-        return seen_by(view, who)
-
-    monkeypatch.setattr(FleetView, "seen_by", slow)
-    greedy, other = service.token("ivan"), service.token("olga")
-    with ThreadPoolExecutor(45) as pool:
-        asked = [pool.submit(service.status, "GET", "fleet", greedy) for _ in range(45)]
-        until(lambda: sum(one.done() for one in asked) == 45 - RequestLimits.account_requests)
-        assert service.status("GET", "fleet", other) == 200
-        free.set()
-    statuses = [one.result() for one in asked]
-    assert sorted(set(statuses)) == [200, 429]
-    assert statuses.count(200) == RequestLimits.account_requests
-    assert service.status("GET", "fleet", greedy) == 200
-
-
-def test_an_operator_is_never_turned_away(
-    service: Service, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever else the account has asked for: it may be a drone that must come home."""
-    monkeypatch.setattr(RequestLimits, "account_requests", 0)
-    token = service.token("olga")
-    service.accounts.change("olga", role=Role.OPERATOR)
-    assert service.status("GET", "fleet", token) == 200
-    assert service.status("GET", "fleet", service.token("ivan")) == 429
-
-
 def test_a_velocity_is_no_longer_than_one(service: Service) -> None:
     """What would take a gigabyte as JSON is not read as such."""
     mission = service.submit()
@@ -504,32 +467,6 @@ def test_a_command_waits_for_nothing_that_the_desk_does(service: Service) -> Non
         command = {"robot": "one", "command": "return-home"}
         assert pool.submit(service.status, *words, command).result(ENOUGH) == 200
     flight.close()
-
-
-def test_an_account_has_so_many_views_and_an_operator_all(service: Service) -> None:
-    """One that ends makes room for the next one."""
-    most = PROVIDER.account_views
-    mission = service.submit()
-    viewer = service.token("vera", role=Role.VIEWER)
-    operator = service.token("olga", role=Role.OPERATOR)
-    with contextlib.ExitStack() as stack:
-        first = stack.enter_context(service.socket(f"{mission}/live", viewer))
-        for _ in range(most - 1):
-            stack.enter_context(service.socket(f"{mission}/live", viewer))
-        assert not _opens(service, mission, viewer)
-        for _ in range(most + 1):
-            stack.enter_context(service.socket(f"{mission}/live", operator))
-        first.close()
-        until(lambda: _opens(service, mission, viewer))
-
-
-def _opens(service: Service, mission: str, token: str) -> bool:
-    """Whether there is room for one more live view."""
-    try:
-        with service.socket(f"{mission}/live", token):
-            return True
-    except InvalidStatus as refused:
-        return refused.response.status_code != 429
 
 
 def test_an_answer_that_nobody_waits_for_is_not_even_parsed(

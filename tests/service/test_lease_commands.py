@@ -72,14 +72,6 @@ def test_everything_that_the_service_takes_can_be_asked_for(lease: Lease) -> Non
     ]
 
 
-@pytest.mark.parametrize(
-    "words", [("--within", "5", "--near", "40,40"), ("--battery-minutes", "100000")]
-)
-def test_what_nothing_fulfils_now_is_queued(lease: Lease, words: tuple[str, ...]) -> None:
-    """A free drone that is too far, or whose charge does not last, is not what was asked for."""
-    assert asked(lease, *words)["state"] == "queued"
-
-
 def test_waiting_ends_with_the_grant(lease: Lease, provider: Served) -> None:
     """Which comes when the one before is given back."""
     first = asked(lease, "one")

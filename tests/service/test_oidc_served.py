@@ -45,21 +45,6 @@ def test_people_of_the_issuer_fly_without_an_account_made_for_them(
     assert provider.send("GET", f"/v1/missions/{found['id']}", token=other)[0] == 404
 
 
-def test_who_has_no_known_role_only_looks(provider: Served, issuer: Issuer) -> None:
-    """By the policy of this provider; 'admin' is no word of its mapping."""
-    token = issuer.token(aerodaas_role="admin", sub="9")
-    assert provider.ask("GET", "/v1/me", token=token)["role"] == "viewer"
-    assert provider.send("POST", "/v1/leases", {"robots": ["one"]}, token)[0] == 403
-
-
-def test_a_forged_token_is_refused_and_the_services_own_stay_good(
-    provider: Served, issuer: Issuer
-) -> None:
-    """Both kinds beside each other."""
-    assert provider.send("GET", "/v1/me", token=issuer.token(aud="other"))[0] == 401
-    assert provider.ask("GET", "/v1/me")["role"] == "admin"
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [

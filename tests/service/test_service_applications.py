@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import enum
-import runpy
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from flying import Flyer
-from served import Served, fleet, quick, robot
+from served import Served, fleet, robot
 
 from aerodaas import AeroNavigation, Analytics, Environment, NavigationType, Waypoint
-from aerodaas.config.options import ProviderOptions, RunOptions, current_options
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.errors import MissionError
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.readings import Readings
@@ -58,32 +54,6 @@ def hop(*places: tuple[float, float], name: str = "wp") -> AeroNavigation:
     """Waypoints at these places, 2 m up."""
     stops = [Waypoint(f"{name}{n}", x, y, 2.0) for n, (x, y) in enumerate(places)]
     return AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops)
-
-
-def test_an_application_flies_by_url_as_on_ones_own_drone(
-    flyer: Flyer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Farm Survey, unchanged but for the environment's name: the same trajectory, exactly."""
-    application, flights = APPS / "farm_survey.py", []
-    monkeypatch.setattr(sys, "path", [str(APPS), *sys.path])
-    content = quick(FARM)
-    environment = flyer.write(content, FARM.name)
-    with Served(content, "--no-rehearse", "--speed", "max") as service:
-        monkeypatch.setenv("AERODAAS_TOKEN", service.token)
-        for name, changes in (
-            ("own", {"simulated_time": True, "environment": environment}),
-            ("provided", {"provider": ProviderOptions(url=service.url)}),
-        ):
-            record = flyer.folder / name
-            with flyer.options(seed=3, record=record, application=application, **changes):
-                runpy.run_path(str(application), run_name="__main__")
-            flights.append(flown(record / "flight.mcap"))
-    (own,), (others,) = (flight.robots.values() for flight in flights)
-    assert own.outcome == others.outcome
-    assert own.visited == others.visited
-    assert set(own.visited) == {"wp1", "wp2", "wp3", "wp4"}
-    assert len(own.position) > 100
-    np.testing.assert_array_equal(own.position, others.position)
 
 
 def test_a_flight_obeys_its_application_over_the_wire(campus: Served, tmp_path: Path) -> None:
@@ -166,15 +136,3 @@ def test_items_of_ones_own_class_are_read_as_they_were_made(campus: Served, tmp_
     assert type(found) is Mark
     assert found.colour is Colour.RED
     assert isinstance(found.place, Odometry)
-
-
-def test_what_the_provider_refuses_is_told_at_the_line(campus: Served, tmp_path: Path) -> None:
-    """A lease that there is not: nothing flies, nothing is recorded."""
-    wanted = ProviderOptions(lease="none")
-    environment = provided(campus, tmp_path / "out", provider=wanted)
-    drone = environment.get_robot_by_id("north")
-    drone.navigate(hop((0, 3)))
-    with pytest.raises(Exception, match="none") as raised:
-        drone.start_mission()
-    assert type(raised.value).__module__ == "aerodaas.errors"
-    assert not (tmp_path / "out").exists()

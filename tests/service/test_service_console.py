@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 
 import pytest
 from required import needs_peer
 from served import Served, document, fleet, robot
-from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
-from websockets.typing import Subprotocol
 
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.messages.health import Verdict
@@ -74,26 +70,6 @@ def test_what_lies_below_a_mission_is_told_to_who_sees_it(provider: Served, miss
     viewer = provider.user("looker", "others", "viewer")
     assert provider.send("GET", path, token=stranger)[0] == 200
     assert provider.send("GET", path, token=viewer)[0] == 404
-
-
-def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission: str) -> None:
-    """With the account's token; places of waypoints are told."""
-    url = f"{provider.url.replace('http', 'ws')}/v1/missions/{mission}/live"
-    words = [Subprotocol("aerodaas"), Subprotocol(f"bearer.{provider.token}")]
-    with connect(url, subprotocols=words) as socket:
-        assert socket.subprotocol == "aerodaas"
-        # Offered by the client: it would be done anew for each watcher.
-        assert socket.protocol.extensions == []
-        status = json.loads(socket.recv(20))["mission"]["status"]["one"]
-    # It flies: the list is the one of its take-off.
-    provider.until(lambda: provider.ask("GET", "/v1/robots/one/preflight")["items"])
-    assert provider.ask("GET", "/v1/fleet")["robots"][0]["preflight"] is None
-    ahead = (status["mission"]["target"], *status["mission"]["pending"])
-    assert any(one and (one["id"], one["x"], one["z"]) == ("wp1", 20, 2) for one in ahead)
-    wrong = [Subprotocol("aerodaas"), Subprotocol("bearer.aerodaas_wrong")]
-    with pytest.raises(InvalidStatus) as refused, connect(url, subprotocols=wrong):
-        pass
-    assert refused.value.response.status_code == 401
 
 
 @needs_peer("AERODAAS_BROWSER")

@@ -87,22 +87,6 @@ def test_commands_reach_the_drone_and_answers_come_back(provider: Served) -> Non
     assert late == (409, f"{id_} is over: landed")
 
 
-def test_waypoints_take_the_place_of_a_queue(provider: Served) -> None:
-    """At once, with a deadline for all of them; one that is past refuses them by name."""
-    id_ = submitted(provider, "one", *FAR)
-    navigation = f"/v1/missions/{id_}/navigation"
-    flying(provider, id_, "one")
-    place = {"id": "late", "x": 3.0, "y": 3.0, "z": 2.0, "waypoint_type": "local"}
-    late = {"robot": "one", "waypoints": [place], "deadline": 0.5}
-    answer = provider.ask("POST", navigation, late)
-    assert "its deadline of 0.5 s is past" in answer["refused"]["late"]
-    new = {"robot": "one", "waypoints": [{**place, "id": "new"}], "clear_first": True}
-    assert provider.ask("POST", navigation, {**new, "deadline": 1000.0})["accepted"]
-    ended = provider.until_phase(id_)
-    assert ended["phase"] == "landed"
-    assert ended["status"]["one"]["mission"]["visited"] == ["new"]
-
-
 def test_a_pilot_surveys_rearranges_and_flies_by_hand(provider: Served) -> None:
     """Of the mission's own tenant alone, one at a time; a disabled account lets go."""
     id_ = submitted(provider, "one", *FAR)
@@ -267,17 +251,6 @@ def test_a_lease_that_ends_brings_the_drone_home(provider: Served) -> None:
     assert len(ended["status"]["one"]["mission"]["visited"]) < 3
 
 
-def test_a_revoked_lease_brings_the_drone_home(provider: Served) -> None:
-    """At once, and with whose wish it was."""
-    lease = provider.ask("POST", "/v1/leases", {"robots": ["one"], "minutes": 10})
-    id_ = submitted(provider, "one", *FAR, lease=lease["id"])
-    flying(provider, id_, "one")
-    provider.ask("DELETE", f"/v1/leases/{lease['id']}")
-    ended = provider.until_phase(id_)
-    assert "the lease has ended" in ended["reason"]
-    assert len(ended["status"]["one"]["mission"]["visited"]) < 3
-
-
 def test_a_silent_user_is_a_reason_to_return_where_the_mission_says_so(provider: Served) -> None:
     """Also while the service is gone: the flight's process listens for itself."""
     id_ = submitted(provider, "one", *FAR, silence="return", silence_seconds=4)
@@ -288,28 +261,6 @@ def test_a_silent_user_is_a_reason_to_return_where_the_mission_says_so(provider:
     ended = provider.until_phase(id_)
     assert "nothing was heard of the user for 4 s" in ended["reason"]
     assert len(ended["status"]["one"]["mission"]["visited"]) < 3
-
-
-def test_a_cancelled_mission_comes_home(provider: Served) -> None:
-    """And is told as such."""
-    id_ = submitted(provider, "one", *FAR)
-    flying(provider, id_, "one")
-    provider.ask("DELETE", f"/v1/missions/{id_}")
-    ended = provider.until_phase(id_)
-    assert ended["phase"] == "cancelled"
-    assert ended["status"]["one"]["mission"]["state"] == "landed"
-
-
-def test_missions_for_one_drone_wait_for_each_other(provider: Served) -> None:
-    """The second flies when the first has landed, not when its lease has ended."""
-    first = submitted(provider, "one", (6.0, 0.0))
-    second = submitted(provider, "one", (0.0, 6.0))
-    provider.until(lambda: provider.mission(first)["phase"] == "flying")
-    assert provider.mission(second)["phase"] in {"submitted", "queued"}
-    assert provider.until_phase(first)["phase"] == "landed"
-    ended = provider.until_phase(second)
-    assert ended["phase"] == "landed"
-    assert ended["started"] >= provider.mission(first)["ended"]
 
 
 def test_the_recording_comes_back(provider: Served, tmp_path: Path) -> None:
