@@ -16,7 +16,7 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.flights.process import FlightProcess
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
+from aerodaas.service.flights.orders import FlightOrder, Outcome
 from aerodaas.service.rehearsal.findings import judge
 from aerodaas.service.rehearsal.picture import draw
 
@@ -36,7 +36,7 @@ def rehearse(path: Path) -> None:
     os.chdir(folder.path)
     with folder.claim():
         flying = FlightProcess(folder, order)
-        threading.Thread(target=_watch, args=(folder, order, flying), daemon=True).start()
+        threading.Thread(target=_watch, args=(folder, order), daemon=True).start()
         outcome = flying.outcome()
         verdict = _verdict(folder, order, flying, outcome)
         # The verdict and its picture are all that is kept of it.
@@ -44,15 +44,12 @@ def rehearse(path: Path) -> None:
         folder.end(outcome.model_copy(update={"verdict": verdict}))
 
 
-def _watch(folder: FlightFolder, order: FlightOrder, flying: FlightProcess) -> None:
-    """Write how far the rehearsal has come, and end its process where it uses too much."""
+def _watch(folder: FlightFolder, order: FlightOrder) -> None:
+    """End the process of a rehearsal that uses too much."""
     process = psutil.Process()
     while True:
         time.sleep(_LOOK_SECONDS)
         processor, memory = time.process_time(), process.memory_info()
-        # A full disk ends a rehearsal elsewhere; its bounds hold all the same.
-        with contextlib.suppress(OSError):
-            folder.advance(Progress(flown=flying.served.meter.time, processor=processor))
         reason = ""
         if processor > order.rehearsal_seconds:
             reason = (

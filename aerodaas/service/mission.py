@@ -168,14 +168,12 @@ class ActiveMission:
         """The rehearsal's verdict; None while it goes on, at most so many wall seconds."""
         ended = self._rehearsing is None or self._rehearsing.poll() is not None
         if not ended or self.rehearsal.flying:
-            progress = self.rehearsal.progress()
             if time.monotonic() - self._rehearsed_since < seconds:
-                self.set_waiting(f"is being rehearsed: {progress.flown:.0f} s flown so far")
                 return None
             self.end_rehearsal()
             text = (
-                f"the provider is busy: of {seconds:g} s, its rehearsal had "
-                f"{progress.processor:.0f} s of a processor: submit it again later"
+                f"the provider is busy: its rehearsal did not end within {seconds:g} s: submit it "
+                "again later"
             )
             return VerdictOut(approved=False, reasons=[text])
         self._rehearsing = None

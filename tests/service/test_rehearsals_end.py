@@ -82,10 +82,9 @@ def test_a_rehearsal_that_uses_too_much_is_ended(
     assert outcome.verdict is not None
     assert not outcome.verdict.approved
     assert told in outcome.verdict.reasons[0]
-    assert made.progress().processor > 0.0
 
 
-def test_a_rehearsal_within_its_bounds_tells_how_far_it_has_come(tmp_path: Path) -> None:
+def test_a_rehearsal_within_its_bounds_is_approved(tmp_path: Path) -> None:
     """Its verdict is that of the flight."""
     made, code = rehearse(tmp_path)
     outcome = made.outcome()
@@ -93,5 +92,3 @@ def test_a_rehearsal_within_its_bounds_tells_how_far_it_has_come(tmp_path: Path)
     assert outcome is not None
     assert outcome.verdict is not None
     assert outcome.verdict.approved, outcome.verdict.reasons
-    assert made.progress().flown > 0.0
-    assert 0.0 < made.progress().processor < 300.0

@@ -1,20 +1,15 @@
-"""Quotas of tenants, the rest of them in this month, and usage as a table."""
+"""Quotas of tenants, and the rest of them in this month."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timezone
 
-from aerodaas.protocol.schemas import UsageOut
-from aerodaas.recording.new_file import harmless
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.store import Store, Tenant, Usage
+from aerodaas.service.store import Store, Tenant
 
-__all__ = ["Quotas", "QuotasLeft", "usage_csv"]
+__all__ = ["Quotas", "QuotasLeft"]
 
 _MINUTE = 60.0
 """Seconds."""
@@ -115,22 +110,3 @@ def _month(now: float) -> float:
     """When the calendar month of a moment began."""
     moment = datetime.fromtimestamp(now, timezone.utc)
     return moment.replace(day=1, hour=0, minute=0, second=0, microsecond=0).timestamp()
-
-
-_COLUMNS = tuple(UsageOut.model_fields)
-
-
-def usage_csv(rows: Iterable[Usage]) -> str:
-    """Rows as CSV with a header; `compute_seconds` is the sum over all resources.
-
-    Moments are ISO 8601 in UTC. Spreadsheets take no text of it for a formula.
-    """
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow(_COLUMNS)
-    for row in rows:
-        cells = {name: getattr(row, name) for name in _COLUMNS}
-        cells["started"] = datetime.fromtimestamp(row.started, timezone.utc).isoformat()
-        cells["compute_seconds"] = sum(row.compute_seconds.values())
-        writer.writerow(map(harmless, cells.values()))
-    return text.getvalue()

@@ -94,7 +94,6 @@ def _limited(robot: RobotConfig, tenant: TenantLimits, area: shapely.Polygon | N
             "cruise_speed": min(limits.cruise_speed, speed),
             "max_speed": speed,
             "max_climb": _least(limits.max_climb, tenant.max_speed),
-            "max_range": _least(limits.max_range, tenant.max_range),
             "geofence": fence.model_copy(update=changes),
         }
     )

@@ -17,7 +17,7 @@ from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.errors import MissionError
 from aerodaas.files.file_lock import actor_lock, exclusive, is_locked
 from aerodaas.files.private_file import write_private
-from aerodaas.service.flights.orders import FlightOrder, Outcome, Progress
+from aerodaas.service.flights.orders import FlightOrder, Outcome
 
 __all__ = [
     "FlightFolder",
@@ -76,7 +76,6 @@ class FlightFolder:
         self._begun = self.path / "begun"
         self._lock = self.path / "lock"
         self._cancelled = self.path / "cancelled"
-        self._progress = self.path / "progress.json"
         self._outcome = self.path / "outcome.json"
 
     def make(self, order: FlightOrder, document: str) -> None:
@@ -126,17 +125,6 @@ class FlightFolder:
             return self._cancelled.read_text(encoding="utf-8")
         except OSError:
             return ""
-
-    def advance(self, progress: Progress) -> None:
-        """Write how far the rehearsal has come."""
-        write_private(self._progress, progress.model_dump_json())
-
-    def progress(self) -> Progress:
-        """How far the rehearsal has come."""
-        try:
-            return Progress.model_validate_json(self._progress.read_bytes())
-        except (OSError, ValidationError):
-            return Progress()
 
     def end(self, outcome: Outcome) -> None:
         """Write how the flight ended."""

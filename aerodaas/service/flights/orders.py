@@ -39,7 +39,6 @@ __all__ = [
     "HostFlight",
     "OtherLease",
     "Outcome",
-    "Progress",
     "TenantLimits",
     "robots_of",
 ]
@@ -53,8 +52,6 @@ class TenantLimits:
     """Metres above home."""
     max_speed: Positive | None = None
     """m/s, level and upright."""
-    max_range: Positive | None = None
-    """Metres from the place of take-off."""
 
 
 class _Record(BaseModel):
@@ -126,15 +123,6 @@ class FlightOrder(_Record):
     def read(cls, path: Path) -> FlightOrder:
         """Read an order; raises ConfigError for one that is malformed."""
         return checked(cls, read_json(path, "the flight's order"), str(path))
-
-
-class Progress(_Record):
-    """How far a rehearsal has come."""
-
-    flown: float = 0.0
-    """Mission seconds."""
-    processor: float = 0.0
-    """Seconds of a processor that it has used."""
 
 
 class Outcome(_Record):

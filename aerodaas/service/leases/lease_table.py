@@ -371,11 +371,6 @@ class LeaseBook:
                 total += left * len(lease.robots or lease.wanted or ("any",))
         return total
 
-    @property
-    def unsaved(self) -> int:
-        """Leases that have ended or been moved, which the database has not taken yet."""
-        return len(self._unsaved)
-
     def _end(
         self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
     ) -> tuple[Lease, ...]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict
 
 from aerodaas.protocol.schemas import (
@@ -22,10 +22,9 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
-from aerodaas.service.access.quotas import usage_csv
 from aerodaas.service.http.bodies import api_router
 from aerodaas.service.http.gate import Admission
-from aerodaas.service.store import Account, AuditEntry, Store, Tenant, Token
+from aerodaas.service.store import Account, AuditEntry, Store, Tenant, Token, Usage
 
 __all__ = ["AccountRoutes"]
 
@@ -71,10 +70,7 @@ class AccountRoutes:
             "/tokens/{token}", self.revoke, methods=["DELETE"], response_model=TokenOut
         )
         router.add_api_route("/audit", self.audit, response_model=list[AuditOut])
-        table: dict[int | str, dict[str, Any]] = {
-            200: {"content": {"text/csv": {"schema": {"type": "string"}}}}
-        }
-        router.add_api_route("/usage", self.usage, response_model=list[UsageOut], responses=table)
+        router.add_api_route("/usage", self.usage, response_model=list[UsageOut])
         return router
 
     def accounts(self, request: Request) -> list[Account]:
@@ -144,15 +140,8 @@ class AccountRoutes:
         self._admission.require(request, Role.ADMIN)
         return self._audit.newest(limit)
 
-    def usage(
-        self,
-        request: Request,
-        form: Annotated[Literal["json", "csv"], Query(alias="format")] = "json",
-    ) -> Any:  # noqa: ANN401 - JSON by its model, or CSV
+    def usage(self, request: Request) -> list[Usage]:
         """Usage by mission: the tenant's own, or all for an operator."""
         principal = self._admission.require(request, Role.VIEWER)
         every = principal.role.reaches(Role.OPERATOR)
-        rows = self._store.usage.all(None if every else principal.tenant)
-        if form == "csv":
-            return Response(usage_csv(rows), media_type="text/csv")
-        return rows
+        return self._store.usage.all(None if every else principal.tenant)

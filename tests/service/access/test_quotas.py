@@ -1,16 +1,14 @@
-"""A tenant uses what its quotas allow in a calendar month, and the table of it harms nobody."""
+"""A tenant uses what its quotas allow in a calendar month."""
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from datetime import datetime, timezone
 
 import pytest
 
-from aerodaas.protocol.schemas import MissionPhase, UsageOut
-from aerodaas.service.access.quotas import Quotas, usage_csv
+from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 
@@ -98,27 +96,3 @@ def test_a_tenant_without_quotas_has_no_end(store: Store) -> None:
     """So has one that is not known."""
     for tenant in ("farm", "unknown"):
         assert Quotas(store).check(tenant, 1e9, moment(2026, 3, 1)).cloud_calls == math.inf
-
-
-def test_the_table_has_a_row_for_each_mission_and_no_formula() -> None:
-    """A name that a spreadsheet would compute is told as text."""
-    usage = Usage(
-        "=HYPERLINK(1)",
-        "farm",
-        "@pilot",
-        moment(2026, 3, 1),
-        61.5,
-        10.0,
-        0.25,
-        {"edge": 1, "e2": 2},
-    )
-    rows = list(csv.DictReader(io.StringIO(usage_csv([usage, usage]), newline="")))
-    assert len(rows) == 2
-    assert rows[0]["mission"] == "'=HYPERLINK(1)"
-    assert rows[0]["account"] == "'@pilot"
-    assert rows[0]["started"] == "2026-03-01T00:00:00+00:00"
-    assert float(rows[0]["compute_seconds"]) == 3.0
-    assert float(rows[0]["flight_seconds"]) == 61.5
-    assert usage_csv([]).count("\n") == 1
-    shown = UsageOut.model_validate(usage, from_attributes=True)
-    assert shown.compute_seconds == {"edge": 1, "e2": 2}

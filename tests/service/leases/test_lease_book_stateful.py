@@ -143,7 +143,6 @@ class Leases(RuleBasedStateMachine):
             assert lease.ends is None or lease.ends > self.now
         if self.fails():
             return
-        assert self.book.unsaved == 0
         free = {id_ for id_ in ROBOTS if not self.fleet[id_].busy} - self.held()
         for lease in self.queued():
             wanted = self.usable(lease)
