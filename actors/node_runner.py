@@ -156,8 +156,6 @@ class NodeRunner(Host):
         what = f"{self._who}'s result" if self._who else ""
         for stream in self.node.outlets:
             self._actor.publisher(stream, what)
-        if isinstance(self.node, CameraNode):
-            self.node.place_pictures_in(self._actor.publishers[self.node.name].picture_memory)
 
     def run(self) -> None:
         """Step the node until the actor is stopped; a node that raises ends."""

@@ -19,7 +19,7 @@ from aerodaas import (
     VelocityCommand,
 )
 from aerodaas.analytics.base import Context
-from aerodaas.cameras.base import Picture, PictureMemory, own_memory
+from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.geometry.frames import CameraModel
@@ -29,7 +29,6 @@ __all__ = [
     "RATE",
     "WIDTH",
     "PatternCamera",
-    "PlacingPatternCamera",
     "ReadFrame",
     "Reading",
     "StampedVehicle",
@@ -69,22 +68,6 @@ class PatternCamera:
     def close(self) -> None:
         """Write the stamps."""
         _stamps.dump()
-
-
-class PlacingPatternCamera(PatternCamera):
-    """The same, but that capturing puts the picture where its readers look at it."""
-
-    _memory: PictureMemory = staticmethod(own_memory)
-
-    def place_in(self, memory: PictureMemory) -> None:
-        """Capture into what `memory` returns."""
-        self._memory = memory
-
-    def capture(self, stamp: int, pose: Odometry | None) -> Picture:  # noqa: ARG002
-        """Put the picture there."""
-        image = self._memory(HEIGHT, WIDTH)
-        image[...] = self._image
-        return Picture(image, stamp)
 
 
 class StampedVehicle(SimulatedVehicle):

@@ -33,7 +33,6 @@ from _latency_ours import (
     RATE,
     WIDTH,
     PatternCamera,
-    PlacingPatternCamera,
     ReadFrame,
     StampedVehicle,
     Steer,
@@ -76,8 +75,10 @@ def _cpu_seconds(processes: list[psutil.Process]) -> float:
     return total
 
 
-def _environment(folder: Path, camera_class: type[PatternCamera], *, far: bool) -> Path:
-    plugin, vehicle = (f"{one.__module__}:{one.__name__}" for one in (camera_class, StampedVehicle))
+def _environment(folder: Path, *, far: bool) -> Path:
+    plugin, vehicle = (
+        f"{one.__module__}:{one.__name__}" for one in (PatternCamera, StampedVehicle)
+    )
     camera = {"id": "camera", "type": "camera", "driver": plugin, "rate": RATE}
     content = {
         "name": "latency",
@@ -90,16 +91,10 @@ def _environment(folder: Path, camera_class: type[PatternCamera], *, far: bool) 
     return path
 
 
-def measure_ours(
-    seconds: float,
-    folder: Path,
-    *,
-    camera: type[PatternCamera] = PatternCamera,
-    far: bool = False,
-) -> Round:
+def measure_ours(seconds: float, folder: Path, *, far: bool = False) -> Round:
     """Fly the four actors for `seconds`; `far` puts the analysis on another Ray node."""
     current_options.set(RunOptions(speed=1.0, simulated_time=False, view=False))
-    env = Environment(_environment(folder, camera, far=far))
+    env = Environment(_environment(folder, far=far))
     drone = env.get_robot_by_id("drone")
     frames = drone.get_sensor_by_id("camera").get_data_stream()
     place = env.get_compute_resource_by_id("place")
@@ -224,15 +219,13 @@ def main(
     packages = ("ray", *(("dora-rs",) if dora else ()))
     report = Report(title, UNITS, packages=packages)
     ours: list[Round] = []
-    placed: list[Round] = []
     theirs: list[Round] = []
     with tempfile.TemporaryDirectory() as name, Progress() as progress:
         folder = Path(name)
-        task = progress.add_task("measuring", total=rounds * (3 if dora else 2) + 2)
+        task = progress.add_task("measuring", total=rounds * (2 if dora else 1) + 2)
         for _ in range(rounds):
-            for rounds_of, camera in ((ours, PatternCamera), (placed, PlacingPatternCamera)):
-                rounds_of.append(measure_ours(seconds, folder, camera=camera))
-                progress.advance(task)
+            ours.append(measure_ours(seconds, folder))
+            progress.advance(task)
             if dora:
                 theirs.append(measure_dora(seconds, folder))
                 progress.advance(task)
@@ -243,11 +236,9 @@ def main(
             by_ray = [measure_ray(seconds)]
             progress.advance(task)
     _add(report, "AeroDaaS, one node", ours)
-    _add(report, "AeroDaaS, captured where it is read", placed)
     if theirs:
         _add(report, "dora, one node", theirs)
         report.note(f"ours over dora's, medians of pairs: {_ratios(ours, theirs)}")
-        report.note(f"captured where it is read: {_ratios(placed, theirs)}")
     _add(report, "AeroDaaS, analysis on a second Ray node", far)
     _add(report, "Ray alone, a frame's bytes to a second node", by_ray)
     report.note("CPU: all processes of the system together, Ray's own included; 100 % = one core")

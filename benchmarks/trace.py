@@ -22,7 +22,7 @@ import aerodaas.actors  # noqa: F401 - sets what Ray reads as it is imported
 import _stamps
 import ray
 import typer
-from _latency_ours import HEIGHT, RATE, WIDTH, PlacingPatternCamera
+from _latency_ours import HEIGHT, RATE, WIDTH
 from _report import Report
 from latency import measure_ours
 
@@ -76,7 +76,7 @@ def main(
     """
     with tempfile.TemporaryDirectory() as name:
         os.environ[_stamps.FOLDER] = name
-        measured = measure_ours(seconds, Path(name), camera=PlacingPatternCamera)
+        measured = measure_ours(seconds, Path(name))
         ray.shutdown()
         stamps = _read(Path(name))
     worked = [stream for stream, steps in stamps.items() if "work" in steps and "encode" in steps]

@@ -64,11 +64,10 @@ class Encoded:
         item, self._buffers = _pickled(message.item)
         self._places: list[int] = []
         """Where each buffer begins, from the first on."""
-        self._length = 0
-        """Bytes of all buffers, with the gaps between them."""
+        length = 0
         for buffer in self._buffers:
-            self._places.append(_aligned(self._length))
-            self._length = self._places[-1] + buffer.nbytes
+            self._places.append(_aligned(length))
+            length = self._places[-1] + buffer.nbytes
         envelope = pickle.dumps(
             (
                 message.stream,
@@ -88,37 +87,14 @@ class Encoded:
         self._start = _LENGTHS.size + len(self._head)
         if self._buffers:
             self._start = _aligned(self._start)
-        self.size = self._start + self._length
+        self.size = self._start + length
 
-    def size_around(self, array: NDArray[np.uint8], room: int) -> int | None:
-        """Return the size that it has in a buffer that holds `array`.
-
-        Args:
-            array: The first buffer of the message.
-            room: Byte of the buffer from which it holds `array`.
-
-        Returns:
-            None if its first buffer does not begin with `array`, or the rest has not enough room.
-        """
-        if not self._length or _LENGTHS.size + len(self._head) > room:
-            return None
-        first = np.frombuffer(self._buffers[0], np.uint8)
-        return room + self._length if _address(first) == _address(array) else None
-
-    def write_into(self, target: memoryview, room: int = 0) -> None:
-        """Write all into `target`.
-
-        Args:
-            target: Memory of its size.
-            room: Byte from which its first buffer is there, which is not written then; 0 if it is
-                not.
-        """
-        start = room or self._start
-        target[: _LENGTHS.size] = _LENGTHS.pack(*self._lengths, start)
+    def write_into(self, target: memoryview) -> None:
+        """Write all into `target`, memory of at least its size."""
+        target[: _LENGTHS.size] = _LENGTHS.pack(*self._lengths, self._start)
         target[_LENGTHS.size : _LENGTHS.size + len(self._head)] = self._head
         for place, buffer in zip(self._places, self._buffers, strict=True):
-            if place or not room:
-                target[start + place : start + place + buffer.nbytes] = buffer
+            target[self._start + place : self._start + place + buffer.nbytes] = buffer
 
     def to_bytes(self, suffix: bytes = b"") -> bytes:
         """The encoded message as one bytes object, with `suffix` after it."""
@@ -159,11 +135,6 @@ def decode(source: memoryview) -> Message[Any]:
 
 def _aligned(offset: int) -> int:
     return -(-offset // _ALIGNMENT) * _ALIGNMENT
-
-
-def _address(array: NDArray[np.uint8]) -> int:
-    address: int = array.__array_interface__["data"][0]
-    return address
 
 
 def _pickled(item: object) -> tuple[bytes, list[memoryview]]:

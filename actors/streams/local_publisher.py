@@ -14,10 +14,6 @@ import socket
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from aerodaas.actors.streams.codec import Encoded
 from aerodaas.actors.streams.completion import Publication
@@ -44,15 +40,6 @@ MAX_DEPTH = 32
 """Largest queue depth of a reader."""
 MAX_BORROWED = 16
 """Most messages in slots that a reader may hold beside those in its queue."""
-_ROOM = 4096
-"""Bytes before the array in a lent slot, for the rest of its message."""
-
-
-class _ReservedSlot(NamedTuple):
-    """A slot that the publisher's owner fills before it sends the message."""
-
-    slot: Slot
-    array: NDArray[np.uint8]
 
 
 class _ReaderLink:
@@ -182,7 +169,6 @@ class LocalPublisher:
         self._news = select.epoll()
         self._news.register(self._arrivals.bell, select.EPOLLIN)
         self._pool: SlotPool | None = None
-        self._lent: _ReservedSlot | None = None
         self._publication: Publication | None = None
         self._number = 0
         """Messages queued so far."""
@@ -201,26 +187,6 @@ class LocalPublisher:
                     self._admit(arrival)
             if self._readers:
                 self._send(encode())
-
-    def reserve(self, size: int) -> NDArray[np.uint8] | None:
-        """Return `size` bytes of a slot for the first large array of the next message.
-
-        None if nobody reads the stream, or no memory is left.
-        """
-        with self._lock:
-            if not self._readers:
-                return None
-            self._receive_releases()  # now rather than when the message is in a hurry
-            if self._lent is not None:
-                self._put_back([self._lent.slot])
-                self._lent = None
-            slot = self._acquire_slot(
-                _ROOM + 2 * size
-            )  # room for its depth; unwritten pages cost nothing
-            if slot is None:
-                return None
-            self._lent = _ReservedSlot(slot, np.frombuffer(slot.memory, np.uint8, size, _ROOM))
-            return self._lent.array
 
     def close(self) -> None:
         """Close the stream."""
@@ -242,38 +208,21 @@ class LocalPublisher:
         if encoded.size <= LONGEST_INLINE:
             self._queue(encoded.to_bytes(TRAILER.pack(number, INLINE)), None)
             return
-        slot, size = self._written(encoded)
+        try:
+            self._pool = self._pool or SlotPool()
+            slot = self._pool.acquire(encoded.size)
+        except OSError:
+            slot = None
         if slot is None:
             self.refused += 1
             return
+        encoded.write_into(slot.memory)
         slot.users = 1  # ourselves: a reader that ends must not free it for the next message
-        where = SLOT.pack(slot.offset, len(slot.memory), size)
+        where = SLOT.pack(slot.offset, len(slot.memory), encoded.size)
         self._queue(where + TRAILER.pack(number, IN_SLOT), slot)
         slot.users -= 1
         if not slot.users:
             self._put_back([slot])
-
-    def _written(self, encoded: Encoded) -> tuple[Slot | None, int]:
-        """Write a message into a slot, of a lent one only what is not there yet; and its size."""
-        lent, self._lent = self._lent, None
-        if lent is not None:
-            size = encoded.size_around(lent.array, _ROOM)
-            if size is not None and size <= len(lent.slot.memory):
-                encoded.write_into(lent.slot.memory, _ROOM)
-                return lent.slot, size
-        slot = self._acquire_slot(encoded.size)
-        if slot is not None:
-            encoded.write_into(slot.memory)
-        if lent is not None:  # not before: what was written may be a part of it
-            self._put_back([lent.slot])
-        return slot, encoded.size
-
-    def _acquire_slot(self, size: int) -> Slot | None:
-        try:
-            self._pool = self._pool or SlotPool()
-            return self._pool.acquire(size)
-        except OSError:
-            return None
 
     def _queue(self, data: bytes, slot: Slot | None) -> None:
         """Queue the next message to all readers, then wake all of them."""

@@ -8,14 +8,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aerodaas.actors.streams.availability import shared_memory_available
 from aerodaas.actors.streams.codec import Encoded, UnsendableError
 from aerodaas.actors.streams.local_publisher import LocalPublisher
 from aerodaas.actors.streams.remote import RemoteReader, send_to
-from aerodaas.cameras.base import own_memory
 from aerodaas.messages.envelope import Message
 
 __all__ = ["Publisher", "RemoteReader"]
@@ -71,21 +67,6 @@ class Publisher:
             self._kept = deque(maxlen=_MESSAGES_KEPT)
         first = seq if seq <= self._sent else 0
         return [data for number, data in list(self._kept) if number >= first]
-
-    def picture_memory(self, height: int, width: int) -> NDArray[np.uint8]:
-        """Memory for the picture of the next message, where its readers will look at it.
-
-        It must not be written to once the message is published.
-
-        Args:
-            height: Pixels.
-            width: Pixels.
-
-        Returns:
-            A `PictureMemory` of cameras, (height, width, 3).
-        """
-        lent = None if self._local is None else self._local.reserve(height * width * 3)
-        return own_memory(height, width) if lent is None else lent.reshape(height, width, 3)
 
     def close(self) -> None:
         """Close the stream."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +17,10 @@ __all__ = [
     "Camera",
     "GimballedCamera",
     "Picture",
-    "PictureMemory",
-    "PlacingCamera",
     "VehicleAddressedCamera",
     "ZoomingCamera",
     "most_memory",
-    "own_memory",
 ]
-
-PictureMemory: TypeAlias = Callable[[int, int], NDArray[np.uint8]]
-"""Returns memory for one picture of so many pixels down and across: height x width x 3, BGR."""
 
 
 @valued
@@ -111,37 +104,12 @@ class ZoomingCamera(Camera, Protocol):
 
 
 @runtime_checkable
-class PlacingCamera(Camera, Protocol):
-    """A camera that draws a picture where its readers will look at it, which saves a copy."""
-
-    def place_in(self, memory: PictureMemory) -> None:
-        """Draw each picture from now on into memory that is asked for anew, all of it.
-
-        It is the camera's until `capture` returns; then others read it, and it is used again.
-        """
-        ...
-
-
-@runtime_checkable
 class VehicleAddressedCamera(Camera, Protocol):
     """A camera whose video's address the vehicle may tell."""
 
     def follow_video(self, address: str) -> None:
         """Read from there, where the settings say so; empty: the vehicle tells none."""
         ...
-
-
-def own_memory(height: int, width: int) -> NDArray[np.uint8]:
-    """Memory for a picture that nobody else reads where it is: a `PictureMemory`.
-
-    Args:
-        height: Pixels.
-        width: Pixels.
-
-    Returns:
-        Array, height x width x 3.
-    """
-    return np.empty((height, width, 3), np.uint8)
 
 
 def most_memory(camera: Camera) -> int | None:

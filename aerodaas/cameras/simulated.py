@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from aerodaas.cameras.base import Picture, PictureMemory, own_memory
+from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.clock import seconds
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
@@ -22,7 +22,7 @@ __all__ = ["SimulatedCamera"]
 
 
 class SimulatedCamera:
-    """A pinhole camera in the simulated world, which can turn, zoom and place its pictures.
+    """A pinhole camera in the simulated world, which can turn and zoom.
 
     Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
     environment's world is invalid.
@@ -47,7 +47,6 @@ class SimulatedCamera:
         self._gimbal: GimbalAttitude | None = None
         self._zoom = 1.0
         self._depth_range = config.depth_range
-        self._memory: PictureMemory = own_memory
         self._renderer: Renderer | None = None
 
     @property
@@ -72,10 +71,6 @@ class SimulatedCamera:
             from aerodaas.simulation.renderer import renderer_for  # noqa: PLC0415
 
             self._renderer = renderer_for(self._world, self._model, self._depth_range)
-
-    def place_in(self, memory: PictureMemory) -> None:
-        """Render into what `memory` returns."""
-        self._memory = memory
 
     def follow_gimbal(self, attitude: GimbalAttitude | None) -> None:
         """Look as the gimbal does at the next image."""
@@ -106,8 +101,7 @@ class SimulatedCamera:
             model = zoomed(self._mounted, self._zoom)
             self._model = model if self._gimbal is None else levelled(model, self._gimbal, pose)
             self._renderer.orient(self._model)
-        memory = self._memory(self._model.height, self._model.width)
-        image = self._renderer.render(seconds(stamp), pose, memory)
+        image = self._renderer.render(seconds(stamp), pose)
         return Picture(image, stamp, depth=self._renderer.depth())
 
     def close(self) -> None:

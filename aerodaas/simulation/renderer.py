@@ -124,15 +124,12 @@ class Renderer:
             self._eye.node().get_lens().set_focal_length(camera.fx)
         self._camera, self._optical = camera, camera.body_from_optical
 
-    def render(
-        self, time: float, pose: Odometry, into: NDArray[np.uint8] | None = None
-    ) -> NDArray[np.uint8]:
+    def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
         """Render a picture (height, width, 3) in BGR from a vehicle.
 
         Args:
             time: Mission time, seconds.
             pose: Of the vehicle, which carries the camera.
-            into: Memory of that shape, which is returned; None for memory of its own.
         """
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
         right, down, ahead = (body @ self._optical).T
@@ -143,7 +140,7 @@ class Renderer:
         self._engine.render_frame()
         height, width = self._camera.height, self._camera.width
         rendered = np.frombuffer(self._pixels.get_ram_image(), np.uint8)
-        picture = np.empty((height, width, 3), np.uint8) if into is None else into
+        picture = np.empty((height, width, 3), np.uint8)
         cv2.cvtColor(rendered.reshape(height, width, 4), cv2.COLOR_BGRA2BGR, dst=picture)
         cv2.flip(picture, 0, dst=picture)
         return picture

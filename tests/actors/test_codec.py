@@ -187,30 +187,6 @@ def test_a_frame_is_a_view_of_the_buffer_and_read_only() -> None:
         frame.image[0, 0, 0] = 1
 
 
-@pytest.mark.parametrize(
-    ("part", "room", "fits"),
-    [(slice(None), 4096, True), (slice(None), 64, False), (slice(1, None), 4096, False)],
-)
-def test_a_message_is_written_around_an_array_that_is_there(
-    part: slice, room: int, *, fits: bool
-) -> None:
-    """If its first array begins there, and the rest has room before it."""
-    whole = np.zeros(room + 200_000, np.uint8)
-    array = np.frombuffer(whole, np.uint8, 48 * 64 * 3, room)
-    image = array.reshape(48, 64, 3)
-    image[...] = np.arange(48 * 64 * 3, dtype=np.uint8).reshape(48, 64, 3)
-    depth = np.arange(48 * 64, dtype=np.uint16).reshape(48, 64)
-    frame = Frame(Header(0, 0, "c"), image[part], depth=depth[part])
-    encoded = Encoded(_message(frame))
-    size = encoded.size_around(array, room)
-    assert (size is not None) is fits
-    if size is not None:
-        encoded.write_into(whole.data, room)
-        assert decode(whole[:size].data).item == frame
-    assert encoded.size_around(image.copy().reshape(-1), room) is None
-    assert decode(memoryview(encoded.to_bytes())).item == frame
-
-
 def _there_and_back(item: object) -> Any:  # noqa: ANN401 - any item
     return decode(memoryview(Encoded(_message(item)).to_bytes())).item
 

@@ -12,8 +12,6 @@ from aerodaas.cameras.base import (
     Camera,
     GimballedCamera,
     Picture,
-    PictureMemory,
-    PlacingCamera,
     VehicleAddressedCamera,
     ZoomingCamera,
 )
@@ -71,11 +69,6 @@ class CameraNode(Node):
         self._told_camera = self.camera if isinstance(self.camera, VehicleAddressedCamera) else None
         self._gimballed = self.camera if isinstance(self.camera, GimballedCamera) else None
         self._zooming = self.camera if isinstance(self.camera, ZoomingCamera) else None
-
-    def place_pictures_in(self, memory: PictureMemory) -> None:
-        """Have an opened camera write its pictures into `memory`, if it can."""
-        if isinstance(self.camera, PlacingCamera):
-            self.camera.place_in(memory)
 
     def start(self, clock: Clock) -> Sequence[Message[Any]]:
         """Begin at the first time at which the sensor is due."""
