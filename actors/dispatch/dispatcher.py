@@ -1,8 +1,7 @@
 """Dispatcher in real time: executors on the edge that may die, and executors in the cloud.
 
-An executor that dies is restarted by Ray, and its task is retried once if the deadline allows. A
-cloud that is gone has no slots until it answers again. A scheduler that is slow is replaced by
-edge-first EDF.
+An executor that dies is restarted by Ray; its task has failed. A cloud that is gone has no slots
+until it answers again. A scheduler that is slow is replaced by edge-first EDF.
 """
 
 from __future__ import annotations
@@ -30,10 +29,8 @@ from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Profile,
     Resources,
-    Result,
     Task,
     TaskOutcome,
-    TaskPlace,
 )
 
 __all__ = ["DispatcherSpec", "LiveDispatcher"]
@@ -81,16 +78,6 @@ class LiveDispatcher(Dispatcher):
         self._edge_since = 0
         self._way = DeadlineReserve()
         self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
-        self._lost: set[int] = set()
-        """Tasks whose executor died during the execution."""
-        self._second: set[int] = set()
-        """Tasks in their second try."""
-        self._again: deque[Task] = deque()
-        """Tasks to be retried at once, ..."""
-        self._orphans: dict[str, list[Task]] = {}
-        """... and those that wait for their executor, by model."""
-        self._gone: set[str] = set()
-        """Models whose executor on the edge will not come back."""
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
         """Failures in the cloud that have raised an alert."""
         self._turns: EdgeTurns | None = None
@@ -162,7 +149,7 @@ class LiveDispatcher(Dispatcher):
         return self._estimates.profile(managed.profile, managed.open_times, cloud, link)
 
     def _edge_answered(self, managed: Managed, message: Message[Any], now: int) -> None:
-        if managed.stream in self._dispatch.down and managed.stream not in self._gone:
+        if managed.stream in self._dispatch.down:
             self._executor_is(managed.stream, "serving", now)
         task = self._dispatch.running
         if task is None or task.profile.model != managed.stream:
@@ -189,19 +176,13 @@ class LiveDispatcher(Dispatcher):
             if model in down:
                 down.discard(model)
                 self.host.alert("executor_back", f"{model} is back on the edge")
-                self._again.extend(self._orphans.pop(model, ()))
-                self._try_again(now)
             return
-        if life == "gone":
-            self._gone.add(model)
         if model not in down:
             down.add(model)
             self.host.alert("executor_lost", f"{model} died on the edge: {life}")
-        for orphan in self._orphans.pop(model, ()) if life == "gone" else ():
-            super().closed(Result(orphan, TaskOutcome.FAILED, TaskPlace.EDGE, now, now))
         running = self._dispatch.running
         if running is not None and running.profile.model == model:
-            self._lose(running, "its executor on the edge died", now)
+            self._fail(running, "its executor on the edge died", now)
 
     def _advance(self, now: int) -> None:
         """Handle due timers, answers from the cloud, and hanging executions."""
@@ -213,7 +194,7 @@ class LiveDispatcher(Dispatcher):
             model = running.profile.model
             self.host.alert("executor_lost", f"{model} does not answer on the edge")
             self._dispatch.down.add(model)
-            self._lose(running, "it did not answer", now)
+            self._fail(running, "it did not answer", now)
         elif running is None and self._turns is not None:
             # It decides in its turns, and those that wait for one grow old meanwhile.
             self._take_turns(self._turns, now)
@@ -247,7 +228,7 @@ class LiveDispatcher(Dispatcher):
     def _hear_from(self, cloud: ExecutorPool, now: int) -> None:
         answers = list(cloud.answers(now))
         cloud.probe(now)
-        # First, so that no task is retried in a cloud that is gone.
+        # First, so that no task is sent to a cloud that is gone.
         slots, before = cloud.slots, self._dispatch.resources.cloud_slots
         if slots != before:
             if not slots:
@@ -269,7 +250,7 @@ class LiveDispatcher(Dispatcher):
         if answer.figures is not None:
             self._figures[task.id] = answer.figures
         if answer.lost:
-            self._lose(task, answer.error, now)
+            self._fail(task, answer.error, now)
         elif answer.timed_out:
             self._reasons[task.id] = answer.error
             self._guarded("finished", task, now, TaskOutcome.TIMEOUT)
@@ -285,47 +266,9 @@ class LiveDispatcher(Dispatcher):
             self._results[task.id] = answer.message
             self._guarded("finished", task, now)
 
-    def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
-        super()._guarded(event, *args)
-        self._try_again(next(arg for arg in reversed(args) if isinstance(arg, int)))
-
-    # Tasks whose executor dies.
-
-    def _lose(self, task: Task, why: str, now: int) -> None:
-        self._lost.add(task.id)
+    def _fail(self, task: Task, why: str, now: int) -> None:
         self._reasons[task.id] = why
         self._guarded("finished", task, now, TaskOutcome.FAILED)
-
-    def _retried(self, task: Task, now: int) -> bool:
-        """Keep a lost task for a second try and return True, if its deadline allows one."""
-        profile, resources = task.profile, self._dispatch.resources
-        room = task.deadline - now
-        if task.id in self._second:
-            return False
-        down = profile.model in self._dispatch.down
-        cloud = resources.cloud_slots and profile.cloud_gain > 0 and profile.cloud_time <= room
-        if cloud or (profile.edge_time <= room and not down):
-            self._again.append(task)
-            return True
-        if profile.edge_time <= room and profile.model not in self._gone:
-            self._orphans.setdefault(profile.model, []).append(task)
-            return True
-        return False
-
-    def _try_again(self, now: int) -> None:
-        """Pass lost tasks to the scheduler again, as new ones with their old deadline."""
-        while self._again:
-            lost = self._again.popleft()
-            why = self._reasons.pop(lost.id, "")
-            if lost.deadline < now:
-                super().closed(Result(lost, TaskOutcome.FAILED, TaskPlace.NOWHERE, now, now))
-                continue
-            task = replace(lost, id=next(self._numbers))
-            self._frames[task.id] = self._frames.pop(lost.id)
-            self._second.add(task.id)
-            self._counts.retried += 1
-            self._out.append(self._log.message(task, "retry", why, now))
-            self._guarded("arrived", task, now)
 
     # Host interface of `Dispatch`.
 
@@ -349,14 +292,6 @@ class LiveDispatcher(Dispatcher):
     def wake_at(self, at: int) -> None:
         """Store a time at which the scheduler is to be woken."""
         heapq.heappush(self._timers, at)
-
-    def closed(self, result: Result) -> None:
-        """Publish a task's result if in time, or retry a lost task."""
-        lost = result.task.id in self._lost
-        self._lost.discard(result.task.id)
-        if not (lost and self._retried(result.task, result.finished)):
-            self._second.discard(result.task.id)
-            super().closed(result)
 
     def close(self) -> None:
         """Wait for the cloud's last answers; end what watches the executors."""

@@ -69,7 +69,6 @@ class Counts:
 
     def __init__(self) -> None:
         """Start with all counts at zero."""
-        self.retried = 0
         self._tasks = 0
         self._outcomes: Counter[str] = Counter()
         self._places: Counter[str] = Counter()
@@ -100,7 +99,6 @@ class Counts:
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),
             "places": dict(self._places),
-            "retried": self.retried,
             **self.totals,
             "qoe_windows": self._windows.won,
         }
