@@ -12,7 +12,6 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, NodeActor, NodeMaker
 from aerodaas.actors.cluster.run_lock import RunLock
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
-from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.actors.drone.planner import planner_for
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import IdleGarbageCollector, punctual, raise_niceness
@@ -28,7 +27,7 @@ from aerodaas.runtime.nodes.drone import DroneNode, failure_of
 from aerodaas.runtime.nodes.loop_calls import LoopCalls, LoopOverError
 from aerodaas.runtime.session import CONTROL_PERIOD_NS, Session
 
-__all__ = ["ANSWER_TIMEOUT", "CHANGES", "COMMANDS", "DroneActor"]
+__all__ = ["ANSWER_TIMEOUT", "COMMANDS", "DroneActor"]
 
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a heartbeat of the application's process after which the drone returns home."""
@@ -36,8 +35,6 @@ ANSWER_TIMEOUT = 4.0
 """Wall seconds within which the loop must execute a command; less than the sender's timeout."""
 COMMANDS = "commands"
 """Concurrency group of an actor for commands only, which wait for the loop."""
-CHANGES = "changes"
-"""Concurrency group of an actor for the call of the application that waits for a change."""
 
 
 class DroneActor(NodeActor):
@@ -63,7 +60,6 @@ class DroneActor(NodeActor):
         self._reports: dict[str, RobotStatus] = {}
         """Newest report of each robot: replaced by the loop, never mutated."""
         self._locks = ExitStack()
-        self._changes = ChangeSignal()
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._background = BackgroundPublisher(self._unpublished)
         self._late = 0
@@ -131,23 +127,9 @@ class DroneActor(NodeActor):
             for name, report in self._reports.items()
         }
 
-    def await_change(self, known: int, timeout: float) -> int:
-        """Return the number of changes of the missions once it is another one.
-
-        A change is one of a mission's state, its reason, waypoints or faults, an alert, and the
-        end. The call is no heartbeat: it may have been made before the application froze.
-
-        Args:
-            known: Number of changes that the caller has seen.
-            timeout: Wall seconds after which it returns at the latest.
-        """
-        return self._changes.wait(known, timeout)
-
     def _publish_reports(self) -> None:
         """Replace the robots' reports; in the loop's thread only."""
         self._reports = self._node.reports()
-        notable = [report.notable for report in self._reports.values()]
-        self._changes.update((self.alerts.outlet.sent, *notable))
 
     def _wake(self) -> None:
         for runner in self.runners:
@@ -209,10 +191,6 @@ class DroneActor(NodeActor):
     def _unpublished(self, count: int) -> None:
         text = f"{count} messages of the setpoint loop were not published: too many waited"
         self.alert("unpublished", text)
-
-    def _guard(self) -> None:
-        super()._guard()
-        self._changes.end()
 
     def fail(self, error: Exception) -> None:
         """End as failed: every drone that still flies lands by itself."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future
-from concurrent.futures import wait as wait_for
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -23,7 +21,7 @@ from aerodaas.actors.cluster.ray_cluster import options_for
 from aerodaas.actors.dispatch.dispatcher import DispatcherSpec
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.remote_executor import Executor
-from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
+from aerodaas.actors.drone.actor import COMMANDS, DroneActor
 from aerodaas.actors.isolation import environment_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.recorder import RecorderActor, RecorderSpec
@@ -63,8 +61,6 @@ _SILENT_FOR = 30.0
 """Seconds without an answer of a drone's actor after which the run has failed; it flies on."""
 _NOTES_KEPT = 50
 _REPORT_INTERVAL = 0.5
-_HELD = 10.0
-"""Wall seconds for which a drone's actor holds a call that waits for a change."""
 _RESTARTS = 3
 _LOOKS = 2
 """Concurrent calls of a cloud executor reserved for probes and pings."""
@@ -128,10 +124,6 @@ class Flight:
         self._answers: dict[str, tuple[float, dict[str, RobotStatus]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
-        self._changes: dict[str, int] = {}
-        """Changes of each drone's actor that are known."""
-        self._awaited: dict[str, Future[int]] = {}
-        """The pending call to each drone's actor that returns with the next one."""
         self._stopped = False
         self._sensed = False
         """Whether a run without drones is to end before its cameras do."""
@@ -207,24 +199,9 @@ class Flight:
             for report in (self._members[actor.name].report,)
         )
 
-    def await_change(self, timeout: float) -> None:
-        """Return once a mission has changed, or after `timeout` seconds; for one thread only.
-
-        One call is pending in each drone's actor. That of an actor that has died returns at once:
-        the next `poll` raises the error.
-        """
-        if not self._drones:
-            time.sleep(timeout)
-        for name in self._ids() - set(self._awaited):
-            method = self._members[name].handle.await_change.options(concurrency_group=CHANGES)
-            self._awaited[name] = method.remote(self._changes.get(name, 0), _HELD).future()
-        # An answer may be late, or never come, without delaying the application's heartbeat.
-        wait_for(self._awaited.values(), timeout, FIRST_COMPLETED)
-        for name, awaited in [one for one in self._awaited.items() if one[1].done()]:
-            del self._awaited[name]
-            if awaited.exception() is None and awaited.result() != self._changes.get(name, 0):
-                self._changes[name] = awaited.result()
-                self._next_reports = 0.0
+    def await_end(self, timeout: float) -> None:
+        """Wait for `timeout` seconds, for `poll` alone tells whether the flight is over."""
+        time.sleep(timeout)
 
     def _robots_of(self, name: str, newest: int) -> dict[str, RobotStatus]:
         """Reports of a drone's actor; the last ones while it is too busy to answer."""
@@ -389,7 +366,7 @@ class Flight:
         remote: Any = ray.remote
         # Pending calls, of the liveness monitor or for the loop, must not block others.
         groups = {LIFE: LIFELINES} if restarts else {}
-        groups |= {COMMANDS: 1, CHANGES: 1} if issubclass(kind, DroneActor) else {}
+        groups |= {COMMANDS: 1} if issubclass(kind, DroneActor) else {}
         groups |= {REAPER: 1} if issubclass(kind, ReaperHost) else {}
         if groups:
             remote = remote(concurrency_groups=groups)

@@ -54,10 +54,8 @@ MakeFlight: TypeAlias = "Callable[..., Flight | InlineFlight]"
 
 __all__ = ["Run"]
 
-_LOOK_SECONDS = 1.0
-"""Wall seconds between two looks at missions in which nothing changes."""
-_VIEW_SECONDS = 0.25
-"""The same where a terminal shows them move."""
+_LOOK_SECONDS = 0.25
+"""Wall seconds between two looks at the missions."""
 _BEAT_SECONDS = 0.5
 _BEAT_AGE = 1.5
 """Wall seconds after the last look at which a heartbeat needs one of its own."""
@@ -493,7 +491,7 @@ class Run:
                 watching.update(state)
                 if state.over:
                     return
-                self._flight.await_change(_VIEW_SECONDS if watching.moves else _LOOK_SECONDS)
+                self._flight.await_end(_LOOK_SECONDS)
 
     def _land(self, reason: str) -> None:
         """Land every drone, and wait for a limited time."""

@@ -155,12 +155,6 @@ class RobotStatus:
     """Milliseconds from capture to command, newest last."""
 
     @property
-    def notable(self) -> tuple[object, ...]:
-        """Values whose change the application is told at once, rather than at its next poll."""
-        one = self.mission
-        return one.state, one.reason, len(one.visited), len(one.given_up), one.faults
-
-    @property
     def charge(self) -> float | None:
         """Charge left, 0 to 1; None where it is not known."""
         charge = math.nan if self.vehicle is None else self.vehicle.battery.fraction

@@ -125,14 +125,11 @@ class InlineFlight:
         self._executor.order(self._nodes())
         self._calls = LoopCalls(lambda: None, self._publish_reports)
         self._thread = threading.Thread(target=self._run, name="flight", daemon=True)
-        self._changed = threading.Condition()
         self._stopping = False
         self._sensed = False
-        self._over = False
+        self._over = threading.Event()
         self._stopped = False
         self._robots: dict[str, RobotStatus] = {}
-        self._look: object = None
-        """What of the robots the application is told at once."""
         self._notes: list[Alert] = []
 
     def _add(self, actor: ActorPlan) -> None:
@@ -191,9 +188,7 @@ class InlineFlight:
         finally:
             self._calls.close("the mission is over")
             self._publish_reports()
-            with self._changed:
-                self._over = True
-                self._changed.notify_all()
+            self._over.set()
 
     def _fly(self) -> None:
         executor = self._executor
@@ -243,14 +238,8 @@ class InlineFlight:
             self._recorder.write_vitals(reading, self._executor.clock.now())
 
     def _publish_reports(self) -> None:
-        if self._drone is None:
-            return
-        self._robots = self._drone.reports()
-        look = (len(self._notes), [report.notable for report in self._robots.values()])
-        if look != self._look:
-            with self._changed:
-                self._look = look
-                self._changed.notify_all()
+        if self._drone is not None:
+            self._robots = self._drone.reports()
 
     def poll(self, newest: int = 200) -> FlightState:
         """State of the run, with the `newest` latencies of each robot."""
@@ -259,7 +248,7 @@ class InlineFlight:
             for name, report in self._robots.items()
             if self._drone is not None
         }
-        return FlightState(robots, self.reports(), self._over, self.notes)
+        return FlightState(robots, self.reports(), self._over.is_set(), self.notes)
 
     @property
     def notes(self) -> tuple[Alert, ...]:
@@ -275,11 +264,9 @@ class InlineFlight:
         """The report of each part."""
         return {name: part.report() for name, part in tuple(self._executor.parts.items())}
 
-    def await_change(self, timeout: float) -> None:
-        """Return once a mission has changed, or after `timeout` seconds."""
-        with self._changed:
-            before = self._look
-            self._changed.wait_for(lambda: self._over or self._look != before, timeout)
+    def await_end(self, timeout: float) -> None:
+        """Return once the flight is over, or after `timeout` seconds."""
+        self._over.wait(timeout)
 
     def command(self, robot: str, command: Command) -> Answer:
         """Execute a command on a robot's mission, between two moments.

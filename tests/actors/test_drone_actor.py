@@ -16,7 +16,6 @@ from drone_nodes import UnreadableVehicle, robot_spec
 from flying import hop, robot
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
-from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.errors import MissionError
@@ -99,41 +98,6 @@ def test_commands_after_the_end_are_refused_at_once() -> None:
     assert answer.text == "the mission is over: landed"
     actor.stop()
     assert actor.robots()["drone"] == before
-
-
-def test_a_change_is_told_to_a_call_that_waits() -> None:
-    """A command's effect answers the call, which otherwise waits; the end answers it, too."""
-    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0, mission=_HOLD)
-    actor.start(host_time_ns())
-    known = 0
-    while actor.robots()["drone"].mission.state is not MissionState.TAKING_OFF:
-        known = actor.await_change(known, 60.0)
-    with ThreadPoolExecutor(1) as pool:
-        known = actor.await_change(-1, 60.0)
-        waiting = pool.submit(actor.await_change, known, 60.0)
-        assert actor.command("drone", End()).accepted
-        assert waiting.result() > known
-        while actor.report().phase == "running":
-            known = actor.await_change(known, 60.0)
-    # Aborted if it was asked to land before it had taken off.
-    ended = {MissionState.LANDED, MissionState.ABORTED}
-    assert actor.robots()["drone"].mission.state in ended
-    assert actor.await_change(known, 60.0) >= known
-    actor.stop()
-
-
-def test_a_call_that_waits_for_a_change_returns_without_one() -> None:
-    """The same value is no change, and one that was missed answers at once."""
-    signal = ChangeSignal()
-    signal.update("here")
-    assert signal.wait(0, 60.0) == 1
-    signal.update("here")
-    assert signal.wait(1, 0.01) == 1
-    signal.update("there")
-    assert signal.wait(1, 60.0) == 2
-    signal.end()
-    assert signal.wait(2, 60.0) == 3
-    assert signal.wait(3, 60.0) == 3
 
 
 def test_what_is_told_while_connecting_has_the_missions_time() -> None:
