@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerodaas.extensions.notebook import Pictures, recorded_pictures
 from aerodaas.schedulers.lab import run_sweep
-from aerodaas.schedulers.lab.sweep_plots import plot_sweep
+from aerodaas.schedulers.lab.plots import plot_sweep
 
 __all__ = ["draw_sweep", "sheet"]
 

@@ -221,7 +221,7 @@ def _write(result: SweepResult, out: Path) -> list[str]:
 
 
 def _plot(result: SweepResult, figures: Sequence[str], out: Path) -> list[str]:
-    from aerodaas.schedulers.lab.sweep_plots import plot_sweep  # noqa: PLC0415 - loads matplotlib
+    from aerodaas.schedulers.lab.plots import plot_sweep  # noqa: PLC0415 - loads matplotlib
 
     files = []
     for figure in figures:

@@ -23,8 +23,8 @@ from aerodaas.schedulers.analytics.published.edge_only import Edf
 from aerodaas.schedulers.lab import Workload, run_lab, run_sweep
 from aerodaas.schedulers.lab.metrics import holm, permutation_p
 from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.plots import plot_sweep
 from aerodaas.schedulers.lab.sweep import SweepResult
-from aerodaas.schedulers.lab.sweep_plots import plot_sweep
 from aerodaas.schedulers.lab.workload import TaskArrival
 from aerodaas.testing.scheduler_kit import check_scheduler
 
