@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import io
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +20,7 @@ sys.path.append(str(ROOT / "benchmarks"))
 
 import _aims  # noqa: E402 - benchmarks are no package
 import all as suite_run  # noqa: E402
-from _comparison import Comparison, committed, figures  # noqa: E402
+from _comparison import Comparison, committed  # noqa: E402
 from _suite import Benchmark, Need  # noqa: E402
 
 QUICK = ("--scheduler", "edf", "--waiting", "5", "--rounds", "10")
@@ -137,60 +135,6 @@ def test_a_busy_machine_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         assert ("not a quiet machine: 3 processes" in done.output) is told
 
 
-def test_further_files_come_after_the_first(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """Whatever their names: some benchmarks write two."""
-
-    def wrote(words: list[str], said: Path) -> int:
-        said.touch()
-        first = Path(words[-1])
-        for path, content in ((first.with_stem(f"{first.stem}-more"), 2), (first, 1)):
-            path.write_text(json.dumps(content), encoding="utf-8")
-        return 0
-
-    monkeypatch.setattr(suite_run, "_end_of", wrote)
-    reports: list[Any] = suite_run.run(Benchmark("routes"), tmp_path / "routes").reports
-    assert reports == [1, 2]
-
-
-@pytest.mark.slow
-def test_a_benchmark_that_hangs_is_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """With all that it has started."""
-    monkeypatch.setattr(suite_run, "_PATIENCE", 2.0)
-    code = (
-        "import subprocess, sys, time\n"
-        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'],"
-        " start_new_session=True)\n"
-        "print(child.pid, flush=True)\n"
-        "time.sleep(600)\n"
-    )
-    said = tmp_path / "said"
-    assert suite_run._end_of(["-c", code], said) is None
-    child = int(said.read_text().splitlines()[0])
-    until = time.monotonic() + 10
-    while psutil.pid_exists(child) and time.monotonic() < until:
-        if psutil.Process(child).status() == psutil.STATUS_ZOMBIE:
-            break
-        time.sleep(0.05)
-    assert not psutil.pid_exists(child) or psutil.Process(child).status() == psutil.STATUS_ZOMBIE
-
-
-@pytest.mark.parametrize(
-    ("said", "line"),
-    [
-        ("one\nValueError: it broke\n\n", "ValueError: it broke"),
-        ("╭─ Error ─╮\n│ No such option: --x │\n╰─────────╯\n", "No such option: --x"),
-        ("\n", ""),
-    ],
-)
-def test_the_last_line_is_one_with_words(said: str, line: str, tmp_path: Path) -> None:
-    """Without the frame of a message."""
-    path = tmp_path / "said"
-    path.write_text(said, encoding="utf-8")
-    assert suite_run.last_line(path) == line
-
-
 def test_ratios_are_coloured_by_what_is_better() -> None:
     """Twice the time is red, twice the speed green, and a twentieth neither."""
     before = results(median=1.0, factor=1.0, p99=1.0, lost=2.0, more=0.0)
@@ -203,30 +147,6 @@ def test_ratios_are_coloured_by_what_is_better() -> None:
     assert "3 (was 0)" in text
     assert "revision 1234567890ab, 2026-01-02" in text
     assert "latency no longer measures all of: one node" in text
-
-
-def test_what_is_counted_or_given_is_neither_better_nor_worse() -> None:
-    """More frames, or a longer flight that was simulated, have a ratio without a colour."""
-    now, before = results(seen=2.0, simulated=2.0), results(seen=1.0, simulated=1.0)
-    for one in (now, before):
-        one["benchmarks"]["latency"]["reports"][0]["units"]["seen"] = "frames"
-    text = printed(now, before)
-    assert text.count("x2.00") == 2
-    assert RED not in text
-
-
-def test_ratios_between_machines_and_units_mean_little() -> None:
-    """Another machine's are told as such and have no colour; other units are not compared."""
-    for what, value in (("cpu", "another processor"), ("cores", 64)):
-        before = results(median=1.0)
-        before["machine"][what] = value
-        text = printed(results(median=2.0), before)
-        assert "x2.00" in text
-        assert RED not in text
-    assert "another machine, so that ratios mean little: a processor, 64 cores" in text
-    other = results(median=1.0)
-    other["benchmarks"]["latency"]["reports"][0]["units"]["median"] = "us"
-    assert "x2.00" not in printed(results(median=2.0), other)
 
 
 def test_aims_are_shown_with_whether_they_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -248,20 +168,6 @@ def test_aims_are_shown_with_whether_they_are_met(monkeypatch: pytest.MonkeyPatc
     rival = {"case": "rival", "median": 1.0, "factor": 1.0, "p99": 4.0}
     now["benchmarks"]["latency"]["reports"][0]["rows"].append(rival)
     assert f"p99 at most 2 (0.5 of rival): {GREEN}met" in printed(now, None)
-
-
-def test_rows_of_one_name_are_no_figures() -> None:
-    """One would take the other's place: the benchmark has failed, and is not in the results."""
-    twice = results(median=1.0)
-    rows = twice["benchmarks"]["latency"]["reports"][0]["rows"]
-    rows.append(copy.copy(rows[0]))
-    with pytest.raises(ValueError, match="latency has two rows 'one node'"):
-        figures(twice)
-    reports = [{**report, "versions": {}} for report in twice["benchmarks"]["latency"]["reports"]]
-    found: dict[str, Any] = {"benchmarks": {}, "failed": {}, "versions": {}}
-    suite_run._add(found, Benchmark("latency"), suite_run.Outcome(1.0, reports))
-    assert found["failed"] == {"latency": "latency has two rows 'one node'"}
-    assert found["benchmarks"] == {}
 
 
 def test_the_committed_results_are_those_of_the_last_commit(tmp_path: Path) -> None:

@@ -70,20 +70,3 @@ def test_a_survivor_is_told_from_the_killed(project: Path) -> None:
     assert row.split()[1:] == ["6", "2", "3", "1", "33.3"]
     assert "+ return a if a < b" not in done.stdout
     assert sorted(project.rglob("*")) == before
-
-
-@pytest.mark.slow
-def test_what_cannot_be_measured_is_refused(project: Path) -> None:
-    """Tests that fail as it is, no tests at all, and no file."""
-    source = str(project / "parts" / "ages.py")
-    other = run_benchmark("mutation", f"{source}.old", "--root", str(project))
-    assert other.returncode != 0
-    assert "no such file" in other.stderr
-    (project / "tests" / "test_people.py").write_text(f"{TEST}    assert False\n", encoding="utf-8")
-    failing = run_benchmark("mutation", source, "--root", str(project))
-    assert failing.returncode != 0
-    assert "do not pass" in failing.stderr
-    (project / "tests" / "test_people.py").unlink()
-    none = run_benchmark("mutation", source, "--root", str(project))
-    assert none.returncode != 0
-    assert "no test matches" in none.stderr

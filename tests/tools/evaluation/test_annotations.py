@@ -10,10 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
-from aerodaas.errors import AeroDaaSError, ConfigError
+from aerodaas.errors import ConfigError
 from tools.evaluation import dataset
 from tools.evaluation.dataset import Dataset, read_picture, read_size
 from tools.evaluation.reading import read_dataset
@@ -251,34 +249,3 @@ def test_what_is_no_dataset_is_told_what_would_be(folder: Path) -> None:
     for path in (folder / "images", folder / "images/a.png", folder / "gone"):
         with pytest.raises(ConfigError, match="no annotations that are known"):
             read_dataset(path)
-
-
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(data=st.data())
-def test_changed_bytes_are_read_or_refused(folder: Path, data: st.DataObject) -> None:
-    """Nothing but the project's own error comes of a stranger's file."""
-    name, seed = data.draw(
-        st.sampled_from(
-            [
-                ("coco.json", json.dumps(coco()).encode()),
-                ("labels/a.txt", b"0 0.2 0.5 0.2 0.8\n"),
-                ("data.yaml", b"val: images\nnames: {0: person}\n"),
-                ("Annotations/a.xml", XML.encode()),
-            ]
-        )
-    )
-    content = bytearray(seed)
-    for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
-        content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
-        content = content or bytearray(b" ")
-    (folder / name).write_bytes(bytes(content))
-    target = {"coco.json": "coco.json", "Annotations/a.xml": "Annotations"}.get(name, "data.yaml")
-    try:
-        read_dataset(folder / target)
-    except AeroDaaSError as error:
-        str(error).encode()
-    finally:
-        (folder / name).write_bytes(seed)

@@ -67,27 +67,6 @@ def test_a_detector_is_evaluated(evaluated: Callable[..., Result], dataset: Path
     assert [path.name for path in Path("worst").iterdir()] == ["001_missed_dark.jpg"]
 
 
-@pytest.mark.parametrize(
-    ("words", "problem"),
-    [
-        (["--json", "gone/o.json"], "cannot write gone/o.json"),
-        (["--csv", "data"], "cannot write data"),
-        (["--worst", "a.onnx"], "cannot write a.onnx"),
-    ],
-)
-def test_places_that_cannot_be_written_are_refused_first(
-    evaluated: Callable[..., Result], dataset: Path, words: list[str], problem: str
-) -> None:
-    """Before anything is evaluated."""
-    pytest.importorskip("pycocotools")
-    patchwork_model(Path("a.onnx"), shape=(1, 3, 96, 128))
-    rename = ["--rename", "human=person"]
-    failed = evaluated("a.onnx", str(dataset / "coco.json"), *rename, *words)
-    assert isinstance(failed.exception, ConfigError)
-    assert problem in str(failed.exception)
-    assert not failed.output
-
-
 def test_wrong_words_are_told(evaluated: Callable[..., Result], dataset: Path) -> None:
     """No label in common, half a rename, a score that is none."""
     pytest.importorskip("pycocotools")

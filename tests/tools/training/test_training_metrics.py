@@ -16,13 +16,6 @@ def test_overlap_of_boxes() -> None:
     assert overlap(boxes[:1], boxes)[0] == pytest.approx([1.0, 1 / 3, 0.0])
 
 
-def test_a_perfect_detector_has_precision_one() -> None:
-    """Every thing found, nothing else."""
-    ranking = Ranking([], [])
-    ranking.add(np.array([0.9, 0.8]), np.eye(2), ALL)
-    assert ranking.average_precision == pytest.approx(1.0)
-
-
 def test_a_false_box_before_the_second_thing_costs_a_sixth() -> None:
     """Precision is 1 up to half the things, and 2/3 for the rest."""
     ranking = Ranking([], [])
@@ -50,13 +43,6 @@ def test_what_need_not_be_found_neither_helps_nor_harms() -> None:
     ranking.add(np.array([0.9, 0.8]), np.eye(2), np.array([True, False]))
     assert ranking.hits == [True]
     assert ranking.things == 1
-
-
-def test_nothing_found_is_no_precision() -> None:
-    """No detection at all."""
-    ranking = Ranking([], [])
-    ranking.add(np.zeros(0), np.zeros((0, 2)), ALL)
-    assert ranking.average_precision == 0.0
 
 
 def test_keypoints_are_alike_by_the_size_of_the_person() -> None:
