@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -10,13 +9,12 @@ import av
 import cv2
 import numpy as np
 import pytest
-from rewritten import rewritten
 from synthetic_flight import HOME, PLAN, SyntheticFlight, record
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
 from aerodaas.config.model import RecordingConfig
-from aerodaas.errors import AeroDaaSError, RecordingError
+from aerodaas.errors import RecordingError
 from aerodaas.extensions.exports.track import write_gpx, write_kml
 from aerodaas.extensions.exports.video import write_videos
 from aerodaas.recording.reader import Recording
@@ -91,45 +89,6 @@ def test_a_video_of_a_recorded_video_has_every_frame(tmp_path: Path) -> None:
         (video,) = write_videos(recording, tmp_path / "out")
     with av.open(str(video)) as container:
         assert sum(1 for _ in container.decode(video=0)) == expected
-
-
-@pytest.mark.parametrize("broken", [b"\xff\x00", b"", b"null", b"[]", b"{}", b"[" * 50_000])
-def test_broken_messages_are_left_out(recorded: Path, tmp_path: Path, broken: bytes) -> None:
-    """A track has the places of the others."""
-    met = {"states": 0}
-
-    def change(topic: str, data: bytes) -> bytes:
-        met["states"] += topic == "/tello/state"
-        return broken if topic == "/tello/state" and met["states"] in {3, 4} else data
-
-    path = rewritten(recorded, tmp_path / "broken.mcap", change=change)
-    with Recording.open(path) as recording, Recording.open(recorded) as whole:
-        fewer = write_gpx(recording, tmp_path / "broken").read_text().count("<trkpt")
-        assert fewer <= write_gpx(whole, tmp_path / "whole").read_text().count("<trkpt")
-        assert write_kml(recording, tmp_path / "broken").is_file()
-    assert fewer > 100
-
-
-@pytest.mark.parametrize(
-    "content", [1, None, {"robots": 1}, {"home": {"latitude": 1e308}}, {"home": "x"}]
-)
-def test_an_odd_environment_is_refused_in_words(
-    recorded: Path, tmp_path: Path, content: object
-) -> None:
-    """A track needs the place of its home, and says so."""
-    path = rewritten(recorded, tmp_path / "odd.mcap", environment=json.dumps(content).encode())
-    with Recording.open(path) as recording:
-        said = _refusal(recording, tmp_path)
-    assert not said or str(path) in said
-
-
-def _refusal(recording: Recording, folder: Path) -> str:
-    """The project's own error of an export; empty if the track is written without it."""
-    try:
-        write_gpx(recording, folder)
-    except AeroDaaSError as error:
-        return str(error)
-    return ""
 
 
 def test_the_commands_write_into_a_folder(recorded: Path, tmp_path: Path) -> None:
