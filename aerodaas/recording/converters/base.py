@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import singledispatch
-from typing import Any
+from functools import cache, singledispatch
+from typing import Any, Protocol
 
+from foxglove import Schema
 from foxglove.messages import Quaternion, Timestamp, Vector3
 
 from aerodaas.clock import NANOSECONDS
@@ -19,7 +20,15 @@ from aerodaas.recording.encoding import Entry, plain
 from aerodaas.recording.messages import ItemRecord, channel_of, json_entry
 from aerodaas.recording.reference_frames import Rotation
 
-__all__ = ["Session", "convert", "quaternion", "robot_of", "vector"]
+__all__ = [
+    "FoxgloveMessage",
+    "Session",
+    "convert",
+    "foxglove_entry",
+    "quaternion",
+    "robot_of",
+    "vector",
+]
 
 
 @dataclass(slots=True)
@@ -53,6 +62,31 @@ class Session:
             return False
         self.last[key] = value
         return True
+
+
+class FoxgloveMessage(Protocol):
+    """A message of Foxglove's schemas."""
+
+    def encode(self) -> bytes:
+        """The message as protobuf."""
+        ...
+
+
+def foxglove_entry(topic: str, message: FoxgloveMessage, stamp: int) -> Entry:
+    """A message of Foxglove's schemas for its channel.
+
+    Args:
+        topic: The channel's.
+        message: The message.
+        stamp: Mission time of the described measurement, nanoseconds.
+    """
+    return Entry(topic, _schema_of(type(message)), message.encode(), stamp)
+
+
+@cache
+def _schema_of(kind: Any) -> Schema:  # noqa: ANN401 - a class of Foxglove's
+    schema: Schema = kind.get_schema()
+    return schema
 
 
 @singledispatch

@@ -29,7 +29,7 @@ from aerodaas.messages.detections import Detection, Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
-from aerodaas.recording.converters.base import Session, convert, quaternion, vector
+from aerodaas.recording.converters.base import Session, convert, foxglove_entry, quaternion, vector
 from aerodaas.recording.converters.h264 import H264Encoder
 from aerodaas.recording.converters.vehicle import body_frame
 from aerodaas.recording.encoding import Entry, topic
@@ -38,13 +38,6 @@ from aerodaas.recording.reference_frames import OPTICAL, compose, from_rpy
 from aerodaas.recording.report.overlay import VISIBLE, label_colour, rgb
 
 __all__ = ["EncodedFrame"]
-
-IMAGE = CompressedImage.get_schema()
-VIDEO = CompressedVideo.get_schema()
-DEPTH = RawImage.get_schema()
-CALIBRATION = CameraCalibration.get_schema()
-TRANSFORM = FrameTransform.get_schema()
-ANNOTATIONS = ImageAnnotations.get_schema()
 
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
@@ -66,14 +59,8 @@ class EncodedFrame:
 
 
 @convert.register
-def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an image, its depth, and its camera's calibration when that has changed.
-
-    Args:
-        item: The frame.
-        message: Message that brought it.
-        session: State of the recording, whose settings choose the format.
-    """
+def _frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write an image, its depth, and its camera's calibration when that has changed."""
     header, stream = item.header, message.stream
     yield from _head(item, stream, session)
     if item.depth is not None and session.config.images != "none":
@@ -88,27 +75,15 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
 
 
 @convert.register
-def encoded_frame(item: EncodedFrame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an image as it came, and its camera's calibration when that has changed.
-
-    Args:
-        item: The frame.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _encoded_frame(item: EncodedFrame, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write an image as it came, and its camera's calibration when that has changed."""
     yield from _head(item, message.stream, session)
     yield _image(item.data, item.format, item.header, message.stream, session)
 
 
 @convert.register
-def detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write boxes and keypoints as annotations of the image and as exact JSON.
-
-    Args:
-        item: The detections, in pixels.
-        message: Message that brought them.
-        session: State of the recording.
-    """
+def _detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write boxes and keypoints as annotations of the image and as exact JSON."""
     header, stream = item.header, message.stream
     annotations = ImageAnnotations(
         # Foxglove pairs annotations with the image of exactly this time.
@@ -116,7 +91,7 @@ def detections(item: Detections, message: Message[Any], session: Session) -> Ite
         points=[shape for found in item.items for shape in _shapes(found)],
         texts=[_label(found) for found in item.items],
     )
-    yield Entry(topic(stream, "boxes"), ANNOTATIONS, annotations.encode(), header.stamp)
+    yield foxglove_entry(topic(stream, "boxes"), annotations, header.stamp)
     yield json_entry(item, stream, header.stamp)
 
 
@@ -132,7 +107,7 @@ def _image(data: bytes, kind: str, header: Header, stream: str, session: Session
     image = CompressedImage(
         timestamp=session.time(header.stamp), frame_id=header.source, data=data, format=kind
     )
-    return Entry(topic(stream, "image"), IMAGE, image.encode(), header.stamp)
+    return foxglove_entry(topic(stream, "image"), image, header.stamp)
 
 
 def _depth(depth: NDArray[np.uint16], header: Header, stream: str, session: Session) -> Entry:
@@ -146,7 +121,7 @@ def _depth(depth: NDArray[np.uint16], header: Header, stream: str, session: Sess
         step=2 * width,
         data=depth.astype("<u2", copy=False).tobytes(),
     )
-    return Entry(topic(stream, "aligned_depth"), DEPTH, image.encode(), header.stamp)
+    return foxglove_entry(topic(stream, "aligned_depth"), image, header.stamp)
 
 
 def _video(item: Frame, stream: str, session: Session) -> Entry:
@@ -161,7 +136,7 @@ def _video(item: Frame, stream: str, session: Session) -> Entry:
         data=encoder.encode(item.image, stamp),
         format="h264",
     )
-    return Entry(topic(stream, "image"), VIDEO, video.encode(), stamp)
+    return foxglove_entry(topic(stream, "image"), video, stamp)
 
 
 def _settings(config: RecordingConfig) -> list[int]:
@@ -185,7 +160,7 @@ def _camera(
         R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
         P=[fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0],
     )
-    yield Entry(topic(stream, "calibration"), CALIBRATION, calibration.encode(), stamp)
+    yield foxglove_entry(topic(stream, "calibration"), calibration, stamp)
     mount = FrameTransform(
         timestamp=time,
         parent_frame_id=body_frame(source),
@@ -193,7 +168,7 @@ def _camera(
         translation=vector(camera.mount),
         rotation=quaternion(compose(from_rpy(camera.roll, camera.pitch, camera.yaw), OPTICAL)),
     )
-    yield Entry(topic(stream, "mount"), TRANSFORM, mount.encode(), stamp)
+    yield foxglove_entry(topic(stream, "mount"), mount, stamp)
 
 
 def _colour(label: str) -> Color:

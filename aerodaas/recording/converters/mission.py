@@ -16,14 +16,12 @@ from aerodaas.messages.mission import MissionPlan, MissionStatus
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vitals import Vitals
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.recording.converters.base import Session, convert, robot_of
+from aerodaas.recording.converters.base import Session, convert, foxglove_entry, robot_of
 from aerodaas.recording.converters.plan import plan_entries
 from aerodaas.recording.encoding import Entry, plain
 from aerodaas.recording.messages import NavigationRecord, json_entry
 
 __all__ = ["log_entry"]
-
-LOG = Log.get_schema()
 
 
 def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: str) -> Entry:
@@ -37,18 +35,12 @@ def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: st
         text: Its text.
     """
     line = Log(timestamp=session.time(stamp), level=level, message=text, name=name)
-    return Entry("/log", LOG, line.encode(), stamp)
+    return foxglove_entry("/log", line, stamp)
 
 
 @convert.register
-def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an alert to the log and, with its figures, as JSON.
-
-    Args:
-        item: The alert.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write an alert to the log and, with its figures, as JSON."""
     stamp = item.header.stamp
     yield log_entry(session, stamp, LogLevel.Warning, message.stream, f"{item.kind}: {item.text}")
     # An application's own figures may be of any class.
@@ -57,26 +49,16 @@ def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entr
 
 
 @convert.register
-def text(item: str, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a plain text as a line of the log.
-
-    Args:
-        item: The text.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _text(item: str, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a plain text as a line of the log."""
     yield log_entry(session, message.stamp, LogLevel.Info, message.stream, item)
 
 
 @convert.register
-def log_record(item: logging.LogRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a record of Python's logging, with its level, file and line.
-
-    Args:
-        item: The record.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _log_record(
+    item: logging.LogRecord, message: Message[Any], session: Session
+) -> Iterator[Entry]:
+    """Write a record of Python's logging, with its level, file and line."""
     line = Log(
         timestamp=session.time(message.stamp),
         level=_level(item.levelno),
@@ -85,7 +67,7 @@ def log_record(item: logging.LogRecord, message: Message[Any], session: Session)
         file=item.filename,
         line=item.lineno,
     )
-    yield Entry("/log", LOG, line.encode())
+    yield foxglove_entry("/log", line, message.header.stamp)
 
 
 def _level(number: int) -> LogLevel:
@@ -101,14 +83,10 @@ def _level(number: int) -> LogLevel:
 
 
 @convert.register
-def mission_status(item: MissionStatus, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a status, a new plan, and log lines for a changed state and changed faults.
-
-    Args:
-        item: The status.
-        message: Message that brought it.
-        session: State of the recording, with the last state and faults.
-    """
+def _mission_status(
+    item: MissionStatus, message: Message[Any], session: Session
+) -> Iterator[Entry]:
+    """Write a status, a new plan, and log lines for a changed state and changed faults."""
     stream, robot = message.stream, robot_of(message)
     yield json_entry(item, stream, item.stamp, robot=robot, ahead=len(item.pending))
     if session.changed("state", stream, item.state):
@@ -131,27 +109,15 @@ def _is_new_plan(ahead: tuple[Waypoint, ...], stream: str, session: Session) -> 
 
 
 @convert.register
-def navigation(item: AeroNavigation, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the waypoints and commands of a navigation result.
-
-    Args:
-        item: The result.
-        message: Message that brought it.
-        session: Ignored.
-    """
+def _navigation(item: AeroNavigation, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the waypoints and commands of a navigation result."""
     del session
     yield json_entry(NavigationRecord.of(item, message.header), message.stream)
 
 
 @convert.register
-def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a reading, with the number of cores in use since the last one.
-
-    Args:
-        item: The reading.
-        message: Message that brought it.
-        session: State of the recording, with the actor's last reading.
-    """
+def _vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a reading, with the number of cores in use since the last one."""
     actor, _, machine = message.header.source.partition("@")
     key = ("vitals", actor)
     before: Vitals | None = session.last.get(key)

@@ -27,17 +27,13 @@ from aerodaas.geometry.frames import GeodeticOrigin
 from aerodaas.identifiers import internal
 from aerodaas.messages.mission import MissionPlan
 from aerodaas.messages.waypoints import Waypoint
-from aerodaas.recording.converters.base import Session, quaternion, vector
+from aerodaas.recording.converters.base import Session, foxglove_entry, quaternion, vector
 from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.messages import json_entry
 from aerodaas.recording.reference_frames import MAP_FRAME, from_rpy
 from aerodaas.recording.report.overlay import OKABE_ITO, rgb
 
 __all__ = ["fence_entries", "plan_entries"]
-
-SCENE = SceneUpdate.get_schema()
-POSES = PosesInFrame.get_schema()
-MAP = GeoJson.get_schema()
 
 _BALL = 0.25
 """Diameter in metres of a waypoint in the scene."""
@@ -87,9 +83,9 @@ def plan_entries(plan: MissionPlan, robot: str, stream: str, session: Session) -
             for at in waypoints
         ],
     )
-    yield Entry(topic(stream, "scene"), SCENE, SceneUpdate(entities=[entity]).encode(), stamp)
+    yield foxglove_entry(topic(stream, "scene"), SceneUpdate(entities=[entity]), stamp)
     poses = PosesInFrame(timestamp=time, frame_id=MAP_FRAME, poses=[_pose(at) for at in waypoints])
-    yield Entry(topic(stream, "path"), POSES, poses.encode(), stamp)
+    yield foxglove_entry(topic(stream, "path"), poses, stamp)
     if session.home is not None:
         home = session.home
         places = [_place((at.x, at.y, at.z), home) for at in waypoints]
@@ -97,7 +93,7 @@ def plan_entries(plan: MissionPlan, robot: str, stream: str, session: Session) -
         features += [
             _feature("Point", place, at.id) for place, at in zip(places, waypoints, strict=True)
         ]
-        yield Entry(topic(stream, "map"), MAP, _geojson(features), stamp)
+        yield foxglove_entry(topic(stream, "map"), _geojson(features), stamp)
 
 
 def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterator[Entry]:
@@ -128,12 +124,11 @@ def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterat
             for height in (fence.floor, fence.ceiling)
         ],
     )
-    scene = SceneUpdate(entities=[entity])
-    yield Entry(topic(fence_stream, "scene"), SCENE, scene.encode(), 0)
+    yield foxglove_entry(topic(fence_stream, "scene"), SceneUpdate(entities=[entity]), 0)
     if session.home is not None:
         ring = [_place((x, y, 0.0), session.home) for x, y in fence.polygon]
         feature = _feature("Polygon", [[*ring, ring[0]]], f"{robot} geofence")
-        yield Entry(topic(fence_stream, "map"), MAP, _geojson([feature]), 0)
+        yield foxglove_entry(topic(fence_stream, "map"), _geojson([feature]), 0)
 
 
 def _colour(name: str) -> Color:
@@ -159,6 +154,6 @@ def _feature(kind: str, coordinates: list[Any], name: str) -> dict[str, Any]:
     }
 
 
-def _geojson(features: list[dict[str, Any]]) -> bytes:
+def _geojson(features: list[dict[str, Any]]) -> GeoJson:
     collection = {"type": "FeatureCollection", "features": features}
-    return GeoJson(geojson=json.dumps(collection)).encode()
+    return GeoJson(geojson=json.dumps(collection))

@@ -16,16 +16,19 @@ from foxglove.messages import Odometry as FoxgloveOdometry
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.odometry import GpsFix, Odometry
 from aerodaas.messages.vehicle import VehicleState
-from aerodaas.recording.converters.base import Session, convert, quaternion, robot_of, vector
+from aerodaas.recording.converters.base import (
+    Session,
+    convert,
+    foxglove_entry,
+    quaternion,
+    robot_of,
+    vector,
+)
 from aerodaas.recording.encoding import Entry, topic
 from aerodaas.recording.messages import json_entry
 from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist, from_rpy
 
 __all__ = ["body_frame"]
-
-ODOMETRY = FoxgloveOdometry.get_schema()
-TRANSFORM = FrameTransform.get_schema()
-LOCATION = LocationFix.get_schema()
 
 
 def body_frame(source: str) -> str:
@@ -35,14 +38,8 @@ def body_frame(source: str) -> str:
 
 
 @convert.register
-def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a state as odometry, transform, location and JSON.
-
-    Args:
-        item: The state.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _vehicle_state(item: VehicleState, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a state as odometry, transform, location and JSON."""
     stream, robot = message.stream, robot_of(message)
     yield from _pose(item.odometry, base_link(robot), stream, item.stamp, session)
     if item.gps is not None:
@@ -51,27 +48,15 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
 
 
 @convert.register
-def odometry(item: Odometry, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the reading of an odometry sensor.
-
-    Args:
-        item: The reading.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _odometry(item: Odometry, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the reading of an odometry sensor."""
     header = message.header
     yield from _pose(item, body_frame(header.source), message.stream, header.stamp, session)
 
 
 @convert.register
-def gps(item: GpsFix, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the reading of a GPS sensor.
-
-    Args:
-        item: The reading.
-        message: Message that brought it.
-        session: State of the recording.
-    """
+def _gps(item: GpsFix, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the reading of a GPS sensor."""
     header = message.header
     yield _location(item, body_frame(header.source), message.stream, header.stamp, session)
 
@@ -90,7 +75,7 @@ def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session)
         linear_velocity=vector(velocity),
         angular_velocity=vector(rates),
     )
-    yield Entry(topic(stream, "odometry"), ODOMETRY, pose.encode(), stamp)
+    yield foxglove_entry(topic(stream, "odometry"), pose, stamp)
     transform = FrameTransform(
         timestamp=time,
         parent_frame_id=MAP_FRAME,
@@ -98,7 +83,7 @@ def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session)
         translation=position,
         rotation=attitude,
     )
-    yield Entry(topic(stream, "transform"), TRANSFORM, transform.encode(), stamp)
+    yield foxglove_entry(topic(stream, "transform"), transform, stamp)
 
 
 def _location(fix: GpsFix, frame: str, stream: str, stamp: int, session: Session) -> Entry:
@@ -113,4 +98,4 @@ def _location(fix: GpsFix, frame: str, stream: str, stamp: int, session: Session
         position_covariance=[horizontal, 0, 0, 0, horizontal, 0, 0, 0, vertical],
         position_covariance_type=kinds.DiagonalKnown if horizontal else kinds.Unknown,
     )
-    return Entry(topic(stream, "location"), LOCATION, location.encode(), stamp)
+    return foxglove_entry(topic(stream, "location"), location, stamp)
