@@ -101,7 +101,6 @@ SPEED = tuple(
         ("simulation", "--rounds 1 --seeds 2", ()),
         ("decision", "--waiting 100", ()),
         ("lab", "--scheduler all --edges=", ()),
-        ("lab_spread", "--edges 40 --duration 10 --rounds 1", ()),
         ("routes", "--size 50 --seeds 2 --long-run 5", (_ROUTES,)),
         ("vision", "aerodaas/analytics/models/detector.onnx --rounds 30", ()),
         ("recording", "--drones 1 --seconds 5", ()),

@@ -14,7 +14,6 @@ import typer
 from _report import Report
 from rich.progress import track
 
-from aerodaas.actors.cluster.ray_map import spread_over
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.registry import scheduler_names
 from aerodaas.schedulers.lab import Workload, run_lab
@@ -29,7 +28,6 @@ def main(
     ] = "1,10,100,1000",
     duration: Annotated[float, typer.Option(help="Simulated seconds of the growing fleet.")] = 30,
     jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
-    address: Annotated[str | None, typer.Option(help="Ray cluster instead of processes.")] = None,
     rounds: Annotated[
         int, typer.Option(help="Of each the least time and CPU are told.", min=1)
     ] = 1,
@@ -41,7 +39,6 @@ def main(
     for count in filter(None, edges.split(",")):
         name = f"{3 * int(count)}D-A/{count}"
         loads[f"{name} {duration:g} s"] = Workload.named(name, round(duration * NANOSECONDS))
-    spread = spread_over(address) if address else None
     per_task: dict[str, list[tuple[int, float]]] = {}
     names = scheduler_names() if scheduler == "all" else scheduler.split(",")
     cases = [(case, name) for name in names for case in loads]
@@ -49,13 +46,13 @@ def main(
         taken, cpu, tasks = inf, inf, 0
         for _ in range(rounds):
             began, worked = time.perf_counter(), time.process_time()
-            result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs, spread=spread)
+            result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs)
             taken = min(taken, time.perf_counter() - began)
             cpu = min(cpu, time.process_time() - worked)
             tasks = result.scores[name][0].tasks
         figures = (taken, cpu, tasks / 1e3, tasks / 1e3 / taken, taken / tasks * 1e6)
         report.row(f"{name} {case}", dict(zip(UNITS, figures, strict=True)))
-        alone = jobs == 1 and spread is None
+        alone = jobs == 1
         # Other work on the machine prolongs the wall time, but hardly the processor's.
         per_task.setdefault(name, []).append((loads[case].edges, (cpu if alone else taken) / tasks))
     for name, (_, *grown) in per_task.items():
@@ -66,8 +63,7 @@ def main(
             f"{name}: from {least} to {most} edges the time per task grows {last / first:.2f} times"
             " (1 is linear growth)"
         )
-    where = f"the cluster at {address}" if address else f"{jobs} process(es)"
-    report.note(f"{where}, without the clairvoyant bound; CPU is of the first process")
+    report.note(f"{jobs} process(es), without the clairvoyant bound; CPU is of the first process")
     report.show()
     if json is not None:
         report.write(json)

@@ -32,8 +32,7 @@ __all__ = [
 ]
 
 Spread = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
-"""An ordered `map`, such as `Pool.imap` of multiprocessing, or
-`aerodaas.actors.cluster.ray_map.spread_over(address)` for a Ray cluster."""
+"""An ordered `map`, such as `Pool.imap` of multiprocessing."""
 
 _BATCHES = 16
 """Batches for each worker: enough that all end at about the same time."""
@@ -195,7 +194,7 @@ def run_lab(
         resources: The edge executor and the cloud; by default those of the class.
         bound: Whether to compute the clairvoyant bound of each path.
         jobs: Processes that share the work; None for one per core, 1 for none.
-        spread: A map in their place, for example over a Ray cluster.
+        spread: A map in their place.
         progress: Called with the number of parts done and of all parts.
 
     Raises:

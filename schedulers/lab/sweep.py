@@ -155,7 +155,7 @@ def run_sweep(
         duration: Seconds; None: the workload's.
         bound: Compute the clairvoyant bound, too, which takes longer than simulating.
         jobs: Processes that share seeds and edges; None: one per core.
-        spread: In their place, such as over a Ray cluster.
+        spread: A map in their place.
         progress: Told how many of how many parts are done, one for each case, seed and edge.
 
     Raises:

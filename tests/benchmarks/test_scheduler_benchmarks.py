@@ -15,7 +15,6 @@ from bench_runs import run_benchmark
         ("schedulers", "--workload 2D-P --case nominal --seeds 2 --duration 4", 17),
         ("decision", "--scheduler edf,margin --waiting 5,20 --rounds 10", 4),
         ("lab", "--scheduler edf --edges 1 --duration 2", 2),
-        ("lab_spread", "--edges 4 --duration 2 --rounds 1 --no-nodes", 2),
         ("fairness", "--seeds 1 --duration 4", 12),
     ],
 )

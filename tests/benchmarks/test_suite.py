@@ -68,7 +68,6 @@ def test_its_options_exist(name: str) -> None:
                 ("hop", ""),
                 ("footprint", "--seconds 1"),
                 ("simulation", "--seeds 0"),
-                ("lab_spread", "--edges 4 --no-nodes"),
                 ("mavlink", "--seconds 2"),
                 ("tello", "--seconds 1"),
             )

@@ -1,4 +1,4 @@
-"""Options of the lab's commands, and the workloads and executors that they name."""
+"""Options of the lab's commands, and the workloads that they name."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ from typing import Annotated, Any
 import typer
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.lab import Workload, load_workload, read_arrivals
 from aerodaas.schedulers.lab.arrival_trace import TRACE
-from aerodaas.schedulers.lab.run import Spread
 
 __all__ = [
     "WORKLOAD",
-    "Address",
     "Duration",
     "Edges",
     "Jobs",
     "Names",
     "names_of",
-    "spread_of",
     "workload_of",
     "write_csv",
 ]
@@ -52,10 +48,6 @@ Edges = Annotated[
     ),
 ]
 Jobs = Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1)]
-Address = Annotated[
-    str | None,
-    typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the edges and seeds."),
-]
 
 
 def names_of(scheduler: list[str] | None) -> list[str]:
@@ -73,17 +65,6 @@ def workload_of(name: str, duration: float | None, edges: int | None) -> Workloa
     if edges is not None:
         found = found.on_edges(edges)
     return found if lasts is None else found.lasting(lasts)
-
-
-def spread_of(
-    address: str | None, names: list[str]
-) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
-    """Executor that shares the seeds over a cluster, if there is one, and the schedulers for it."""
-    if address is None:
-        return None, names
-    from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
-
-    return spread_over(address), [shipped(name) for name in names]
 
 
 def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:

@@ -14,13 +14,11 @@ from rich.table import Table
 
 from aerodaas.cli.lab.options import (
     WORKLOAD,
-    Address,
     Duration,
     Edges,
     Jobs,
     Names,
     names_of,
-    spread_of,
     workload_of,
     write_csv,
 )
@@ -90,7 +88,6 @@ def run(
         typer.Option(help="Compute the clairvoyant bound; by default for up to 10 edges."),
     ] = None,
     jobs: Jobs = None,
-    address: Address = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
     json_path: Annotated[
         Path | None, typer.Option("--json", help="File for every figure and its interval.")
@@ -106,7 +103,7 @@ def run(
 
         aerodaas lab run -w 2D-A,4D-A -s ec_edf,dems,margin --times lognormal:0.15 --plots out
 
-        aerodaas lab run --edges 1000 --seeds 1 --address auto -s dems,margin
+        aerodaas lab run --edges 1000 --seeds 1 -s dems,margin
 
         aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
     """
@@ -116,20 +113,18 @@ def run(
     loads, resources, as_flown = _loads(workloads, flown, duration, edges)
     if cloud_slots is not None:
         resources = Resources(cloud_slots=cloud_slots)
-    spread, schedulers = spread_of(address, names)
     for load in loads:
         with show_progress() as progress:
             bar = progress.add_task(load.name, total=seeds * load.edges)
             result = run_lab(
                 load,
-                schedulers,
+                names,
                 range(seeds),
                 network=Network.named(network, load.duration),
                 times=ExecutionTimes.named(times),
                 resources=resources,
                 bound=load.edges <= _BOUND_EDGES if bound is None else bound,
                 jobs=jobs,
-                spread=spread,
                 progress=lambda done, _: progress.update(bar, completed=done),  # noqa: B023
             )
         if as_flown is not None:

@@ -13,13 +13,11 @@ from rich.console import Console
 
 from aerodaas.cli.lab.options import (
     WORKLOAD,
-    Address,
     Duration,
     Edges,
     Jobs,
     Names,
     names_of,
-    spread_of,
     workload_of,
     write_csv,
 )
@@ -79,7 +77,6 @@ def sweep(
         bool, typer.Option("--bound", help="Compute the clairvoyant bound, too; it takes longer.")
     ] = False,
     jobs: Jobs = None,
-    address: Address = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and plots.")] = Path(
         "sweep"
     ),
@@ -95,12 +92,11 @@ def sweep(
         aerodaas lab sweep --sweep network=steady,trapezium --sweep cloud_slots=4,16 -s dems,gems
         aerodaas lab sweep --sweep scheduler.slack=10,50,100 -s mine.py:Mine,dems --baseline dems
     """
-    spread, schedulers = spread_of(address, names_of(scheduler))
     figures = figure or list(_FIGURES)
     with show_progress() as progress:
         bar = progress.add_task("edges", total=None)
         result = run_sweep(
-            schedulers,
+            names_of(scheduler),
             parse_sweeps(sweeps),
             workload=workload_of(workload, duration, edges),
             seeds=range(seeds),
@@ -110,7 +106,6 @@ def sweep(
             cloud_slots=cloud_slots,
             bound=bound,
             jobs=jobs,
-            spread=spread,
             progress=lambda done, total: progress.update(bar, completed=done, total=total),
         )
     for name in figures:

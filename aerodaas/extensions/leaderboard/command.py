@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 import aerodaas
-from aerodaas.cli.lab.options import Address, Jobs, spread_of, write_csv
+from aerodaas.cli.lab.options import Jobs, write_csv
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.leaderboard.ranking import (
     CASES,
@@ -51,7 +51,6 @@ def leaderboard(
         bool, typer.Option("--full", help="30 seeds of 300 s instead of 10 seeds of 60 s.")
     ] = False,
     jobs: Jobs = None,
-    address: Address = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the page.")] = Path(
         "leaderboard"
     ),
@@ -69,19 +68,16 @@ def leaderboard(
     own = [name.strip() for name in ",".join(scheduler or []).split(",") if name.strip()]
     registered = [] if only else scheduler_names()
     names = list(dict.fromkeys([*registered, *own]))
-    rank(names, FULL if full else QUICK, jobs=jobs, address=address, out=out)
+    rank(names, FULL if full else QUICK, jobs=jobs, out=out)
 
 
-def rank(
-    names: Sequence[str], extent: Extent, *, jobs: int | None, address: str | None, out: Path
-) -> None:
+def rank(names: Sequence[str], extent: Extent, *, jobs: int | None, out: Path) -> None:
     """Rank schedulers, print the table, and write the files.
 
     Args:
         names: The schedulers.
         extent: Seeds and seconds of each case.
         jobs: Processes; None for one per core.
-        address: Ray cluster whose cores share the seeds; None for none.
         out: Folder of the files.
 
     Raises:
@@ -92,17 +88,15 @@ def rank(
     if not names:
         raise ConfigError("--only needs a --scheduler")
     ideas = {name: _idea(name) for name in names}
-    spread, wanted = spread_of(address, list(names))
     # A folder that cannot be written to is told now, not after minutes.
     _writing(out, lambda: out.mkdir(parents=True, exist_ok=True))
     began = perf_counter()
     with show_progress() as progress:
         bar = progress.add_task("sample paths", total=None)
         board = run_leaderboard(
-            wanted,
+            names,
             extent=extent,
             jobs=jobs,
-            spread=spread,
             progress=lambda done, total: progress.update(bar, completed=done, total=total),
         )
     page, table = out / "leaderboard.html", out / "leaderboard.csv"

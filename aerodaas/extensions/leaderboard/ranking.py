@@ -20,7 +20,7 @@ from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.lab.metrics import SIGNIFICANT, Mean, compare, holm, mean_of
 from aerodaas.schedulers.lab.network import ExecutionTimes, Network
-from aerodaas.schedulers.lab.run import LabResult, Spread, Wanted, run_lab, scheduler_label
+from aerodaas.schedulers.lab.run import LabResult, Wanted, run_lab, scheduler_label
 from aerodaas.schedulers.lab.workload import Workload
 
 __all__ = ["CASES", "FULL", "QUICK", "SET", "Case", "Extent", "Leaderboard", "run_leaderboard"]
@@ -165,7 +165,6 @@ def run_leaderboard(
     *,
     extent: Extent = QUICK,
     jobs: int | None = None,
-    spread: Spread | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Leaderboard:
     """Simulate schedulers in all cases and rank them.
@@ -174,7 +173,6 @@ def run_leaderboard(
         schedulers: Names, `module:Class`, `file.py:Class`, classes or instances.
         extent: Seeds, 0 to N-1, and simulated seconds of each case.
         jobs: Processes, by default one per core.
-        spread: Takes their place, as for `run_lab`.
         progress: Told how many of how many sample paths are done.
 
     Raises:
@@ -200,7 +198,6 @@ def run_leaderboard(
             times=ExecutionTimes.named(case.times),
             resources=Resources(cloud_slots=case.cloud_slots),
             jobs=jobs,
-            spread=spread,
             progress=advance,
         )
         before += extent.seeds

@@ -117,7 +117,7 @@ def test_the_command_writes_page_and_figures(
 ) -> None:
     """A row for each scheduler and case, and one for its standing."""
     out = tmp_path / "some" / "board"
-    rank(["edf", "dems"], Extent(2, 1), jobs=1, address=None, out=out)
+    rank(["edf", "dems"], Extent(2, 1), jobs=1, out=out)
     assert "leaderboard.html" in capsys.readouterr().out
     rows = list(csv.DictReader((out / "leaderboard.csv").open(encoding="utf-8")))
     assert len(rows) == 2 * (1 + len(CASES))
