@@ -16,9 +16,8 @@ from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.commander import Commander
-from aerodaas.drivers.mavlink.microservices.fallback import Fallback
+from aerodaas.drivers.mavlink.microservices.fallback import Fallback, ParameterBackup
 from aerodaas.drivers.mavlink.microservices.fence import upload_fence
-from aerodaas.drivers.mavlink.microservices.parameter_backup import ParameterBackup
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings

@@ -23,10 +23,9 @@ from aerodaas.drivers.mavlink.component import (
     mavlink_components,
 )
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
-from aerodaas.drivers.mavlink.control.completion import ClimbCompletion
+from aerodaas.drivers.mavlink.control.climb import ClimbCompletion
 from aerodaas.drivers.mavlink.control.departure import Departure
-from aerodaas.drivers.mavlink.control.mode_change import ModeChange
-from aerodaas.drivers.mavlink.control.permission import flight_objection
+from aerodaas.drivers.mavlink.control.mode_change import ModeChange, flight_objection
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators

@@ -52,7 +52,7 @@ def show(plan: File, home_altitude: HomeAltitude = None) -> None:
 
     aerodaas plan show survey.plan
     """
-    from aerodaas.extensions.plans.reading import flown_plan  # noqa: PLC0415 - slow to load
+    from aerodaas.extensions.plans.navigation import flown_plan  # noqa: PLC0415 - slow to load
     from aerodaas.messages.waypoints import HeightReference  # noqa: PLC0415
 
     waypoints, notices = flown_plan(plan, home_altitude)
@@ -113,7 +113,7 @@ def fence(
     aerodaas plan fence survey.plan --home 47.3977,8.5456
     """
     from aerodaas.extensions.plans.fences import geofence_of  # noqa: PLC0415 - slow to load
-    from aerodaas.extensions.plans.reading import read_plan  # noqa: PLC0415
+    from aerodaas.extensions.plans.navigation import read_plan  # noqa: PLC0415
     from aerodaas.geometry.frames import GeodeticOrigin  # noqa: PLC0415
 
     read = read_plan(plan)

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import math
 import re
+import statistics
+from collections import deque
 from dataclasses import dataclass
 
-__all__ = ["TelloState", "parse_state"]
+from aerodaas.messages.odometry import Battery
+
+__all__ = ["BatteryGauge", "TelloState", "parse_state"]
 
 _NUMBER = re.compile(r" *([+-]?\d{1,9}(?:\.\d{1,9})?) *", re.ASCII)
 
@@ -104,3 +108,26 @@ def _fields(text: str) -> dict[str, float] | None:
             return None
         found[name] = float(number[1])
     return found
+
+
+_WINDOW = 9
+"""Packets, 0.9 s: a reading must hold for half of it before it counts."""
+
+
+class BatteryGauge:
+    """The median of the newest percentages."""
+
+    def __init__(self) -> None:
+        """Start without a reading."""
+        self._percent: deque[int] = deque(maxlen=_WINDOW)
+
+    def add(self, percent: int) -> None:
+        """Add the percentage of one packet, 0 to 100."""
+        self._percent.append(percent)
+
+    @property
+    def battery(self) -> Battery:
+        """Present charge; NaN before the first packet."""
+        if not self._percent:
+            return Battery(float("nan"))
+        return Battery(statistics.median(self._percent) / 100)

@@ -14,7 +14,6 @@ from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite, slowed
 from aerodaas.errors import InvalidWaypointError, VehicleError
-from aerodaas.extensions.tello.battery import BatteryGauge
 from aerodaas.extensions.tello.commands import (
     ENTER,
     LAND,
@@ -29,7 +28,7 @@ from aerodaas.extensions.tello.link import TelloLink
 from aerodaas.extensions.tello.phase import LIFTED, FlightPhase
 from aerodaas.extensions.tello.reckoning import DeadReckoning
 from aerodaas.extensions.tello.settings import TelloSettings, tello_settings, video_port
-from aerodaas.extensions.tello.state import TelloState
+from aerodaas.extensions.tello.state import BatteryGauge, TelloState
 from aerodaas.geometry.braking import limit_length, velocity_towards
 from aerodaas.geometry.frames import Vector, enu_to_body, wrap_angle
 from aerodaas.messages.health import HealthReadings

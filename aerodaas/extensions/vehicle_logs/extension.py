@@ -12,5 +12,5 @@ EXTENSION = Extension(
             "List, fetch and attach the logs that a robot's autopilot keeps.",
         ),
     ),
-    report_sections=("aerodaas.extensions.vehicle_logs.report:log_sections",),
+    report_sections=("aerodaas.extensions.vehicle_logs.plots:log_sections",),
 )

@@ -18,7 +18,7 @@ from autopilot import robot_of
 from emulated import LOOPBACK, Flight, Stepped, free_port, wait_for
 from typing_extensions import Self
 
-from aerodaas.drivers.mavlink.microservices import parameter_backup
+from aerodaas.drivers.mavlink.microservices import fallback
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
@@ -382,7 +382,7 @@ def test_a_journal_that_cannot_be_written_changes_nothing(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(parameter_backup, "write_private", full)
+    monkeypatch.setattr(fallback, "write_private", full)
     with flight(ARDUPILOT, fallback="set").unconnected() as ends:
         with pytest.raises(VehicleError, match=r"so nothing is.*XDG_STATE_HOME"):
             ends.vehicle.connect()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aerodaas.drivers.mavlink.control.guidance import Target
-from aerodaas.drivers.mavlink.control.setpoint import position_message, velocity_message
+from aerodaas.drivers.mavlink.control.steering import position_message, velocity_message
 from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.geometry.frames import GeodeticOrigin, Vector

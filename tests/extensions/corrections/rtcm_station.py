@@ -7,7 +7,7 @@ from types import TracebackType
 
 from typing_extensions import Self
 
-from aerodaas.extensions.corrections.rtcm import crc24q
+from aerodaas.extensions.corrections.corrections import crc24q
 
 __all__ = ["BaseStation", "rtcm"]
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rtcm_station import rtcm
 
-from aerodaas.extensions.corrections.rtcm import LARGEST, RtcmFramer, crc24q, fragments
+from aerodaas.extensions.corrections.corrections import LARGEST, RtcmFramer, crc24q, fragments
 
 # The worked example of RTCM 10403, a reference station's place (message 1005).
 EXAMPLE = bytes.fromhex("D300133ED7D30202980EDEEF34B4BD62AC0941986F33360B98")

@@ -13,8 +13,8 @@ from plan_files import plan
 
 from aerodaas.errors import ConfigError
 from aerodaas.extensions.plans.fences import geofence_of
+from aerodaas.extensions.plans.navigation import read_plan
 from aerodaas.extensions.plans.plan import FenceCircle, FencePolygon
-from aerodaas.extensions.plans.reading import read_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)

@@ -16,7 +16,7 @@ from plan_files import item, lines, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, Waypoint
 from aerodaas.config.sections.actuators import GripperConfig
-from aerodaas.extensions.plans.reading import flown_plan, read_plan
+from aerodaas.extensions.plans.navigation import flown_plan, read_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 
 HOME = GeodeticOrigin(47.0, 8.0, 535.0)

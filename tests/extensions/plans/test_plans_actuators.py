@@ -19,8 +19,8 @@ from aerodaas.config.sections.actuators import (
     ServoConfig,
 )
 from aerodaas.errors import ConfigError
+from aerodaas.extensions.plans.navigation import flown_plan
 from aerodaas.extensions.plans.plan import Plan
-from aerodaas.extensions.plans.reading import flown_plan
 from aerodaas.extensions.plans.waypoints_in import waypoints_of
 from aerodaas.extensions.plans.writing import planned
 from aerodaas.geometry.frames import GeodeticOrigin

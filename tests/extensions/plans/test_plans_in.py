@@ -17,8 +17,8 @@ from plan_files import item, lines, mavwp, plan, survey, waypoint
 from aerodaas import AeroNavigation, HeightReference, WaypointType
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.extensions.plans.commands import command_name
+from aerodaas.extensions.plans.navigation import flown_plan, read_plan
 from aerodaas.extensions.plans.plan import Plan, PlanItem
-from aerodaas.extensions.plans.reading import flown_plan, read_plan
 from aerodaas.extensions.plans.waypoints_in import waypoints_of
 from aerodaas.geometry.frames import GeodeticOrigin
 

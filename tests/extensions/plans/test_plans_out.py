@@ -16,7 +16,7 @@ from plan_files import mavwp
 
 from aerodaas import AeroNavigation, VelocityCommand, Waypoint
 from aerodaas.errors import ConfigError
-from aerodaas.extensions.plans.reading import flown_plan, read_plan
+from aerodaas.extensions.plans.navigation import flown_plan, read_plan
 from aerodaas.geometry.frames import GeodeticOrigin, wrap_angle
 from aerodaas.messages.waypoints import HeightReference, WaypointType
 

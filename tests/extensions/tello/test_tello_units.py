@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.extensions.tello.battery import BatteryGauge
 from aerodaas.extensions.tello.commands import (
     ENTER,
     LAND,
@@ -23,7 +22,7 @@ from aerodaas.extensions.tello.commands import (
     StickScale,
     ports,
 )
-from aerodaas.extensions.tello.state import parse_state
+from aerodaas.extensions.tello.state import BatteryGauge, parse_state
 from tools.tello_vehicle.flight import TelloFlight
 from tools.tello_vehicle.options import TelloOptions
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from aerodaas.errors import AeroDaaSError
 from aerodaas.extensions.plans.commands import command_name
 from aerodaas.extensions.plans.fences import geofence_of
-from aerodaas.extensions.plans.reading import flown_plan, read_plan
+from aerodaas.extensions.plans.navigation import flown_plan, read_plan
 from aerodaas.geometry.frames import GeodeticOrigin
 from tools.fuzz.scratch import scratch_file
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from aerodaas.extensions.ros2.driver.touchdown import Touchdown
+from aerodaas.extensions.ros2.driver.loop import Touchdown
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.vehicle import FlightEnd
 
