@@ -43,8 +43,6 @@ class Shape:
     outline: tuple[_Point, ...]
     """Metres east and north: the corners of an area, the points of a road's or fence's line, the
     middle of a tree."""
-    height: float
-    """Of its highest point, metres."""
     width: float = 0.0
     """Of a road, and of a tree's crown, metres."""
 
@@ -56,7 +54,6 @@ def ground_plan(world: World) -> list[Shape]:
         Shape(
             one.kind,
             tuple((round(east, 2), round(north, 2)) for east, north in one.outline),
-            round(one.height, 2),
             round(one.width, 2),
         )
         for one in shapes
@@ -68,12 +65,11 @@ def _shape(thing: Thing) -> Shape | None:
     if isinstance(spec, Person | Car):
         return None
     if isinstance(spec, Road):
-        return Shape("road", tuple(spec.points), 0.0, spec.width)
+        return Shape("road", tuple(spec.points), spec.width)
     if isinstance(spec, Fence):
-        return Shape("fence", tuple(spec.points), spec.height)
+        return Shape("fence", tuple(spec.points))
     (box,) = thing.boxes(0.0)
-    _, width, height = box.size
     if isinstance(spec, Tree):
-        return Shape("tree", ((thing.x, thing.y),), height, width)
+        return Shape("tree", ((thing.x, thing.y),), box.size[1])
     foot = box.corners[_FOOT, :2].tolist()
-    return Shape(_KINDS[type(spec)], tuple((east, north) for east, north in foot), height)
+    return Shape(_KINDS[type(spec)], tuple((east, north) for east, north in foot))

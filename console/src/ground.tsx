@@ -86,9 +86,9 @@ interface MarksProps {
 function labelled(marks: Mark[], sight: Sight): Set<Mark> {
   const labels = new Labels();
   return new Set(
-    [...marks].reverse().filter(({ what, place: [east, north, up] }) => {
+    [...marks].reverse().filter(({ what, place: [east, north] }) => {
       const half = (LETTER * nameOf(what).length) / 2;
-      return labels.add(sight.x(east) + half, sight.y(north, up), half);
+      return labels.add(sight.x(east) + half, sight.y(north), half);
     }),
   );
 }
@@ -98,7 +98,7 @@ export function MarkLayer({ marks, now, stale, sight }: MarksProps) {
   return (
     <g>
       {marks.map((one) => {
-        const [east, north, up, major, minor, angle] = one.place;
+        const [east, north, , major, minor, angle] = one.place;
         const fresh = 1 - Math.max(0, now - one.time) / KEPT;
         const wide = SIGMAS * sight.view.scale;
         return (
@@ -106,7 +106,7 @@ export function MarkLayer({ marks, now, stale, sight }: MarksProps) {
             key={one.key}
             class={`seen ${stale ? "stale" : ""}`}
             style={{ color: colourOf(one.what), opacity: fresh.toFixed(2) }}
-            transform={`translate(${px(sight.x(east))} ${px(sight.y(north, up))})`}
+            transform={`translate(${px(sight.x(east))} ${px(sight.y(north))})`}
             data-seen={nameOf(one.what)}
             data-east={east}
             data-north={north}
@@ -114,7 +114,7 @@ export function MarkLayer({ marks, now, stale, sight }: MarksProps) {
             <ellipse
               rx={px(wide * major)}
               ry={px(wide * minor)}
-              transform={`scale(1 ${sight.lies}) rotate(${((-angle * 180) / Math.PI).toFixed(1)})`}
+              transform={`rotate(${((-angle * 180) / Math.PI).toFixed(1)})`}
             />
             <circle r="4" />
             {named.has(one) && (

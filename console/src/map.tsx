@@ -105,12 +105,11 @@ export function FlightMap(props: MapProps) {
         ref={box}
         tabIndex={0}
         role="application"
-        aria-label={`Map. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, T tilts the view, M measures, Enter ${enter}.`}
+        aria-label={`Map. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, M measures, Enter ${enter}.`}
         data-testid="map"
         data-scale={sight.view.scale}
         data-east={sight.view.east}
         data-north={sight.view.north}
-        data-tilted={sight.tilted}
         onKeyDown={(event) => {
           const act = keys[event.key];
           if (!act) return;
@@ -156,12 +155,6 @@ export function FlightMap(props: MapProps) {
           />
         )}
         <Key text="Measure" title="Measure distances (M)" pressed={ruler !== null} onClick={measure} />
-        <Key
-          text="Tilt"
-          title="Look from the south, and see heights (T)"
-          pressed={sight.tilted}
-          onClick={view.tilt}
-        />
         <Key text="+" title="Zoom in (+)" onClick={() => view.zoom(ZOOM)} />
         <Key text="−" title="Zoom out (-)" onClick={() => view.zoom(1 / ZOOM)} />
         <Key text="All" title="Show all (0)" onClick={view.showAll} />
@@ -206,13 +199,12 @@ function Listed(props: { name: string; word: string; items: string[] }): Compone
   );
 }
 
-/** A view that is moved, zoomed and tilted, and that follows a drone if asked to. */
+/** A view that is moved and zoomed, and that follows a drone if asked to. */
 function useView(box: RefObject<HTMLDivElement | null>, fitted: readonly Point[], drone: readonly number[] | null) {
   const [size, setSize] = useState<Size>({ width: 600, height: 400 });
   /** Null for the view that shows all. */
   const [own, setOwn] = useState<View | null>(null);
   const [follows, setFollows] = useState(false);
-  const [tilted, setTilted] = useState(false);
   const drag = useRef<{ x: number; y: number; moved: boolean } | null>(null);
   useEffect(() => {
     const element = box.current;
@@ -226,19 +218,18 @@ function useView(box: RefObject<HTMLDivElement | null>, fitted: readonly Point[]
   const whole = useMemo(() => fit(fitted, size), [size, fitted]);
   const [east, north] = (follows && drone) || [];
   const shown = { ...(own ?? whole), ...(east !== undefined && north !== undefined && { east, north }) };
-  const sight = new Sight(shown, size, tilted);
+  const sight = new Sight(shown, size);
   const zoom = (factor: number) =>
     setOwn({ ...shown, scale: Math.min(400, Math.max(0.05, shown.scale * factor)) });
   const pan = (dx: number, dy: number) => {
     setFollows(false);
     const { scale } = shown;
-    setOwn({ scale, east: shown.east - dx / scale, north: shown.north + dy / scale / sight.lies });
+    setOwn({ scale, east: shown.east - dx / scale, north: shown.north + dy / scale });
   };
   const showAll = () => {
     setFollows(false);
     setOwn(null);
   };
-  const tilt = () => setTilted(!tilted);
   const follow = () => setFollows(!follows);
   const keys: Record<string, () => void> = {
     "+": () => zoom(ZOOM),
@@ -246,7 +237,6 @@ function useView(box: RefObject<HTMLDivElement | null>, fitted: readonly Point[]
     "-": () => zoom(1 / ZOOM),
     "0": showAll,
     f: follow,
-    t: tilt,
     ArrowLeft: () => pan(40, 0),
     ArrowRight: () => pan(-40, 0),
     ArrowUp: () => pan(0, 40),
@@ -278,7 +268,7 @@ function useView(box: RefObject<HTMLDivElement | null>, fitted: readonly Point[]
       onPoint(sight.metres(event.clientX - at.left, event.clientY - at.top));
     },
   });
-  return { sight, keys, pointer, zoom, showAll, tilt, follow, follows };
+  return { sight, keys, pointer, zoom, showAll, follow, follows };
 }
 
 function planKey(flight: Flight): string {

@@ -2,7 +2,7 @@
 
 import { useMemo } from "preact/hooks";
 import { type Vehicle, aheadOf, idsOf, placeOf, placesOf, spotOf, type Places } from "./flight";
-import type { LeasedArea, Point, Spot } from "./place";
+import type { LeasedArea, Point } from "./place";
 import { LETTER, LINE, Labels, type Sight, px } from "./sight";
 import type { RobotConfig, RobotStatus } from "./wire";
 
@@ -68,8 +68,7 @@ function Plan({ status, behind, sight }: { status: RobotStatus; behind: Places; 
   return (
     <g>
       <Way status={status} sight={sight} />
-      {sight.tilted && known.map(([id, place]) => <Stem key={id} place={place} sight={sight} />)}
-      {known.map(([id, [east, north, up]]) => {
+      {known.map(([id, [east, north]]) => {
         const number = ahead.indexOf(id);
         const current = id === target?.id;
         const visited = number < 0 && reached.includes(id);
@@ -79,7 +78,7 @@ function Plan({ status, behind, sight }: { status: RobotStatus; behind: Places; 
             key={id}
             class={`waypoint ${kind}`}
             data-waypoint={id}
-            transform={`translate(${sight.x(east)} ${sight.y(north, up)})`}
+            transform={`translate(${sight.x(east)} ${sight.y(north)})`}
           >
             <circle r={current ? 8 : 6} />
             {visited && <path d="M-3 0l2 3 4-6" />}
@@ -91,12 +90,6 @@ function Plan({ status, behind, sight }: { status: RobotStatus; behind: Places; 
       })}
     </g>
   );
-}
-
-/** From the ground to what is above it. */
-function Stem({ place, sight }: { place: Spot; sight: Sight }) {
-  const [east, north, up] = place;
-  return <path class="stem" d={`M${px(sight.x(east))} ${px(sight.y(north))}V${px(sight.y(north, up))}`} />;
 }
 
 interface DronesProps {
@@ -146,9 +139,9 @@ function namePlaces(vehicles: Vehicle[], chosen: string | null, sight: Sight): M
   const found = new Map<string, Shift>();
   for (const one of [...vehicles].sort((first, second) => rank(first) - rank(second))) {
     if (!one.position) continue;
-    const [east, north, up] = one.position;
+    const [east, north] = one.position;
     const half = (LETTER * nameOf(one).join("").length) / 2;
-    const [x, y, { width }] = [sight.x(east), sight.y(north, up), sight.size];
+    const [x, y, { width }] = [sight.x(east), sight.y(north), sight.size];
     // A name is not cut off by the map's edge.
     const dx = x < 0 || x > width ? 0 : Math.max(half - x, Math.min(0, width - half - x));
     const free = NAME_PLACES.find((dy) => labels.add(x + dx, y + dy, half));
@@ -167,24 +160,23 @@ interface DroneProps {
 function Drone({ vehicle, chosen, name, sight }: DroneProps) {
   const { id, status, position, stale } = vehicle;
   if (!position) return null;
-  const [east, north, up] = position;
+  const [east, north] = position;
   const turn = 90 - ((status?.vehicle?.odometry.yaw ?? Math.PI / 2) * 180) / Math.PI;
   const { x: ve, y: vn } = status?.vehicle?.odometry.velocity ?? {};
   const unsure = SIGMAS * (status?.vehicle?.gps?.horizontal_sigma ?? 0) * sight.view.scale;
   const [text, height] = nameOf(vehicle);
   return (
     <>
-      {sight.tilted && <Stem place={position} sight={sight} />}
       <g
         class={`drone ${chosen ? "chosen" : ""} ${stale ? "stale" : ""}`}
-        transform={`translate(${sight.x(east)} ${sight.y(north, up)})`}
+        transform={`translate(${sight.x(east)} ${sight.y(north)})`}
         data-drone={id}
       >
-        {unsure > 0 && <ellipse class="unsure" rx={px(unsure)} ry={px(unsure * sight.lies)} />}
+        {unsure > 0 && <ellipse class="unsure" rx={px(unsure)} ry={px(unsure)} />}
         {ve != null && vn != null && (
-          <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14 * sight.lies}`} />
+          <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14}`} />
         )}
-        <path class="body" d="M0-14L9 10L0 5L-9 10Z" transform={`scale(1 ${sight.lies}) rotate(${turn})`} />
+        <path class="body" d="M0-14L9 10L0 5L-9 10Z" transform={`rotate(${turn})`} />
         <text x={name?.[0]} y={name?.[1]}>
           {text}
           {height && <tspan class="small">{height}</tspan>}
@@ -195,14 +187,14 @@ function Drone({ vehicle, chosen, name, sight }: DroneProps) {
 }
 
 /** Multiples of the grid's step in sight: metres east, and metres north. */
-function gridOf({ size, view, lies }: Sight): [east: number[], north: number[]] {
+function gridOf({ size, view }: Sight): [east: number[], north: number[]] {
   const step = niceStep(70 / view.scale);
   const between = (middle: number, pixels: number) => {
     const half = pixels / 2 / view.scale;
     const [from, to] = [Math.ceil((middle - half) / step), Math.floor((middle + half) / step)];
     return Array.from({ length: Math.max(0, to - from + 1) }, (_, place) => (from + place) * step);
   };
-  return [between(view.east, size.width), between(view.north, size.height / lies)];
+  return [between(view.east, size.width), between(view.north, size.height)];
 }
 
 export function Grid({ sight }: { sight: Sight }) {

@@ -1,17 +1,11 @@
-// What lies below a flight: the simulated world, as walls and crowns where the view is tilted.
+// What lies below a flight: the simulated world.
 
 import { useMemo } from "preact/hooks";
 import { ask, usePolled } from "./connection";
-import type { Point } from "./place";
 import type { Sight } from "./sight";
 import { px } from "./sight";
 import type { SceneryOut, Shape } from "./wire";
 
-/** Where a tree's crown is, as a share of its height. */
-const CROWN = 0.62;
-/** Rungs of a tower, and how much of its foot is left at its top. */
-const RUNGS = 6;
-const TOP = 0.25;
 /** Kinds that lie flat, below all that stands. */
 const FLAT = new Set(["road", "crops"]);
 
@@ -40,92 +34,31 @@ export function SceneryLayer({ shapes, sight }: { shapes: readonly Shape[]; sigh
         ))}
       </g>
     );
-  }, [shapes, east, north, scale, sight.size, sight.tilted]);
+  }, [shapes, east, north, scale, sight.size]);
 }
 
 function Thing({ shape, sight }: { shape: Shape; sight: Sight }) {
-  const { kind, outline, height, width } = shape;
-  const [first] = outline;
+  const { kind, outline, width } = shape;
+  const [first, second, third, fourth] = outline;
   if (!first) return null;
   if (kind === "road") {
     const wide = Math.max(1.5, width * sight.view.scale);
     return <polyline class="road" points={sight.line(outline)} stroke-width={px(wide)} />;
   }
-  if (kind === "fence") {
-    return (
-      <g class="rail">
-        <polyline points={sight.line(outline)} />
-        {sight.tilted && <polyline points={sight.line(outline, height)} />}
-      </g>
-    );
+  if (kind === "fence") return <polyline class="rail" points={sight.line(outline)} />;
+  if (kind === "tree") {
+    const radius = px((width / 2) * sight.view.scale);
+    return <circle class="tree" cx={px(sight.x(first[0]))} cy={px(sight.y(first[1]))} r={radius} />;
   }
-  if (kind === "tree") return <Tree place={first} height={height} width={width} sight={sight} />;
-  if (kind === "tower") return <Tower foot={outline} height={height} sight={sight} />;
   return (
     <g class={kind}>
       <polygon points={sight.line(outline)} />
-      {sight.tilted &&
-        walls(outline).map(([from, to], number) => (
-          <polygon
-            key={number}
-            class="wall"
-            points={`${sight.line([from, to])} ${sight.line([to, from], height)}`}
-          />
-        ))}
-      {sight.tilted && <polygon class="roof" points={sight.line(outline, height)} />}
-    </g>
-  );
-}
-
-/** The sides of an area that look south, towards the viewer; its corners go counter-clockwise. */
-function walls(outline: readonly Point[]): [Point, Point][] {
-  return outline
-    .map((from, place): [Point, Point] => [from, outline[(place + 1) % outline.length] ?? from])
-    .filter(([from, to]) => to[0] > from[0]);
-}
-
-function Tree(props: { place: Point; height: number; width: number; sight: Sight }) {
-  const { place, height, width, sight } = props;
-  const [east, north] = place;
-  const [x, crown] = [sight.x(east), sight.y(north, CROWN * height)];
-  return (
-    <g class="tree">
-      {sight.tilted && <path class="trunk" d={`M${px(x)} ${px(sight.y(north))}V${px(crown)}`} />}
-      <circle cx={px(x)} cy={px(crown)} r={px((width / 2) * sight.view.scale)} />
-    </g>
-  );
-}
-
-function Tower({ foot, height, sight }: { foot: readonly Point[]; height: number; sight: Sight }) {
-  const [a, b, c, d] = foot;
-  if (!a || !b || !c || !d) return null;
-  const middle: Point = [(a[0] + c[0]) / 2, (a[1] + c[1]) / 2];
-  const ring = (share: number) => {
-    const left = 1 - (1 - TOP) * share;
-    return foot.map(
-      ([east, north]): Point => [
-        middle[0] + left * (east - middle[0]),
-        middle[1] + left * (north - middle[1]),
-      ],
-    );
-  };
-  const shares = sight.tilted ? Array.from({ length: RUNGS + 1 }, (_, n) => n / RUNGS) : [0];
-  const [top] = ring(1);
-  return (
-    <g class="tower">
-      {shares.map((share) => (
-        <polygon key={share} points={sight.line(ring(share), share * height)} />
-      ))}
-      {sight.tilted && top
-        ? foot.map((corner, place) => (
-            <polyline
-              key={place}
-              points={`${sight.line([corner])} ${sight.line([ring(1)[place] ?? top], height)}`}
-            />
-          ))
-        : [[a, c], [b, d]].map((pair, place) => (
-            <polyline key={place} points={sight.line(pair as [Point, Point])} />
-          ))}
+      {kind === "tower" && second && third && fourth && (
+        <>
+          <polyline points={sight.line([first, third])} />
+          <polyline points={sight.line([second, fourth])} />
+        </>
+      )}
     </g>
   );
 }

@@ -1,4 +1,4 @@
-// How the map looks at the ground: from straight above, or tilted, from the south.
+// How the map looks at the ground: from straight above.
 
 import type { Point, Spot } from "./place";
 
@@ -17,48 +17,31 @@ export interface Size {
 /** Pixels of a label's letter across and of its line. */
 export const LETTER = 7;
 export const LINE = 13;
-/** Of the tilted view: how far 57° from the zenith shortens what lies, and lets stand what stands. */
-const LIES = 0.55;
-const STANDS = Math.sqrt(1 - LIES * LIES);
 
-/** An orthographic view: east is right, north is up, and in the tilted one, up is up, too. */
+/** A view from straight above: east is right, north is up. */
 export class Sight {
-  /** Pixels on the screen of a pixel's length towards north. */
-  readonly lies: number;
-  private readonly stands: number;
-
   constructor(
     readonly view: View,
     readonly size: Size,
-    readonly tilted: boolean,
-  ) {
-    this.lies = tilted ? LIES : 1;
-    this.stands = tilted ? STANDS : 0;
-  }
+  ) {}
 
   x(east: number): number {
     return this.size.width / 2 + (east - this.view.east) * this.view.scale;
   }
 
-  y(north: number, up = 0): number {
-    const shown = (north - this.view.north) * this.lies + up * this.stands;
-    return this.size.height / 2 - shown * this.view.scale;
+  y(north: number): number {
+    return this.size.height / 2 - (north - this.view.north) * this.view.scale;
   }
 
-  /** The place on the ground below a pixel. */
+  /** The place at a pixel. */
   metres(px: number, py: number): Point {
     const { east, north, scale } = this.view;
-    return [
-      east + (px - this.size.width / 2) / scale,
-      north - (py - this.size.height / 2) / scale / this.lies,
-    ];
+    return [east + (px - this.size.width / 2) / scale, north - (py - this.size.height / 2) / scale];
   }
 
-  /** Points of an SVG line; those without a height lie at `up`. */
-  line(points: readonly (Point | Spot)[], up = 0): string {
-    return points
-      .map(([east, north, own]) => `${px(this.x(east))},${px(this.y(north, own ?? up))}`)
-      .join(" ");
+  /** Points of an SVG line. */
+  line(points: readonly (Point | Spot)[]): string {
+    return points.map(([east, north]) => `${px(this.x(east))},${px(this.y(north))}`).join(" ");
   }
 }
 

@@ -136,7 +136,7 @@ export function TileLayer({ tiles, archive, sight }: TileLayerProps) {
         })}
       </g>
     ),
-    [tiles, archive, east, north, scale, sight.size, sight.tilted],
+    [tiles, archive, east, north, scale, sight.size],
   );
 }
 

@@ -32,7 +32,6 @@ def test_each_thing_is_where_its_box_is(name: str, seed: int) -> None:
     boxes = [one for one in world.boxes(0.0) if one.label not in {*MOVING, "fence"}]
     assert len(shapes) == len(boxes)
     for shape, box in zip(shapes, boxes, strict=True):
-        assert shape.height == pytest.approx(box.size[2], abs=CENTIMETRE)
         middle = [sum(axis) / len(shape.outline) for axis in zip(*shape.outline, strict=True)]
         assert middle == pytest.approx(box.centre[:2], abs=CENTIMETRE)
         if shape.kind == "tree":
@@ -45,7 +44,7 @@ def test_each_thing_is_where_its_box_is(name: str, seed: int) -> None:
 
 
 def test_roads_and_fences_are_lines_and_nobody_is_shown() -> None:
-    """As wide as they are, with their height."""
+    """As wide as they are."""
     scenario = Scenario.model_validate(
         {
             "name": "street",
@@ -58,7 +57,7 @@ def test_roads_and_fences_are_lines_and_nobody_is_shown() -> None:
         }
     )
     shapes = ground_plan(World(scenario))
-    assert [(one.kind, one.outline, one.height, one.width) for one in shapes] == [
-        ("road", ((0, 0), (5, 0)), 0.0, 3.0),
-        ("fence", ((0, 2), (5, 2)), 1.5, 0.0),
+    assert [(one.kind, one.outline, one.width) for one in shapes] == [
+        ("road", ((0, 0), (5, 0)), 3.0),
+        ("fence", ((0, 2), (5, 2)), 0.0),
     ]
