@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copyreg
 import dataclasses
 import enum
 from collections import OrderedDict
@@ -50,10 +49,6 @@ class Finding:
     values: dict[str, Any] = field(default_factory=dict)
 
 
-class Grown(Finding):
-    """A class derived from another, with an attribute that only some objects have."""
-
-
 class Slotted:
     """A class without a `__dict__`."""
 
@@ -66,35 +61,6 @@ class Slotted:
         return isinstance(other, Slotted) and other.value == self.value
 
     __hash__ = None  # type: ignore[assignment]
-
-
-class Told:
-    """A class that says how it is pickled."""
-
-    def __init__(self, value: int) -> None:
-        self.value, self.untold = value, object()
-
-    def __reduce__(self) -> tuple[type[Told], tuple[int]]:
-        return Told, (self.value,)
-
-
-class Mixed(Slotted):
-    """A class with both, a slot and a `__dict__`."""
-
-
-class Registered:
-    """A class for which pickle's registry knows what to do."""
-
-    def __init__(self, value: int) -> None:
-        self.value = value
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Registered) and other.value == self.value
-
-    __hash__ = None  # type: ignore[assignment]
-
-
-copyreg.pickle(Registered, lambda one: (Registered, (one.value + 1,)))
 
 
 class Numbers(list[int]):
@@ -213,17 +179,10 @@ def test_what_comes_back_is_what_went(item: object) -> None:
     assert _same(_there_and_back(item), item)
 
 
-def _grown() -> Grown:
-    grown = Grown(1)
-    object.__setattr__(grown, "extra", (2, Colour.BLUE))
-    return grown
-
-
 @pytest.mark.parametrize(
     "item",
     [
         Slotted(3),
-        Mixed(3),
         Numbers([1, 2]),
         OrderedDict(b=1, a=2),
         Fraction(1, 3),
@@ -241,32 +200,6 @@ def test_an_object_of_any_class_arrives(item: Any) -> None:  # noqa: ANN401 - an
     assert type(found) is type(item)
     if not isinstance(item, ValueError) and not callable(item):
         assert np.array_equal(found, item) if isinstance(item, np.ndarray) else found == item
-
-
-def test_a_class_that_says_how_it_is_pickled_is_asked() -> None:
-    """What it leaves out stays out."""
-    assert _there_and_back(Told(4)).value == 4
-
-
-def test_a_class_in_pickles_registry_is_made_as_that_says() -> None:
-    """Here with a number more."""
-    assert _there_and_back(Registered(4)) == Registered(5)
-
-
-def test_attributes_beyond_those_of_the_class_arrive() -> None:
-    """All that an object holds is told."""
-    found = _there_and_back(_grown())
-    assert type(found) is Grown
-    assert vars(found) == vars(_grown())
-
-
-def test_an_item_that_contains_itself_arrives() -> None:
-    """Pickle knows what it has met."""
-    item: list[Any] = [1]
-    item.append(item)
-    found = _there_and_back(item)
-    assert found[0] == 1
-    assert found[1] is found
 
 
 def test_navigation_arrives_as_it_was() -> None:

@@ -156,17 +156,20 @@ def _frame(number: int, stamp: int) -> Message[Frame]:
     ("edge_time", "patience"), [(10, 1000), (250, 1000), (251, 1004), (3000, 12_000)]
 )
 def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patience: int) -> None:
-    """But a second at least, for a first inference takes longer; milliseconds."""
+    """But a second at least, for a first inference takes longer; it is back once it answers."""
     dispatcher = _dispatcher(Dems(), edge_time)
     host = Hand()
     dispatcher.open(host)
     dispatcher.start(SimulatedClock())
     tasks = dispatcher.step(0, [_frame(0, 0)])
-    assert task_stream("m") in {message.stream for message in tasks}
     for milliseconds, alerts in ((patience, []), (patience + 1, ["executor_lost"])):
         host.time = milliseconds * MILLISECOND
         dispatcher.step(host.time, [])
         assert [alert.kind for alert in host.alerts] == alerts
+    [task] = [message for message in tasks if message.stream == task_stream("m")]
+    late = Outlet(done_stream("m")).derive(1, task, 0, host.time)
+    dispatcher.step(host.time, [late])
+    assert [alert.kind for alert in host.alerts] == ["executor_lost", "executor_back"]
     dispatcher.close()
 
 

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import time
 from collections.abc import Callable
 from functools import partial
 
 import pytest
-from analyses import ProcessId
-from flying import FLAT, Flyer, recorded, robot
-from one_drone import drone_of, long, odometry_of, short, state_of
+from flying import Flyer, recorded
+from one_drone import drone_of, long, odometry_of, short
 
 from aerodaas import Environment, Odometry
-from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.errors import GraphError, MissionError
-from aerodaas.messages.mission import MissionState
 
 pytestmark = pytest.mark.wall_clock
 
@@ -100,44 +95,3 @@ def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:
     assert max(item.height for item in pushed) > 1.0
     with pytest.raises(MissionError, match="no longer flying"):
         drone_of(env).end_mission()
-
-
-@pytest.mark.usefixtures("reads")
-def test_poll_gives_the_newest(flyer: Flyer) -> None:
-    """However long nobody asked, the item is a fresh one; asked twice, there is still one."""
-    with flyer.flying(long, speed=SPEED) as env:
-        sensor = drone_of(env).get_sensor_by_id("odom_drone")
-        assert sensor.poll(5.0).height < 1.0
-        eventually(lambda: state_of(env) is MissionState.LOITERING)
-        time.sleep(1.0)
-        assert sensor.poll(0.0).height > 1.0
-        assert sensor.poll(0.0).height > 1.0
-        drone_of(env).end_mission()
-
-
-@pytest.mark.slow
-def test_an_analysis_that_dies_is_restarted(flyer: Flyer) -> None:
-    """SIGKILL of an analysis' process: it works again in a new one; the drone flies on, watched."""
-    results: dict[str, AeroStreamData[int]] = {}
-
-    def build(env: Environment) -> None:
-        long(env)
-        work = ProcessId(str(flyer.folder / "opened"))
-        results["pid"] = work.analyse(odometry_of(env))
-
-    with flyer.flying(build, {**FLAT, "robots": [robot()]}, speed=1.0) as env:
-        first = results["pid"].get_data(30.0)
-        os.kill(first, signal.SIGKILL)
-        eventually(lambda: state_of(env) is not None and newest(results["pid"]) not in {0, first})
-        drone_of(env).end_mission()
-    flight = recorded(env.launch())
-    assert flight.robots["drone"].outcome.startswith("landed: ")
-    assert [kind for _, kind, _ in flight.alerts] == ["actor_lost", "actor_back"]
-
-
-def newest(stream: AeroStreamData[int]) -> int:
-    """The next item, 0 if there is none at present."""
-    try:
-        return stream.get_data(0.2)
-    except TimeoutError:
-        return 0

@@ -48,13 +48,3 @@ def test_only_a_pause_between_two_beats_counts(monkeypatch: pytest.MonkeyPatch) 
     now += 7.0
     pulse.beat()
     assert pulse.frozen == 7.0
-
-
-def test_a_pause_since_the_last_beat_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process is stopped anywhere, also while it waits for an actor's answer."""
-    now = 100.0
-    monkeypatch.setattr("aerodaas.actors.run.losses.time.monotonic", lambda: now)
-    pulse = SuspensionMonitor()
-    pulse.beat()
-    now += 9.0
-    assert pulse.frozen == 9.0

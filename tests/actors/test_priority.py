@@ -11,7 +11,6 @@ import threading
 
 import pytest
 
-from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.priority import SWITCH, punctual
 
 
@@ -85,31 +84,3 @@ def test_garbage_waits_while_a_loop_is_punctual(monkeypatch: pytest.MonkeyPatch)
     assert gc.isenabled()
     assert sys.getswitchinterval() == interval
     assert os.sched_getscheduler(0) == scheduling
-
-
-def test_messages_are_published_in_order_by_another_thread() -> None:
-    """At once and here before it is started and after it is closed."""
-    publisher, seen = BackgroundPublisher(), []
-    publisher.do(lambda: seen.append((0, threading.get_ident())))
-    publisher.start()
-    for number in range(1, 4):
-        publisher.do(lambda number=number: seen.append((number, threading.get_ident())))  # type: ignore[misc]
-    publisher.do(lambda: 1 // 0)
-    publisher.do(lambda: seen.append((4, threading.get_ident())))
-    publisher.close()
-    publisher.do(lambda: seen.append((5, threading.get_ident())))
-    assert [number for number, _ in seen] == [0, 1, 2, 3, 4, 5]
-    here = threading.get_ident()
-    assert [thread == here for _, thread in seen] == [True, False, False, False, False, True]
-
-
-def test_a_publisher_that_is_stuck_never_makes_the_loop_wait() -> None:
-    """The newest are dropped, and counted."""
-    publisher, stuck = BackgroundPublisher(), threading.Event()
-    publisher.start()
-    publisher.do(stuck.wait)
-    for _ in range(2000):
-        publisher.do(lambda: None)
-    assert publisher.dropped > 1000
-    stuck.set()
-    publisher.close()

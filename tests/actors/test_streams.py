@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
-import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import ray
-from publishing import child_variables, send
+from publishing import send
 from required import needs
 from stream_reader import Reader, Seen, digest
 
@@ -74,10 +70,10 @@ class Link:
             assert time.monotonic() < deadline
             time.sleep(0.002)
 
-    def take(self, *, keep: bool = False) -> list[Seen]:
+    def take(self) -> list[Seen]:
         """What the reader has got since the last call."""
         self.settle()
-        seen: list[Seen] = ask(self.reader.take.remote(self.stream, keep=keep))
+        seen: list[Seen] = ask(self.reader.take.remote(self.stream))
         return seen
 
 
@@ -161,22 +157,6 @@ def test_a_reader_that_never_reads_harms_nobody(connect: Connect) -> None:
     with_local.close()
 
 
-def test_pictures_kept_by_a_reader_stay_as_they_were(connect: Connect) -> None:
-    """A reader may keep as many pictures as it likes; later ones neither spoil nor stop them."""
-    link = connect(depth=4)
-    rng = np.random.default_rng(1)
-    published = []
-    for stamp in range(40):
-        image = rng.integers(0, 255, (180, 320, 3), dtype=np.uint8)
-        frame = Frame(Header(stamp, stamp, "camera"), image)
-        link.publish(stamp, frame)
-        published.append(digest(frame))
-        image[:] = 0  # a camera may write its next picture into the same memory
-        assert [one.seq for one in link.take(keep=True)] == [stamp]
-    assert ask(link.reader.kept.remote(link.stream)) == published
-    assert ask(link.reader.close.remote(link.stream)) == published
-
-
 @pytest.mark.parametrize("shape", [(16, 16, 3), (720, 1280, 3), (2160, 3840, 3)])
 def test_frames_of_any_size_pass(connect: Connect, shape: tuple[int, int, int]) -> None:
     """A stream takes small and large frames, one after the other."""
@@ -187,29 +167,6 @@ def test_frames_of_any_size_pass(connect: Connect, shape: tuple[int, int, int]) 
         link.publish(stamp, frame)
         (seen,) = link.take()
         assert seen.digest == digest(frame)
-
-
-def test_a_reader_that_leaves_harms_nobody(connect: Connect) -> None:
-    """The publisher goes on after a reader has closed its subscriber."""
-    link = connect(depth=2)
-    leaving = Subscriber(link.publisher.scope, {link.stream: 2})
-    link.publish(0, "a")
-    leaving.close()
-    link.publish(1, "b")
-    assert [one.seq for one in link.take()] == [0, 1]
-
-
-def test_many_readers_see_the_same() -> None:
-    """Every reader gets every message."""
-    scope = f"test/{uuid.uuid4().hex[:8]}"
-    publisher = Publisher(scope, "s")
-    readers = [Subscriber(scope, {"s": 8}) for i in range(12)]
-    for stamp in range(5):
-        send(publisher, stamp, Header(stamp, stamp, "c"), 0)
-    for subscriber in readers:
-        assert [message.item for message in subscriber.receive(0)] == list(range(5))
-        subscriber.close()
-    publisher.close()
 
 
 def test_one_subscriber_keeps_the_order_in_which_its_streams_were_named() -> None:
@@ -240,89 +197,6 @@ def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
     assert [message.item for message in subscriber.receive(60.0)] == ["x"]
     subscriber.wake()
     assert subscriber.receive(60.0) == []
-    subscriber.close()
-
-
-_VICTIM = """
-import sys, time
-from aerodaas.actors.streams import Subscriber
-subscriber = Subscriber(sys.argv[1], {"s": 64})
-print("ready", flush=True)
-kept = []
-while True:
-    kept += subscriber.receive(1.0)
-    if len(kept) > 3:
-        print("full", flush=True)
-        time.sleep(600)
-"""
-
-
-def test_a_reader_that_is_killed_harms_nobody() -> None:
-    """SIGKILL of readers that hold messages: the publisher and the other readers go on."""
-    scope = f"test/{uuid.uuid4().hex[:8]}"
-    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 4})
-    root = Path(__file__).resolve().parents[2]
-    image = np.zeros((360, 640, 3), np.uint8)
-    stamp = 0
-
-    def publish(times: int) -> None:
-        nonlocal stamp
-        for _ in range(times):
-            send(publisher, Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
-            stamp += 1
-            assert [message.seq for message in subscriber.receive(0)] == [stamp - 1]
-
-    for round_ in range(3):
-        command = [sys.executable, "-c", _VICTIM, scope, str(round_)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root) as victim:
-            assert victim.stdout is not None
-            assert victim.stdout.readline() == "ready\n"
-            publish(8)
-            assert victim.stdout.readline() == "full\n"
-            victim.send_signal(signal.SIGKILL)
-            victim.wait()
-        publish(100)
-    assert subscriber.dropped == {"s": 0}
-    subscriber.close()
-    publisher.close()
-
-
-_PUBLISHER = """
-import sys, time
-from publishing import send
-from aerodaas.actors.streams import Publisher
-from aerodaas.messages.frames import Header
-publisher = Publisher(sys.argv[1], "s")
-sys.stdin.readline()
-for stamp in range(5):
-    send(publisher, stamp, Header(stamp, stamp, "c"), 0)
-print("sent", flush=True)
-time.sleep(600)
-"""
-
-
-def test_a_publisher_that_is_killed_and_returns_is_read_again() -> None:
-    """A restarted actor's stream goes on for those who read the one that died."""
-    scope = f"test/{uuid.uuid4().hex[:8]}"
-    subscriber = Subscriber(scope, {"s": 8})
-    for _ in range(2):
-        command = [sys.executable, "-c", _PUBLISHER, scope]
-        with subprocess.Popen(
-            command,
-            text=True,
-            env=child_variables(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-        ) as process:
-            assert process.stdin is not None
-            assert process.stdout is not None
-            process.stdin.write("go\n")
-            process.stdin.flush()
-            assert process.stdout.readline() == "sent\n"
-            assert [message.item for message in subscriber.receive(5.0)] == list(range(5))
-            process.kill()
-            process.wait()
-    assert subscriber.dropped == {"s": 0}
     subscriber.close()
 
 

@@ -11,7 +11,6 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.geometry.braking import braking_speed
 from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.geometry.free_path import free_path
 from aerodaas.messages.waypoints import Waypoint
@@ -80,13 +79,6 @@ def test_the_meter_scales_what_it_sees() -> None:
     assert worn.way_home(away, HOME, 2.0) == pytest.approx(
         worn.scale * model.way_home(away, HOME, 2.0)
     )
-
-
-@given(st.floats(0, 100), st.floats(0.5, 10), st.floats(0, 1))
-def test_braking_speed_stops_in_time(distance: float, deceleration: float, reaction: float) -> None:
-    """Flying on for the reaction time and then braking uses the distance up, exactly."""
-    speed = braking_speed(distance, deceleration, reaction)
-    assert speed * reaction + speed**2 / (2 * deceleration) == pytest.approx(distance, abs=1e-6)
 
 
 def test_free_path_is_the_shortest_way_round() -> None:

@@ -23,7 +23,6 @@ from ray.cluster_utils import Cluster
 from scripted import RemoteUser, free_port
 
 from aerodaas import AeroNavigation, Environment, NavigationType, TrajectoryScheduler
-from aerodaas.actors.cluster.ray_process import VARIABLE
 from aerodaas.environment.run import Run
 from aerodaas.errors import MissionError
 from aerodaas.recording.reader import Recording
@@ -304,28 +303,6 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
         pass
     assert len(actors) == 2
     assert wait_for(lambda: gone(actors), 60.0)
-    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
-        assert recording.complete
-        flight = RecordedFlight.read(recording)
-    assert landed_at_home(flight)
-    assert "the application's process is gone" in alerts(flight)["application_lost"]
-
-
-@pytest.mark.slow
-def test_application_killed_on_one_machine(flyer: Flyer) -> None:
-    """The drone comes home and lands, the recording is closed, and then nothing is left."""
-    port = free_port()
-    application = start_application(flyer, port)
-    user = RemoteUser(port, lambda _: None)
-    user.until(lambda status: status.mission.distance > 20.0)
-    left = set(psutil.Process(application.pid).children(recursive=True))
-    folders = {Path(one.environ()[VARIABLE]) for one in left if VARIABLE in one.environ()}
-    application.kill()
-    application.wait()
-    assert len(left) > 4
-    assert len(folders) == 1
-    assert wait_for(lambda: gone(left), 60.0)
-    assert not any(folder.exists() for folder in folders)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
         flight = RecordedFlight.read(recording)

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
 from faulty import Forward
-from flying import FLAT, Flyer, flight_of, hop, recorded, robot
+from flying import FLAT, Flyer, flight_of, hop, robot
 from required import needs_root
 
 from aerodaas import AeroNavigation, Environment, NavigationType
 from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
 from aerodaas.actors.run import flight
 from aerodaas.actors.run.actor_state import ask
-from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.environment.run import Run
 from aerodaas.errors import MissionError
 from aerodaas.messages.mission import MissionState
@@ -83,16 +80,6 @@ def alerts(flight: RecordedFlight) -> dict[str, list[str]]:
     for _, kind, text in flight.alerts:
         found[kind].append(text)
     return found
-
-
-@contextmanager
-def frozen(process: psutil.Process) -> Iterator[None]:
-    """Stop a process without its knowing, and let it go on when left."""
-    process.send_signal(signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        process.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.slow
@@ -161,79 +148,6 @@ def test_the_orphan_reaper_outlives_its_host(flyer: Flyer, monkeypatch: pytest.M
         until(run, lambda: flown._reaper != reaper)
         assert not ask(flown._call_reaper("ending"), 20.0)
         env.get_robot_by_id("drone").end_mission()
-
-
-def managed(scheduler: str) -> Callable[[Environment], None]:
-    """One analysis of 20 ms under a scheduler of this name."""
-
-    def build(env: Environment) -> None:
-        env.set_analytics_scheduler(scheduler)
-        drone = env.get_robot_by_id("drone")
-        model = SyntheticAnalytics("model", 20.0, 20.0)
-        model.deploy(env.get_compute_resource_by_id("edge"))
-        model.analyse(drone.get_sensor_by_id("cam").get_data_stream())
-        drone.navigate(hop((2, 0), hover=900))
-
-    return build
-
-
-def done(run: Run) -> int:
-    """Tasks that were done in time so far."""
-    outcomes = run.poll().reports["dispatcher"].values.get("outcomes", {})
-    return int(outcomes.get("done", 0))
-
-
-@pytest.mark.slow
-def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
-    """It is lost after four times what it should take, not for good, and used once it goes on."""
-    task = {"benefit": 10, "deadline": 1000, "edge_time": 50}
-    content = with_camera(schedulers={"tasks": {"model": task}})
-    with flyer.flying(managed("edf"), content, speed=1.0) as env:
-        run = env.launch()
-        until(run, lambda: done(run) > 5)
-        with frozen(process_of(run, "analytics/edge")):
-            until(run, lambda: bool(run.poll().reports["dispatcher"].values.get("edge_down")), 20.0)
-        before = done(run)
-        until(run, lambda: done(run) > before + 5)
-        env.get_robot_by_id("drone").end_mission()
-    told = alerts(recorded(run))
-    assert "drone/model does not answer on the edge" in told["executor_lost"]
-    assert "drone/model is back on the edge" in told["executor_back"]
-    assert "actor_lost" not in told
-
-
-def cloud_executor() -> psutil.Process:
-    """The one executor that stands for the cloud on this machine."""
-    found = []
-    for one in psutil.Process().children(recursive=True):
-        with contextlib.suppress(psutil.NoSuchProcess):  # of another test, and ending
-            if " ".join(one.cmdline()).startswith("ray::CloudExecutor"):
-                found.append(one)
-    assert len(found) == 1
-    return found[0]
-
-
-@pytest.mark.slow
-def test_an_executor_in_the_cloud_is_frozen(flyer: Flyer) -> None:
-    """Lost by what was expected of it, seconds before a time-out; probed, and used again."""
-    task = {"benefit": 10, "deadline": 1000, "cloud_time": 50, "cloud_cost": 1, "edge_time": 50}
-    clouds = [{"id": "edge"}, {"id": "cloud", "kind": "cloud"}]
-    content = with_camera(compute=clouds, schedulers={"tasks": {"model": task}})
-    with flyer.flying(managed("cld"), content, speed=1.0) as env:
-        run = env.launch()
-        until(run, lambda: done(run) > 5)
-        with frozen(cloud_executor()):
-            until(
-                run,
-                lambda: run.poll().reports["dispatcher"].values.get("cloud_slots") == 0,
-                20.0,
-            )
-        before = done(run)
-        until(run, lambda: done(run) > before + 5)
-        env.get_robot_by_id("drone").end_mission()
-    told = alerts(recorded(run))
-    assert any("the cloud is gone" in text for text in told["cloud_lost"])
-    assert "the cloud answers again" in told["cloud_back"]
 
 
 _SURVEY = """
