@@ -120,12 +120,6 @@ def test_the_cloud_queue_keeps_order_and_gives_up_at_the_latest_start() -> None:
     assert [r.task.id for r in scheduler.heard] == [0, 2, 1]
 
 
-def test_what_never_ran_costs_nothing() -> None:
-    """Whatever its end is called."""
-    one = Result(_task(0), TaskOutcome.FAILED, TaskPlace.NOWHERE, 5, 5)
-    assert one.utility == 0
-
-
 def test_results_after_the_deadline_are_late_and_cost_their_price() -> None:
     """A late result earns nothing; its cost stays."""
     dispatch, host = _dispatch_of(_Scripted(lambda t, _: SendToCloud(t)))
@@ -341,15 +335,6 @@ def test_a_scheduler_is_told_the_time_of_each_event_and_of_idleness_only_with_wo
         *[("arrived", 4), ("timer", 5), ("finished 0", 6), ("finished 2", 7), ("idle", 7)],
     ]
     assert [(r.task.id, r.started, r.finished) for r in host.results] == [(0, 1, 6), (2, 4, 7)]
-
-
-def test_a_dropped_task_ran_nowhere() -> None:
-    """Neither place is to blame, and it ended when it was given up."""
-    dispatch, host = _dispatch_of(_Scripted(lambda t, _: Drop(t)))
-    dispatch.arrived(_task(0), 3)
-    (end,) = host.results
-    assert (end.outcome, end.place) == (TaskOutcome.DROPPED, TaskPlace.NOWHERE)
-    assert (end.started, end.finished) == (3, 3)
 
 
 @pytest.mark.parametrize(("at", "place"), [(80, "cloud"), (81, "nowhere")])
