@@ -57,41 +57,6 @@ class SurveyCamera:
             if value is not None and not value > 0.0:
                 raise SchedulerError(f"a camera's {what} must be positive, not {value}")
 
-    @classmethod
-    def of_sensor(
-        cls,
-        focal_length: float,
-        sensor: tuple[float, float],
-        *,
-        front_overlap: float = 0.75,
-        side_overlap: float = 0.65,
-        gimbal: bool = True,
-        pixels: int | None = None,
-        interval: float | None = None,
-    ) -> SurveyCamera:
-        """Describe a camera by its data sheet.
-
-        Args:
-            focal_length: Millimetres.
-            sensor: Width and height of its sensor, millimetres.
-            front_overlap: Share that a picture has in common with the next one, 0 to less than 1.
-            side_overlap: Share that it has in common with those of the next strip, 0 to less than
-                1.
-            gimbal: Whether a gimbal is to be turned straight down.
-            pixels: Width of its picture; None where it is not known.
-            interval: Shortest time between two pictures, seconds; None where it is not known.
-
-        Raises:
-            SchedulerError: If a length is not positive.
-        """
-        width, height = sensor
-        if not (focal_length > 0.0 and width > 0.0 and height > 0.0):
-            raise SchedulerError(
-                f"focal length and sensor are in mm and positive, not {focal_length} and {sensor}"
-            )
-        fov = 2.0 * math.atan2(width, 2.0 * focal_length)
-        return cls(fov, width / height, front_overlap, side_overlap, gimbal, pixels, interval)
-
     def footprint(self, height: float) -> tuple[float, float]:
         """Width and depth in metres of the ground that it sees from `height` metres above it."""
         width = 2.0 * height * math.tan(self.horizontal_fov / 2.0)
