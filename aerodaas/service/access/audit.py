@@ -23,7 +23,6 @@ _MOST = 1_000_000
 _TRIM_EVERY = 1000
 """Entries after which those beyond the most are dropped."""
 _MOST_LATE = 1000
-_MOST_SHOWN = 1000
 
 
 class Audit:
@@ -102,17 +101,9 @@ class Audit:
         said, accepted = answer.text, answer.accepted
         self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)
 
-    def newest(self, limit: int = 100, tenant: str | None = None) -> list[AuditEntry]:
-        """The newest entries of a tenant, or of all, newest first.
-
-        Args:
-            limit: Most entries, 0 to 1000.
-            tenant: Name of the tenant; None for all.
-
-        Raises:
-            StoreError: If the database does not answer.
-        """
-        return self._store.audit.all(tenant, min(max(limit, 0), _MOST_SHOWN))
+    def newest(self, limit: int) -> list[AuditEntry]:
+        """The newest entries, at most `limit`, newest first; raises StoreError."""
+        return self._store.audit.newest(limit)
 
 
 def _bounded(text: str, longest: int) -> str:

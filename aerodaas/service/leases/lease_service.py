@@ -19,13 +19,14 @@ from aerodaas.service.access.quotas import Quotas
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet.fleet_registry import FleetRegistry
 from aerodaas.service.leases.lease_table import Candidate, Fleet, LeaseBook
-from aerodaas.service.store import Lease, Mission, Store
+from aerodaas.service.store import Lease, LeaseEnd, Mission, Store
 
 __all__ = ["LeaseService"]
 
 _SET_SECONDS = 0.1
 """Least seconds by which the wall clock counts as set."""
 _OFFSET = TypeAdapter(WallOffset)
+_GIVEN_BACK = "given back"
 
 
 class LeaseService:
@@ -114,13 +115,7 @@ class LeaseService:
         Raises:
             RefusedError: If it cannot be fulfilled, or a quota is used up.
         """
-        now = self.now()
-        self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
-        lease, changed = self._book.request(
-            wish, principal.tenant, principal.account, now, self._fleet()
-        )
-        self._announce(changed)
-        return self.lease(lease.id)
+        return self._request(principal.tenant, principal.account, wish)
 
     def require_quota(self, tenant: str, minutes: float, *, cloud: bool = False) -> None:
         """Check that a tenant may have further flight.
@@ -139,13 +134,13 @@ class LeaseService:
 
     def for_mission(self, mission: Mission) -> Lease:
         """Ask for the drones of a mission that brought no lease; raises RefusedError."""
-        minutes = float(mission.request["minutes"])
-        # Others were submitted as well before any of them had a lease, which alone counts.
-        self.require_quota(mission.tenant, minutes * len(mission.robots))
-        wish = LeaseIn(robots=list(mission.robots), minutes=minutes)
-        lease, changed = self._book.request(
-            wish, mission.tenant, mission.account, self.now(), self._fleet()
-        )
+        wish = LeaseIn(robots=list(mission.robots), minutes=float(mission.request["minutes"]))
+        return self._request(mission.tenant, mission.account, wish)
+
+    def _request(self, tenant: str, account: str, wish: LeaseIn) -> Lease:
+        # Missions may have been submitted before any of them had a lease, which alone counts.
+        self.require_quota(tenant, wish.minutes * len(wish.robots or [""]))
+        lease, changed = self._book.request(wish, tenant, account, self.now(), self._fleet())
         self._announce(changed)
         return self.lease(lease.id)
 
@@ -229,20 +224,19 @@ class LeaseService:
         """
         found = self.seen(principal, lease)
         if found.tenant == principal.tenant and principal.role.reaches(Role.PILOT):
-            changed = self._book.give_back(lease, self.now(), self._fleet())
+            end, reason = LeaseEnd.GIVEN_BACK, _GIVEN_BACK
         elif principal.role.reaches(Role.OPERATOR):
-            reason = f"revoked by {principal.account}"
-            changed = self._book.revoke(lease, reason, self.now(), self._fleet())
+            end, reason = LeaseEnd.REVOKED, f"revoked by {principal.account}"
         else:
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
-        self._announce(changed)
+        self._end(lease, end, reason)
         return self.lease(lease)
 
     def give_back(self, mission: Mission) -> None:
         """Give back the lease that was asked for with a mission, once that is over."""
         own = mission.request.get("lease") is None
         if own and mission.lease is not None and self._book.get(mission.lease) is not None:
-            self._announce(self._book.give_back(mission.lease, self.now(), self._fleet()))
+            self._end(mission.lease, LeaseEnd.GIVEN_BACK, _GIVEN_BACK)
 
     def holder(self, robot: str) -> Lease | None:
         """The lease that holds a robot now."""
@@ -257,6 +251,9 @@ class LeaseService:
         if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
         return found
+
+    def _end(self, lease: str, end: LeaseEnd, reason: str) -> None:
+        self._announce(self._book.end(lease, end, reason, self.now(), self._fleet()))
 
     def _announce(self, changed: Collection[Lease]) -> None:
         for lease in changed:

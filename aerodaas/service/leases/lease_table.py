@@ -7,13 +7,13 @@ import secrets
 import threading
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 from aerodaas.protocol.schemas import LeaseIn, LeaseOut, LeaseState
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.store import Lease, LeaseEnd
+from aerodaas.service.store import Lease, LeaseEnd, Leases
 
-__all__ = ["Candidate", "Fleet", "LeaseBook", "LeaseTable", "lease_out"]
+__all__ = ["Candidate", "Fleet", "LeaseBook", "lease_out"]
 
 
 def _check_wish(wish: LeaseIn, fleet: Fleet) -> None:
@@ -147,22 +147,6 @@ _LONGEST = 24 * 60
 """Minutes of a lease with all of its extensions."""
 
 
-class LeaseTable(Protocol):
-    """Table in which the book keeps its leases: `Store.leases`."""
-
-    def live(self) -> list[Lease]:
-        """Leases queued or granted, in the queue's order."""
-        ...
-
-    def put(self, *rows: Lease) -> None:
-        """Keep all of these, or none and raise StoreError."""
-        ...
-
-    def highest_number(self) -> int:
-        """The highest place in the queue that was ever given."""
-        ...
-
-
 class LeaseBook:
     """Grants, queues and ends leases; every rule goes by an explicit now. Threads may share it.
 
@@ -185,7 +169,7 @@ class LeaseBook:
     """
 
     def __init__(
-        self, table: LeaseTable, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
+        self, table: Leases, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
     ) -> None:
         """Go on with the leases of `table`; call `tick` next, for some may be over.
 
@@ -284,24 +268,14 @@ class LeaseBook:
             self._write(now, fleet, longer)
             return longer, self._take_changes()
 
-    def give_back(self, id_: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
-        """End a queued or granted lease at its tenant's wish.
+    def end(
+        self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
+    ) -> tuple[Lease, ...]:
+        """End a queued or granted lease at its tenant's wish or an operator's.
 
         Args:
             id_: Id of the lease.
-            now: Unix time, seconds.
-            fleet: Drones of the provider, by id.
-
-        Raises:
-            RefusedError: With status 404 for a lease that is unknown or has ended.
-        """
-        return self._end(id_, LeaseEnd.GIVEN_BACK, "given back", now, fleet)
-
-    def revoke(self, id_: str, reason: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
-        """End a queued or granted lease at an operator's wish, or a policy's.
-
-        Args:
-            id_: Id of the lease.
+            end: Whose wish it was.
             reason: Why, as the tenant reads it.
             now: Unix time, seconds.
             fleet: Drones of the provider, by id.
@@ -309,7 +283,12 @@ class LeaseBook:
         Raises:
             RefusedError: With status 404 for a lease that is unknown or has ended.
         """
-        return self._end(id_, LeaseEnd.REVOKED, reason, now, fleet)
+        with self._lock:
+            self._drop(_expired(self._live.values(), now))
+            lease = self._required(id_)
+            self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
+            self._settle(now, fleet)
+            return self._take_changes()
 
     def advance(self, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End what is over, and grant what has become free; call it every second or so.
@@ -370,16 +349,6 @@ class LeaseBook:
                     left = max(0.0, lease.ends - now) / _MINUTE
                 total += left * len(lease.robots or lease.wanted or ("any",))
         return total
-
-    def _end(
-        self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
-    ) -> tuple[Lease, ...]:
-        with self._lock:
-            self._drop(_expired(self._live.values(), now))
-            lease = self._required(id_)
-            self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
-            self._settle(now, fleet)
-            return self._take_changes()
 
     def _required(self, id_: str) -> Lease:
         lease = self._live.get(id_)

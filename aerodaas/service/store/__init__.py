@@ -12,13 +12,14 @@ from aerodaas.service.store.rows import (
     Token,
     Usage,
 )
-from aerodaas.service.store.store import Store
+from aerodaas.service.store.store import Leases, Store
 
 __all__ = [
     "Account",
     "AuditEntry",
     "Lease",
     "LeaseEnd",
+    "Leases",
     "Mission",
     "RobotState",
     "Store",

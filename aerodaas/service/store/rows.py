@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 
-class _WordTuple(TypeDecorator[str]):
+class _StorableText(TypeDecorator[str]):
     """A text of any length; what a database cannot hold (half a surrogate pair, 0) is replaced."""
 
     impl = Text
@@ -90,7 +90,7 @@ class Row(MappedAsDataclass, DeclarativeBase):
     """Base of every table's class; its metadata holds the tables."""
 
     type_annotation_map: ClassVar[dict[Any, Any]] = {
-        str: _WordTuple(),
+        str: _StorableText(),
         float: Double(),
         # SQLite counts only a key of its type INTEGER, which has 64 bits there.
         int: BigInteger().with_variant(Integer, "sqlite"),

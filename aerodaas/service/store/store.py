@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +27,7 @@ from aerodaas.service.store.rows import (
     Usage,
 )
 
-__all__ = ["Store"]
+__all__ = ["Leases", "Store"]
 
 Kind = TypeVar("Kind", bound=Row)
 Order = Iterable[InstrumentedAttribute[Any] | ColumnElement[Any]]
@@ -138,10 +137,6 @@ class Rows(Generic[Kind]):
 class Accounts(Rows[Account]):
     """Accounts, by name."""
 
-    def all(self, tenant: str | None = None) -> list[Account]:
-        """Accounts of a tenant, or all, by name."""
-        return self._select(tenant=tenant)
-
     def of_subject(self, subject: str) -> Account | None:
         """The account of a subject of an issuer; None before its first request."""
         return next(iter(self._select(subject=subject)), None)
@@ -170,15 +165,6 @@ class Leases(Rows[Lease]):
     def live(self) -> list[Lease]:
         """Leases that are queued or granted, in the queue's order."""
         return self._select(Lease.state != LeaseState.ENDED, order=[Lease.number])
-
-    def all(self, tenant: str | None = None, limit: int | None = None) -> list[Lease]:
-        """The newest of a tenant, or of all, newest first.
-
-        Args:
-            tenant: Name of the tenant; None for all.
-            limit: Most rows; None for no limit.
-        """
-        return self._select(tenant=tenant, order=[Lease.number.desc()], limit=limit)
 
     def highest_number(self) -> int:
         """The highest place in the queue that was ever given; 0 before the first."""
@@ -227,18 +213,9 @@ class Missions(Rows[Mission]):
 class Usages(Rows[Usage]):
     """Usage by mission."""
 
-    def all(
-        self, tenant: str | None = None, since: float = -math.inf, limit: int | None = None
-    ) -> list[Usage]:
-        """Usage of a tenant, or of all, oldest first.
-
-        Args:
-            tenant: Name of the tenant; None for all.
-            since: Earliest start, seconds since the Unix epoch.
-            limit: Most rows; None for no limit.
-        """
-        later = Usage.started >= since
-        return self._select(later, tenant=tenant, order=[Usage.started], limit=limit)
+    def all(self, tenant: str | None = None) -> list[Usage]:
+        """Usage of a tenant, or of all, oldest first."""
+        return self._select(tenant=tenant, order=[Usage.started])
 
     def total(self, tenant: str, since: float) -> tuple[float, int]:
         """Flight seconds and cloud calls of a tenant's missions that started since then.
@@ -280,16 +257,9 @@ class AuditLog:
             session.flush()
         return rows[-1].number if rows else 0
 
-    def all(self, tenant: str | None = None, limit: int | None = None) -> list[AuditEntry]:
-        """The newest of a tenant, or of all, newest first.
-
-        Args:
-            tenant: Name of the tenant; None for all.
-            limit: Most rows; None for no limit.
-        """
+    def newest(self, limit: int) -> list[AuditEntry]:
+        """The newest entries, at most `limit`, newest first."""
         statement = select(AuditEntry).order_by(AuditEntry.number.desc()).limit(limit)
-        if tenant is not None:
-            statement = statement.where(AuditEntry.tenant == tenant)
         with self._database.reading() as session:
             return list(session.scalars(statement))
 

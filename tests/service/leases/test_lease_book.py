@@ -47,11 +47,11 @@ def test_a_free_drone_is_granted_at_once_and_a_held_one_later(book: LeaseBook) -
     second = ask(book, "near")
     assert second.state is LeaseState.QUEUED
     assert lease_out(second).robots == ["near"]
-    ended, granted = book.give_back(first.id, NOW + 10, FLEET)
+    ended, granted = book.end(first.id, LeaseEnd.GIVEN_BACK, "given back", NOW + 10, FLEET)
     assert (ended.id, ended.end, ended.ended) == (first.id, LeaseEnd.GIVEN_BACK, NOW + 10)
     assert (granted.id, granted.granted) == (second.id, NOW + 10)
     with pytest.raises(RefusedError, match="no lease") as refused:
-        book.give_back(first.id, NOW + 11, FLEET)
+        book.end(first.id, LeaseEnd.GIVEN_BACK, "given back", NOW + 11, FLEET)
     assert refused.value.status == 404
 
 
@@ -63,7 +63,7 @@ def test_several_drones_are_granted_as_a_whole_and_nobody_overtakes(book: LeaseB
     apart = ask(book, "blind")
     assert states(book, both, later, apart) == ["queued", "queued", "granted"]
     assert book.holder("far", NOW) is None
-    book.give_back(held.id, NOW, FLEET)
+    book.end(held.id, LeaseEnd.GIVEN_BACK, "given back", NOW, FLEET)
     assert states(book, both, later) == ["granted", "queued"]
     assert book.holder("far", NOW) == book.get(both.id)
 
@@ -117,7 +117,7 @@ def test_a_drone_that_still_comes_home_is_nobody_elses(book: LeaseBook) -> None:
     first = ask(book, "near")
     second = ask(book, "near")
     flying = FLEET | {"near": replace(FLEET["near"], busy=True)}
-    (ended,) = book.revoke(first.id, "a storm", NOW, flying)
+    (ended,) = book.end(first.id, LeaseEnd.REVOKED, "a storm", NOW, flying)
     assert (ended.end, ended.reason) == (LeaseEnd.REVOKED, "a storm")
     assert book.advance(NOW + 1, flying) == ()
     (granted,) = book.advance(NOW + 2, FLEET)
@@ -134,9 +134,9 @@ def test_a_drone_out_of_service_is_refused_and_holds_up_nobody(book: LeaseBook) 
     assert refused.value.status == 409
     later, _ = book.request(LeaseIn(robots=["far"]), "farm", "pilot", NOW, resting)
     assert later.state is LeaseState.GRANTED
-    book.give_back(held.id, NOW, resting)
+    book.end(held.id, LeaseEnd.GIVEN_BACK, "given back", NOW, resting)
     assert states(book, both) == ["queued"]
-    book.give_back(later.id, NOW, FLEET)
+    book.end(later.id, LeaseEnd.GIVEN_BACK, "given back", NOW, FLEET)
     assert states(book, both) == ["granted"]
 
 
