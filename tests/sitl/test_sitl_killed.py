@@ -80,29 +80,25 @@ def test_application_killed(autopilot: Autopilot, tmp_path: Path) -> None:
             assert recording.complete
 
 
-@pytest.mark.parametrize("way", ["return", "retrace", "plan"])
+@pytest.mark.parametrize("way", ["return", "retrace"])
 def test_everything_killed(autopilot: Autopilot, tmp_path: Path, way: str) -> None:
     """`kill -9` of the application and of every actor: with a fallback the vehicle comes home."""
     if way != "return" and autopilot.family == "px4":
         pytest.skip("PX4 returns straight")
-    places = [[5.0, 10.0, 4.0], [5.0, 3.0, 4.0]] if way == "plan" else way
-    with Application(autopilot, tmp_path, fallback="set", way_home=places) as application:
+    with Application(autopilot, tmp_path, fallback="set", way_home=way) as application:
         witness = application.relay.witness
         assert wait_for(lambda: witness.away > 12.0, 180.0), witness.modes
         for process in application.kill():
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
-        there, widest = witness.away, 0.0
+        there = witness.away
         end = time.monotonic() + 180.0
         while witness.armed and time.monotonic() < end:
             time.sleep(0.2)
-            assert witness.place is not None
-            widest = max(widest, witness.place[0])
         print(  # noqa: T201 - the result itself
             f"\neverything killed: {autopilot.family}, {way}, {there:.1f} m away, modes "
-            f"{witness.modes}, at most {widest:.1f} m east, down {witness.away:.1f} m from home, "
+            f"{witness.modes}, down {witness.away:.1f} m from home, "
             f"texts {witness.texts[-8:]}"
         )
         assert not witness.armed
         assert witness.away < 2.0
-        assert (widest > 4.0) is (way == "plan")

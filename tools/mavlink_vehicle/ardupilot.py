@@ -22,9 +22,8 @@ _MODES = {_STABILIZE, 2, _AUTO, _GUIDED, _LOITER, _RETURN, 7, _LAND, 16, _BRAKE}
 _NEED_PLACE = {_GUIDED, _LOITER, _RETURN, _BRAKE}
 _TIMEOUT = 3.0
 """GUID_TIMEOUT: seconds without setpoints after which it stops."""
-_SMART = {1.0, 3.0}
-"""FS_GCS_ENABLE: return, by the flown way or straight; both fly straight here."""
-_PLANNED = 6.0
+_RETURNS = {1.0, 3.0, 6.0}
+"""FS_GCS_ENABLE: return, straight, by the flown way or by a mission; all fly straight here."""
 _LANDS_ON = 1 << 3
 """Bit of FS_OPTIONS."""
 _CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -207,10 +206,7 @@ class EmulatedArduPilot(Firmware):
         if self._mode == _LAND and int(values["FS_OPTIONS"]) & _LANDS_ON:
             return
         self.text("GCS Failsafe")
-        if values["FS_GCS_ENABLE"] == _PLANNED and self.route.join():
-            self.text("Return path started", mavlink.MAV_SEVERITY_INFO)
-            self._mode, self.failsafe = _AUTO, True
-        elif values["FS_GCS_ENABLE"] in {*_SMART, _PLANNED}:
+        if values["FS_GCS_ENABLE"] in _RETURNS:
             self.enter_return()
         else:
             self._set_mode(_LAND)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -58,32 +56,6 @@ class Route:
             return False
         # ArduPilot's first item is its home.
         self.item, self._there_since = self._selected, None
-        return True
-
-    def join(self) -> bool:
-        """Fly the return path from its nearest leg on; False without one."""
-        items = self._items()
-        starts = [
-            index
-            for index, item in enumerate(items)
-            if item.command == mavlink.MAV_CMD_DO_RETURN_PATH_START
-        ]
-        if not starts:
-            return False
-        places = {
-            index: self._place(items[index])
-            for index in range(starts[0] + 1, len(items))
-            if items[index].command == mavlink.MAV_CMD_NAV_WAYPOINT
-        }
-        here = self._flight.believed.position[:2]
-        numbers = list(places)
-        best, self.item = math.inf, numbers[0]
-        for one, other in itertools.pairwise(numbers):
-            away = _distance(here, places[one][:2], places[other][:2])
-            if away < best:
-                best, self.item = away, other
-        if len(numbers) > 1 and math.dist(here, places[numbers[0]][:2]) <= best:
-            self.item = numbers[0]
         return True
 
     def leave(self) -> None:

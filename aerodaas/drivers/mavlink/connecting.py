@@ -19,7 +19,6 @@ from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.fallback import Fallback, ParameterBackup
 from aerodaas.drivers.mavlink.microservices.fence import upload_fence
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
-from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.alignment import Alignment
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
@@ -140,9 +139,7 @@ def establish(
         if settings.fence != "off" and not settings.observe:
             upload_fence(link, autopilot, robot.limits.geofence, alignment.origin, settings.fence)
         if settings.fallback != "ignore":
-            ways = settings.way_home
-            plan = [] if isinstance(ways, str) else way_home_items(robot, ways, alignment.origin)
-            fallback.establish(robot.limits.geofence.ceiling, telemetry.software, plan)
+            fallback.establish(robot.limits.geofence.ceiling, telemetry.software)
     _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
     return Connection(link, autopilot, commander, departure, alignment, fallback, link.target)
 

@@ -17,8 +17,6 @@ _OBSERVERS = (244, 243)
 """System ids of who only looks; the first that is not a flight's own."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Place = tuple[Finite, Finite, Finite]
 Identity = Annotated[int, Field(ge=1, le=255)]
 
 
@@ -49,10 +47,9 @@ class MavlinkSettings(BaseModel):
     fallback: Literal["report", "require", "set", "ignore"] = "report"
     """Whether it comes home by itself once this process is gone: say what keeps it from that;
     refuse to take off until it would; have it come home for as long as we are connected, by
-    parameters (and a plan) that are put back afterwards; or do not ask."""
-    way_home: Literal["return", "retrace"] | Annotated[list[Place], Field(min_length=1)] = "return"
-    """How: straight; back along the way that was flown; or through these places (ENU metres) by a
-    plan that is uploaded before take-off. The latter two are ArduPilot's alone."""
+    parameters that are put back afterwards; or do not ask."""
+    way_home: Literal["return", "retrace"] = "return"
+    """How: straight, or back along the way that was flown, which is ArduPilot's alone."""
     fallback_after: Annotated[float, Field(ge=2, le=120)] = 5.0
     """Seconds of our silence after which it must be on its way home."""
     fence: Literal["off", "warn", "hold", "return", "land"] = "off"
@@ -91,11 +88,6 @@ class MavlinkSettings(BaseModel):
     def heard_as_station(self) -> bool:
         """Whether our heartbeats are a ground station's."""
         return self.role == "ground_station" and not self.observe
-
-    @property
-    def way_kind(self) -> Literal["return", "retrace", "plan"]:
-        """The kind of the way home."""
-        return self.way_home if isinstance(self.way_home, str) else "plan"
 
     @model_validator(mode="before")
     @classmethod

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from typing import ClassVar
@@ -32,7 +32,6 @@ from aerodaas.drivers.mavlink.microservices.actuators import MavlinkActuators
 from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.microservices.mission_mode import MavlinkMissionMode
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.one_link import check_links, link_of
 from aerodaas.drivers.mavlink.payload.payload import Payload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
@@ -40,7 +39,6 @@ from aerodaas.drivers.mavlink.state.phase import PROTECTIVE, FlightMode, FlightP
 from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.wire.rates import RateKeeper
@@ -451,25 +449,6 @@ class MavlinkVehicle:
         self._connected()
         assert self._modes is not None  # noqa: S101 - made before the connection
         self._modes.ask(wish)
-
-    def upload_mission(
-        self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
-    ) -> None:
-        """Replace the mission on the vehicle by `items`; blocks.
-
-        Args:
-            items: Items of the plan, in order.
-            progress: Called with the number of items uploaded and of all items.
-
-        Raises:
-            VehicleError: If the upload failed, or the vehicle is not ours to control.
-        """
-        self._require_control("take a mission")
-        upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
-
-    def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
-        """The mission on the vehicle; blocks, raises VehicleError."""
-        return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     def grounded_link(self, deed: str) -> MavlinkLink:
         """The link of a vehicle that stands, for services that need much of it.

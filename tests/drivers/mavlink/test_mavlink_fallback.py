@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
-import threading
-import time
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from autopilot import robot_of
 from emulated import LOOPBACK, Flight, Stepped, free_port, wait_for
 from typing_extensions import Self
 
 from aerodaas.drivers.mavlink.microservices import fallback
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem
-from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
-from aerodaas.geometry.frames import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 TESTS = Path(__file__).parents[2]
 ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
 AS_PX4 = AutopilotOptions(family="px4", ready_after=0.0)
-WAY = [[6.0, 6.0, 4.0], [6.0, 0.0, 3.0]]
 OWN = {"FS_GCS_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
 """What its owner has set, and what is set for a flight."""
 OURS = {"FS_GCS_ENABLE": 1.0, "MAV_GCS_SYSID": 245.0, "FS_OPTIONS": 24.0}
@@ -42,46 +32,31 @@ def values(pair: Stepped) -> dict[str, float]:
     return {name: held[name] for name in OWN}
 
 
-def mission(autopilot: EmulatedAutopilot) -> list[int]:
-    """Commands of the mission that it holds."""
-    held = autopilot.firmware.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, [])
-    return [item.command for item in held]
-
-
 @pytest.mark.slow
 @pytest.mark.wall_clock
 def test_a_killed_process_leaves_a_vehicle_that_comes_home(state_folder: Path) -> None:
     """`kill -9` on the way out: it flies back and lands, by the emulator's truth.
 
-    Three vehicles at once: ArduPilot and PX4 straight, and an ArduPilot by a plan, which leads
-    through the place that it has not passed yet.
+    Two vehicles at once: ArduPilot and PX4.
     """
-    plan = f"way_home={json.dumps(WAY)}"
     with ExitStack() as open_:
-        flights = [
-            open_.enter_context(Killed(options, *words))
-            for options, *words in ((ARDUPILOT,), (AS_PX4,), (ARDUPILOT, plan))
-        ]
+        flights = [open_.enter_context(Killed(options)) for options in (ARDUPILOT, AS_PX4)]
         for one in flights:
             one.kill_away_from_home()
         for one in flights:
             wait_for(lambda: not one.autopilot.armed, 60.0)  # noqa: B023 - called at once
             assert away(one.autopilot) < 1.5
-        straight, px4, planned = (one.furthest_east for one in flights)
-        assert max(straight, px4) < 1.0
-        assert planned > 5.0
     assert list(state_folder.rglob("*.json")), "what is to be put back is not known any more"
 
 
 class Killed:
     """A vehicle, and a process that flies it with a fallback."""
 
-    def __init__(self, options: AutopilotOptions, *words: str) -> None:
+    def __init__(self, options: AutopilotOptions) -> None:
         self.autopilot = EmulatedAutopilot(replace(options, peer=(LOOPBACK, free_port())))
-        self.furthest_east = 0.0
         host, port = self.autopilot.options.peer
         command = [sys.executable, "-m", "sitl.victim", f"udpin:{host}:{port}"]
-        command += ["fallback=set", "fallback_after=2", *words]
+        command += ["fallback=set", "fallback_after=2"]
         self._process = subprocess.Popen(command, cwd=TESTS)
 
     def __enter__(self) -> Self:
@@ -98,12 +73,6 @@ class Killed:
         wait_for(lambda: away(self.autopilot) > 4.0, 60.0)
         self._process.kill()
         self._process.wait()
-        threading.Thread(target=self._watch, daemon=True).start()
-
-    def _watch(self) -> None:
-        while self.autopilot.armed:
-            self.furthest_east = max(self.furthest_east, float(self.autopilot.truth.position[0]))
-            time.sleep(0.1)
 
 
 def away(autopilot: EmulatedAutopilot) -> float:
@@ -153,7 +122,7 @@ def test_nothing_is_changed_unasked(
 
 def test_who_only_watches_changes_nothing(flight: Flight, state_folder: Path) -> None:
     """By the driver's own settings for that, over those of a flight that sets all there is."""
-    wanted = {"fallback": "set", "failsafes": "set", "fence": "land", "way_home": WAY}
+    wanted = {"fallback": "set", "failsafes": "set", "fence": "land"}
     with flight(ARDUPILOT, **{**wanted, **MavlinkVehicle.observing}).unconnected() as ends:
         held = ends.firmware.parameters.values
         before = dict(held)
@@ -252,96 +221,6 @@ def test_each_that_keeps_it_away_is_named(flight: Flight, family: str) -> None:
             assert f"{name} is {value:g}" in reason
             assert word in reason
             held[name] = before
-
-
-def test_the_way_home_takes_the_owners_mission_for_a_flight(flight: Flight) -> None:
-    """Their own comes back, item by item."""
-    own = [
-        MissionItem(16, (0.0, 0.0, 0.0, 0.0), 1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL),
-        MissionItem(mavlink.MAV_CMD_NAV_TAKEOFF, (1.5, 0.0, 0.0, 0.0), 3, 4, 12.5),
-    ]
-    with flight(ARDUPILOT, fallback="ignore") as pair:
-        pair.vehicle.upload_mission(own)
-        pair.vehicle.close()
-        with pair.again(fallback="set", way_home=WAY):
-            assert mission(pair.autopilot) == [16, 188, 16, 16, 21]
-        with pair.again(fallback="ignore") as vehicle:
-            assert vehicle.download_mission() == own
-
-
-def spoil(ends: Stepped, fault: str) -> None:
-    """Have the autopilot take plans in the wrong way."""
-    store = ends.firmware.plans
-    whole = store.handle
-
-    def handle(message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
-        item = message.get_type() == "MISSION_ITEM_INT"
-        if item and message.seq == 2 and fault in {"stalls", "vanishes"}:
-            ends.autopilot.cut(off=fault == "vanishes")
-            return []
-        if item and message.command == 188 and fault == "refuses":
-            peer = (message.get_srcSystem(), message.get_srcComponent())
-            unsupported = mavlink.MAV_MISSION_UNSUPPORTED
-            return [mavlink.MAVLink_mission_ack_message(*peer, unsupported, message.mission_type)]
-        if item and message.seq == 2 and fault == "moves":
-            message.x += 100
-        answers = whole(message)
-        if item and message.seq == 4 and fault == "shortens":
-            store.plans[message.mission_type].pop()
-        return answers
-
-    store.handle = handle  # type: ignore[method-assign]
-
-
-@pytest.mark.parametrize(
-    ("fault", "word"),
-    [
-        ("refuses", "does not know this command.*way_home.*return"),
-        ("stalls", "stopped answering while taking the mission"),
-        ("moves", "holds another way home than ours: item 2"),
-        ("shortens", "4 items instead of 5"),
-        ("vanishes", "stopped answering while taking the mission.*is not put back yet"),
-    ],
-)
-def test_a_way_home_that_is_not_there_is_no_fallback(
-    flight: Flight, fault: str, word: str, state_folder: Path
-) -> None:
-    """The connection fails, so that nothing takes off, and the vehicle is as it was."""
-    with flight(ARDUPILOT, fallback="set", way_home=WAY).unconnected() as ends:
-        spoil(ends, fault)
-        with pytest.raises(VehicleError, match=f"(?s){word}"):
-            ends.vehicle.connect()
-        assert not ends.vehicle.connected
-        assert ends.firmware.motions == []
-        held = ends.firmware.parameters.values
-        assert {name: held[name] for name in OWN} == OWN
-        assert bool(list(state_folder.rglob("*.json"))) is (fault == "vanishes")
-        if fault != "vanishes":
-            assert ends.firmware.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []) == []
-
-
-@pytest.mark.parametrize(
-    ("way", "word"),
-    [
-        ([(0.0, 30.0, 3.0)], r"way_home.0: .* outside the geofence"),
-        ([(0.0, 5.0, 300.0)], r"way_home.0: .* above the ceiling"),
-        ([(8.0, 8.0, 3.0), (-8.0, 8.0, 3.0)], r"way_home.0: .*crosses a no-fly zone"),
-    ],
-)
-def test_a_way_home_keeps_to_the_geofence(way: list[tuple[float, float, float]], word: str) -> None:
-    """Its places and the legs between them, before anything of it is uploaded."""
-    fence = {
-        "polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]],
-        "no_fly": [[[-2, 7], [2, 7], [2, 9], [-2, 9]]],
-        "ceiling": 50,
-    }
-    robot = robot_of(1, limits={"geofence": fence}, start=(0.0, 0.0, 1.0))
-    origin = GeodeticOrigin(47.0, 8.0)
-    with pytest.raises(VehicleError, match=word):
-        way_home_items(robot, way, origin)
-    *_, place, landing = way_home_items(robot, [(5.0, 5.0, 4.0)], origin)
-    assert (place.z, landing.z) == (3.0, 0.0), "heights are above where it starts"
-    assert (landing.x, landing.y) == (470_000_000, 80_000_000)
 
 
 def test_px4_flies_no_way_home_of_ours(flight: Flight) -> None:

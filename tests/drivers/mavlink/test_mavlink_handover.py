@@ -509,18 +509,6 @@ def test_what_an_autopilot_cannot_fly_is_refused(
         assert not flight.ends.heard("MISSION_COUNT")
 
 
-def test_the_plan_on_the_vehicle_stays_its_way_home(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A plan that would replace it is refused."""
-    with handed(monkeypatch) as flight:
-        flight.until(S.ENROUTE)
-        mode = flight.ends.vehicle.mission_mode
-        planned = {"way_home": [(0.0, 0.0, 3.0)], "fallback": "report"}
-        assert mode is not None
-        monkeypatch.setattr(mode, "_settings", mode._settings.model_copy(update=planned))
-        answer = flight.tell(HandOver())
-        assert "way_home" in answer.text
-
-
 def test_on_the_ground_nothing_is_handed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor while it takes off, nor once it comes home."""
     with handed(monkeypatch) as flight:

@@ -13,7 +13,7 @@ from emulated import Flight
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices.fence import fence_items, upload_fence
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, upload
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import VehicleError
 from aerodaas.geometry.frames import GeodeticOrigin
@@ -24,7 +24,6 @@ MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 COUNT, ITEM = "MISSION_COUNT", "MISSION_ITEM_INT"
-LIST, REQUEST = "MISSION_REQUEST_LIST", "MISSION_REQUEST_INT"
 ITEMS = [
     MissionItem(16, (1.0, 2.0, 3.0, 4.0), 473977420 + index, -85455940 - index, 10.5 + index)
     for index in range(3)
@@ -39,7 +38,7 @@ def meet(monkeypatch: pytest.MonkeyPatch) -> Meet:
 
     def made(answer: Answer = lambda _: [], *names: str) -> ScriptedAutopilot:
         autopilot = ScriptedAutopilot(
-            answers=dict.fromkeys(names or (COUNT, ITEM, LIST, REQUEST), answer)
+            answers=dict.fromkeys(names or (COUNT, ITEM), answer)
         )
         autopilot.clock.drive(monkeypatch)
         return autopilot
@@ -67,25 +66,6 @@ def taking(count: int, kind: int = MISSION) -> Answer:
     return answer
 
 
-def given(item: MissionItem, index: int, kind: int) -> Any:  # noqa: ANN401
-    """One of its items on the wire."""
-    place = (item.x, item.y, item.z)
-    return mavlink.MAVLink_mission_item_int_message(
-        245, 191, index, item.frame, item.command, 0, 1, *item.values, *place, kind
-    )
-
-
-def holding(items: list[MissionItem], kind: int = MISSION) -> Answer:
-    """It has these items and gives them when asked."""
-
-    def answer(message: Any) -> Iterable[Any]:  # noqa: ANN401
-        if message.get_type() == LIST:
-            return [mavlink.MAVLink_mission_count_message(245, 191, len(items), kind)]
-        return [given(items[message.seq], message.seq, kind)]
-
-    return answer
-
-
 def times(autopilot: ScriptedAutopilot) -> list[float]:
     """When each message was sent, from the first one on."""
     began = autopilot.received[0][0]
@@ -95,9 +75,8 @@ def times(autopilot: ScriptedAutopilot) -> list[float]:
 @pytest.mark.parametrize("kind", [MISSION, FENCE, RALLY])
 def test_an_upload_word_by_word(meet: Meet, kind: int) -> None:
     """The count, then each item whole; a mission's first is its present one, a fence has none."""
-    autopilot, seen = meet(taking(3, kind)), []
-    upload(autopilot, ITEMS, kind, lambda done, total: seen.append((done, total)))
-    assert seen == [(0, 3), (1, 3), (2, 3), (3, 3)]
+    autopilot = meet(taking(3, kind))
+    upload(autopilot, ITEMS, kind)
     (count,), items = autopilot.of(COUNT), autopilot.of(ITEM)
     assert (count.count, count.mission_type) == (3, kind)
     assert [item.seq for item in items] == [0, 1, 2]
@@ -197,70 +176,18 @@ def test_what_does_not_belong_to_the_transfer_is_passed_over(meet: Meet) -> None
     assert [one.seq for one in autopilot.of(ITEM)] == [0, 1, 2]
 
 
-@pytest.mark.parametrize("kind", [MISSION, FENCE])
-def test_a_download_word_by_word(meet: Meet, kind: int) -> None:
-    """The list, each item, and thanks; to the vehicle, and of this kind of plan throughout."""
-    held = [*ITEMS, MissionItem(5001, (3.0, 0.0, 0.0, 0.0), -1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL)]
-    autopilot, seen = meet(holding(held, kind)), []
-    assert download(autopilot, kind, lambda done, total: seen.append((done, total))) == held
-    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    assert autopilot.kinds() == [LIST, *[REQUEST] * 4, "MISSION_ACK"]
-    assert {one.mission_type for _, one in autopilot.received} == {kind}
-    assert [one.seq for one in autopilot.of(REQUEST)] == [0, 1, 2, 3]
-    empty = meet(holding([]))
-    assert download(empty) == []
-    assert empty.kinds() == [LIST, "MISSION_ACK"]
-
-
-def test_more_than_two_thousand_items_are_not_believed(meet: Meet) -> None:
-    """A count of a damaged packet would have us ask for hours."""
-    autopilot = meet(holding(ITEMS[:1] * 2001))
-    with pytest.raises(VehicleError, match="its mission has 2001 items"):
-        download(autopilot)
-    assert len(autopilot.received) == 1
-
-
-def test_answers_to_what_was_asked_before_are_passed_over(meet: Meet) -> None:
-    """A count while an item is awaited, the item before, an item while the count is awaited."""
-    items = holding(ITEMS)
-
-    def late(message: Any) -> list[Any]:  # noqa: ANN401
-        if message.get_type() == LIST:
-            return [given(ITEMS[2], 0, MISSION), *items(message)]
-        before = [given(ITEMS[2], index, MISSION) for index in (message.seq - 1, message.seq + 1)]
-        count = mavlink.MAVLink_mission_count_message(245, 191, 9, MISSION)
-        return [count, *[one for one in before if one.seq >= 0], *items(message)]
-
-    autopilot = meet(late)
-    assert download(autopilot) == ITEMS
-    assert len(autopilot.received) == 5
-
-
-def test_what_is_asked_in_vain_is_asked_five_times(meet: Meet) -> None:
-    """For the list and for an item alike, a second and a half each; lost once is no harm."""
-    autopilot = meet()
-    with pytest.raises(VehicleError, match="does not answer when asked for its rally points"):
-        download(autopilot, RALLY)
-    assert times(autopilot) == pytest.approx([0.0, 1.5, 3.0, 4.5, 6.0])
-    heard = {LIST: 0, REQUEST: 0}
-
-    def lossy(message: Any) -> Iterable[Any]:  # noqa: ANN401
-        heard[message.get_type()] += 1
-        return [] if heard[message.get_type()] % 5 else holding(ITEMS)(message)
-
-    assert download(meet(lossy)) == ITEMS
-    assert heard == {LIST: 5, REQUEST: 15}
-
-
-def test_missions_go_up_and_come_down(flight: Flight) -> None:
+def test_missions_go_up(flight: Flight) -> None:
     """Over a bad link to an emulated autopilot, item by item."""
     bad = Impairment(loss=0.1, duplicates=0.2)
     with flight(AutopilotOptions(uplink=bad, downlink=bad, seed=3)) as ends:
         items = [
             MissionItem(16, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0) for i in range(12)
         ]
-        ends.vehicle.upload_mission(items)
-        assert ends.vehicle.download_mission() == items
+        upload(ends.vehicle.connection.link, items)
+        held = ends.firmware.plans.plans[MISSION]
+        assert [(one.command, one.x, one.y, one.z) for one in held] == [
+            (one.command, one.x, one.y, one.z) for one in items
+        ]
 
 
 def test_an_uploaded_fence_comes_with_what_enforces_it(meet: Meet) -> None:

@@ -225,7 +225,7 @@ def test_a_take_off_called_off_starts_no_motors_after_the_ground_is_told(
         ({"system": 0}, "system"),
         ({"fence": "stop"}, "fence"),
         ({"ready_timeout": -1}, "ready_timeout"),
-        ({"way_home": []}, "way_home"),
+        ({"way_home": [[1, 2, 3]]}, "way_home"),
         ({"fallback_after": 1}, "fallback_after"),
         ({"fallback": "on"}, "fallback"),
     ],

@@ -59,14 +59,12 @@ _KNOWN = {
     21: FlightMode.RETURN,
     _LAND: FlightMode.LAND,
 }
-_LOST = {"return": 1.0, "retrace": 3.0, "plan": 6.0}
+_LOST = {"return": 1.0, "retrace": 3.0}
 """FS_GCS_ENABLE: return to launch; the flown way back (SmartRTL), or a return where that is too
-long to remember; the mission from DO_RETURN_PATH_START, or a return without one."""
-_WAYS = {
-    "return": "come home",
-    "retrace": "fly the flown way back",
-    "plan": "fly the way home that was uploaded",
-}
+long to remember."""
+_COMES_HOME = {*_LOST.values(), 6.0}
+"""Those with which it comes home; 6 by the mission's return path, or straight without one."""
+_WAYS = {"return": "come home", "retrace": "fly the flown way back"}
 _LANDS_ON = 1 << 3
 """Bit of FS_OPTIONS: a landing goes on."""
 _PROTECTS = re.compile(r"failsafe|breached|EKF|crash|thrust|battery.*(low|critical)", re.IGNORECASE)
@@ -89,7 +87,7 @@ class ArduPilot(Autopilot):
     comes_home: ClassVar[str] = (
         "ArduPilot stops within 3 s, and comes home by its ground-station failsafe"
     )
-    ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace", "plan"})
+    ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace"})
     home_comes_first: ClassVar[bool] = True
     turns_at_waypoints: ClassVar[bool] = False
     rates: ClassVar[dict[int, float]] = {
@@ -193,8 +191,8 @@ class ArduPilot(Autopilot):
         """
         del software
         ours, after = float(settings.own_system), settings.fallback_after
-        action = _LOST[settings.way_kind]
-        fits = {action, *_LOST.values()} if settings.way_kind == "return" else {action}
+        action = _LOST[settings.way_home]
+        fits = _COMES_HOME if settings.way_home == "return" else {action}
         return (
             FallbackParameter(
                 ("MAV_GCS_SYSID", "SYSID_MYGCS"),
@@ -233,7 +231,7 @@ class ArduPilot(Autopilot):
                 ("FS_GCS_ENABLE",),
                 lambda value: value in fits,
                 action,
-                f"it does not {_WAYS[settings.way_kind]} when we are silent",
+                f"it does not {_WAYS[settings.way_home]} when we are silent",
             ),
         )
 

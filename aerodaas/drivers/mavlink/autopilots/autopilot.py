@@ -113,7 +113,7 @@ class Autopilot(ABC):
     comes_home: ClassVar[str]
     """The same with a fallback."""
     ways_home: ClassVar[frozenset[str]]
-    """Those of `return`, `retrace` and `plan` that its own protection can fly."""
+    """Those of `return` and `retrace` that its own protection can fly."""
     home_comes_first: ClassVar[bool]
     """Whether the first item of a mission is its home, whatever is sent."""
     turns_at_waypoints: ClassVar[bool]

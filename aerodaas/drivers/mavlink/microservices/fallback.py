@@ -18,8 +18,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FallbackParameter
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
-from aerodaas.drivers.mavlink.microservices.way_home import other_way_home, upload_way_home
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.errors import VehicleError
@@ -37,15 +35,12 @@ class ParameterChange(NamedTuple):
 
 
 class Changes(BaseModel):
-    """Changes of parameters and mission on one vehicle."""
+    """Changes of parameters on one vehicle."""
 
-    # What an item leaves open is not a number, which JSON has no word for.
-    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
+    model_config = ConfigDict(extra="ignore")
 
     parameters: dict[str, ParameterChange] = Field(default_factory=dict)
     """In the order in which they were set."""
-    mission: list[MissionItem] | None = None
-    """The mission that it held before; None: it was left alone."""
 
 
 class ParameterBackup:
@@ -146,7 +141,7 @@ class Fallback:
             return []
         return [f"it would not come home without us: {one}" for one in self.obstacles]
 
-    def establish(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> None:
+    def establish(self, ceiling: float, software: str) -> None:
         """Judge what it would do, and make it come home where the settings ask for that.
 
         An observer changes nothing: what is judged then is what a flight could not change.
@@ -154,7 +149,6 @@ class Fallback:
         Args:
             ceiling: Ceiling of the geofence, metres above home.
             software: Version of the autopilot; empty where it is not known.
-            plan: The way home to be uploaded, if any.
 
         Raises:
             VehicleError: If it cannot be done; what was changed before has been put back.
@@ -166,9 +160,8 @@ class Fallback:
         if self._settings.fallback == "set":
             if unable := self._unable():
                 raise VehicleError(f"{self._name}: {unable}")
-            self._change(self._autopilot.fallback(self._settings, ceiling, software), plan)
-            plan = ()  # it was compared before anything was set that flies it
-        self.obstacles = tuple(self.examine(ceiling, software, plan))
+            self._change(self._autopilot.fallback(self._settings, ceiling, software))
+        self.obstacles = tuple(self.examine(ceiling, software))
         if self.obstacles and self._settings.fallback == "set":
             raise VehicleError(f"{self._name}: {'; '.join(self.objections)}{self._undone()}")
         if self.obstacles:
@@ -180,18 +173,16 @@ class Fallback:
                 "; ".join(self.obstacles),
             )
 
-    def examine(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> list[str]:
+    def examine(self, ceiling: float, software: str) -> list[str]:
         """Faults that keep the vehicle from coming home, one sentence each; nothing is changed.
 
         Args:
             ceiling: Ceiling of the geofence, metres above home.
             software: Version of the autopilot; empty where it is not known.
-            plan: The way home that the vehicle must hold, if any.
         """
         wanted = self._autopilot.fallback(self._settings, ceiling, software)
         obstacles = [unable] if (unable := self._unable()) else []
-        obstacles += [one.text for one in self._judge(wanted)]
-        return obstacles + (self._compare(plan) if plan else [])
+        return obstacles + [one.text for one in self._judge(wanted)]
 
     def restore(self) -> None:
         """Put back what was changed, by this process or an earlier one; raises VehicleError.
@@ -216,9 +207,6 @@ class Fallback:
                 _log.warning(
                     "%s: %s is left at %g: somebody else has set it", self._name, name, value
                 )
-        if changes.mission is not None:
-            upload(self._link, changes.mission)
-            _log.warning("%s: the vehicle's own mission is on it again", self._name)
         self._backup.clear()
 
     def _remind(self) -> None:
@@ -230,12 +218,12 @@ class Fallback:
             "%s: an earlier flight has not put back what was on the vehicle (%s): "
             "`python -m aerodaas.drivers.mavlink URL --restore` does",
             self._name,
-            said or "its mission",
+            said,
         )
 
     def _unable(self) -> str:
         """Why its firmware cannot fly the way home that is asked for; empty if it can."""
-        if self._settings.way_kind in self._autopilot.ways_home:
+        if self._settings.way_home in self._autopilot.ways_home:
             return ""
         name = self._autopilot.name
         return f'{name} cannot fly this settings.way_home by itself; take "return"'
@@ -247,7 +235,7 @@ class Fallback:
         judged = self._judge(self._autopilot.fallback(self._settings, ceiling, software))
         return [one.text for one in judged if one.value is None]
 
-    def _change(self, wanted: Sequence[FallbackParameter], plan: Sequence[MissionItem]) -> None:
+    def _change(self, wanted: Sequence[FallbackParameter]) -> None:
         """Set what does not fit; the backup is always ahead of the vehicle."""
         judged = self._judge(wanted)
         unknown = [one.text for one in judged if one.value is None]
@@ -255,12 +243,6 @@ class Fallback:
             raise VehicleError(f"{self._name}: {'; '.join(unknown)}")
         changes = self._backup.read() or Changes()
         try:
-            # The plan first: what flies it must not be switched on before it is there.
-            if plan:
-                if changes.mission is None:
-                    changes.mission = download(self._link)
-                    self._backup.write(changes)
-                upload_way_home(self._link, plan)
             parameters = Parameters(self._link, self._autopilot)
             for one in judged:
                 assert one.value is not None  # noqa: S101 - just asked
@@ -305,13 +287,6 @@ class Fallback:
             elif name is None and not one.beside:
                 judged.append(_Judged(one, one.names[0], None, one.value))
         return judged
-
-    def _compare(self, plan: Sequence[MissionItem]) -> list[str]:
-        try:
-            text = other_way_home(self._link, plan)
-        except VehicleError as error:
-            text = str(error)
-        return [text] if text else []
 
 
 def _same(one: float, other: float) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FenceAction
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
@@ -47,8 +45,6 @@ def upload_fence(
     fence: GeofenceConfig,
     origin: GeodeticOrigin,
     action: FenceAction,
-    *,
-    progress: Callable[[int, int], None] = lambda _, __: None,
 ) -> None:
     """Upload `fence` and have it enforced by `action`; blocks.
 
@@ -60,13 +56,12 @@ def upload_fence(
         fence: Polygons in local metres, and the ceiling.
         origin: Geodetic origin of the local frame.
         action: What the vehicle does at the fence.
-        progress: Called with the number of items uploaded and of all items.
 
     Raises:
         VehicleError: If the vehicle does not take the fence or a parameter.
     """
     items = fence_items(fence, origin)
-    upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE, progress)
+    upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE)
     parameters = Parameters(link, autopilot)
     for name, value in autopilot.fence(action, fence.ceiling).items():
         parameters.set(name, value)

@@ -171,11 +171,9 @@ class MavlinkMissionMode:
 
     def objection(self, places: Sequence[PlannedPlace]) -> str:
         """Why it cannot fly these places, or not now; empty if it can."""
-        name, settings = self._autopilot.name, self._settings
-        if settings.observe:
+        name = self._autopilot.name
+        if self._settings.observe:
             return 'with "observe" it is only looked at'
-        if settings.fallback != "ignore" and settings.way_kind == "plan":
-            return "the plan on the vehicle is its way home (way_home), and there is room for one"
         if (
             any(place.yaw is not None for place in places)
             and not self._autopilot.turns_at_waypoints
