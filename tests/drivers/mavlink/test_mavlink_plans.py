@@ -37,9 +37,7 @@ def meet(monkeypatch: pytest.MonkeyPatch) -> Meet:
     """Makes an autopilot with one answer to all of these messages, whose clock is the driver's."""
 
     def made(answer: Answer = lambda _: [], *names: str) -> ScriptedAutopilot:
-        autopilot = ScriptedAutopilot(
-            answers=dict.fromkeys(names or (COUNT, ITEM), answer)
-        )
+        autopilot = ScriptedAutopilot(answers=dict.fromkeys(names or (COUNT, ITEM), answer))
         autopilot.clock.drive(monkeypatch)
         return autopilot
 
