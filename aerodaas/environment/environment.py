@@ -16,12 +16,12 @@ from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.environment.actuators import require_actuators
 from aerodaas.environment.mission_run import MissionRun
 from aerodaas.environment.offering import BuildOnlyMission, note_built, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
+from aerodaas.environment.waypoint_checks import require_actions
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.identifiers import find_scoped
 from aerodaas.messages.waypoints import Waypoint
@@ -376,7 +376,7 @@ class Environment(PaperNames, IEnvironment):
         Raises GraphError for what cannot be added in flight, MissionError for what the mission
         refuses.
         """
-        require_actuators(self.config, edge)
+        require_actions(self.config, edge)
         self._require_flying(edge.robot, edge.navigation)
         if self.graph.flying:
             for command in initial_commands([edge]):
@@ -484,7 +484,7 @@ class Environment(PaperNames, IEnvironment):
         robots = list(dict.fromkeys(named))
         if robots:
             for one in entries:
-                require_actuators(self.config, _edge(_addressee(one, robots), one), one.line)
+                require_actions(self.config, _edge(_addressee(one, robots), one), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from aerodaas.config.extensions import service
 from aerodaas.config.model import RobotConfig
 from aerodaas.config.options import Speed
-from aerodaas.config.sections.actuators import actuator_objection, parachute_objection
 from aerodaas.dataflow.graph import NavigationEdge, refusal
 from aerodaas.dataflow.handles import Sensor
 from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
@@ -15,7 +15,6 @@ from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.loading import load_vehicle
 from aerodaas.errors import GraphError, UnknownIdError
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.mission.commands import (
     Actuate,
     End,
@@ -152,10 +151,7 @@ class Robot(PaperNames, IRobot):
             GraphError: For an unknown actuator or position.
             MissionError: If the robot does not fly or refuses.
         """
-        moves = [MoveActuator(actuator, position)]
-        if text := actuator_objection(self.config.actuators, moves, by_waypoint=False):
-            raise refusal(f"{self.robot_id}: {text}")
-        self.environment.command(self.robot_id, Actuate(actuator, position))
+        self._move(Actuate(actuator, position))
 
     def release_parachute(self, parachute: str) -> None:
         """Fire a parachute: the mission is over, and the drone comes down where it is.
@@ -163,9 +159,12 @@ class Robot(PaperNames, IRobot):
         The environment file has to permit it by the parachute's `may_release`. Raises GraphError
         if it does not, and MissionError if the robot is not in the air or flies at a provider.
         """
-        if text := parachute_objection(self.config.actuators, parachute):
+        self._move(ReleaseParachute(parachute))
+
+    def _move(self, command: Actuate | ReleaseParachute) -> None:
+        if text := service("actuators.objection")(self.config, command):
             raise refusal(f"{self.robot_id}: {text}")
-        self.environment.command(self.robot_id, ReleaseParachute(parachute))
+        self.environment.command(self.robot_id, command)
 
     def wait(self) -> None:
         """Return when the mission has ended; raises the error that it ended with."""

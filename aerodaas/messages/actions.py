@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from functools import cache
 from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
-    Literal,
     TypeAlias,
     Union,
     cast,
@@ -32,7 +31,6 @@ from typing_extensions import TypedDict
 from aerodaas.config.extensions import added
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.messages.serialization.json_types import StrictlyTyped
-from aerodaas.messages.serialization.records import shared_pickle
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -43,7 +41,6 @@ __all__ = [
     "Action",
     "ActionKeywords",
     "Actions",
-    "MoveActuator",
     "Number",
     "Place",
     "action_kinds",
@@ -93,6 +90,11 @@ class Action:
         return self.type
 
     @property
+    def equipment(self) -> str:
+        """Id of the robot's actuator that it moves, for which tenants need a permission."""
+        return ""
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names that it holds, which must be short in a stranger's waypoint."""
         return ()
@@ -139,49 +141,9 @@ def _ranges(kind: type[Action]) -> Mapping[str, tuple[float, float, str, bool]]:
     return found
 
 
-@shared_pickle
-@dataclass(frozen=True, slots=True)
-class MoveActuator(Action):
-    """Have an actuator take a position at the waypoint, after picture and video."""
-
-    purpose: ClassVar[str] = "moves actuators"
-    order: ClassVar[int] = 2
-    keywords: ClassVar[tuple[str, ...]] = ("actuate",)
-    actuator: str
-    """Its id in the environment file."""
-    position: str
-    type: Literal["move_actuator"] = field(default="move_actuator", repr=False)
-
-    def __post_init__(self) -> None:
-        """Refuse what is no text."""
-        names: tuple[object, object] = (self.actuator, self.position)
-        if not all(isinstance(name, str) for name in names):
-            raise InvalidWaypointError(f"actuator and position are texts, not {names!r}")
-
-    @classmethod
-    def from_keywords(cls, given: Mapping[str, Any]) -> Iterator[Action]:
-        """One of each actuator."""
-        moves = given["actuate"]
-        pairs = tuple(moves.items()) if isinstance(moves, Mapping) else moves
-        if not (isinstance(pairs, tuple | list) and all(map(_is_pair, pairs))):
-            message = f'actuate is positions by actuator, {{"hook": "release"}}, not {moves!r}'
-            raise InvalidWaypointError(message)
-        return (cls(*pair) for pair in pairs)
-
-    @property
-    def slot(self) -> str:
-        """The actuator, which a waypoint moves once."""
-        return f"actuator {self.actuator}"
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """The actuator and its position."""
-        return self.actuator, self.position
-
-
 def action_kinds() -> Mapping[str, type[Action]]:
     """Classes of actions by their type in JSON, in the order in which a drone does them."""
-    kinds: list[type[Any]] = sorted((MoveActuator, *added("actions")), key=lambda kind: kind.order)
+    kinds: list[type[Any]] = sorted(added("actions"), key=lambda kind: kind.order)
     return {str(fields(kind)[-1].default): kind for kind in kinds}
 
 
@@ -268,7 +230,3 @@ def actions_of(keywords: Mapping[str, Any]) -> tuple[Action, ...]:
 
 def _is_empty(value: object) -> bool:
     return value is None or value is False or value in ((), [], {})
-
-
-def _is_pair(value: object) -> bool:
-    return isinstance(value, tuple | list) and [type(one) for one in value] == [str, str]

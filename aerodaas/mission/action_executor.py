@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from aerodaas.config.extensions import added
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import failure_line
 from aerodaas.geometry.frames import Vector
+from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
+from aerodaas.mission.commands import Answer, Command
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 
-__all__ = ["ActionExecutor", "ActionRunner", "Course", "added_executors"]
+__all__ = ["ActionExecutor", "ActionRunner", "Course", "action_objection", "added_executors"]
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +47,33 @@ class ActionExecutor:
     order: ClassVar[int] = 3
     """As `Action.order`: an executor of a lower number comes first."""
 
-    def objection(self, waypoint: Waypoint) -> str:
-        """Why an action of a waypoint is not possible; empty if all are."""
-        del waypoint
+    @classmethod
+    def objection(cls, waypoint: Waypoint, robot: RobotConfig) -> str:
+        """Why an action of a waypoint is not possible, before the flight and in it.
+
+        Args:
+            waypoint: The waypoint.
+            robot: The robot that is to fly there.
+
+        Returns:
+            One clause; empty if all are.
+        """
+        del waypoint, robot
         return ""
+
+    def handle(self, command: Command, state: MissionState, now: int) -> Answer | None:
+        """Execute a command that concerns the executor's equipment.
+
+        Args:
+            command: The command.
+            state: The mission's state.
+            now: Mission clock, nanoseconds.
+
+        Returns:
+            The answer; None for a command of others.
+        """
+        del command, state, now
+        return None
 
     def poll(self, now: int) -> None:
         """Process what the vehicle has said, once a turn; `now` is the mission clock, ns."""
@@ -91,8 +118,37 @@ class ActionExecutor:
         """What goes on between waypoints by our setpoints, as a clause; empty for nothing."""
         return ""
 
-    def end(self, now: int) -> None:
-        """End what goes on after the mission, at `now` (ns)."""
+    def interruption(self) -> tuple[MissionState, str] | None:
+        """PAUSED or RETURNING, with the reason, after a failure at a stop; returned once."""
+        return None
+
+    def ending(self) -> tuple[MissionState, str] | None:
+        """LANDING or ABORTED, with the reason, as long as the flight cannot go on."""
+        return None
+
+    def on_state(self, state: MissionState, now: int) -> None:
+        """Do what is due in a state of the mission; in its last one, end what goes on.
+
+        Args:
+            state: The mission's state.
+            now: Mission clock, nanoseconds.
+        """
+
+
+def action_objection(waypoint: Waypoint, robot: RobotConfig) -> str:
+    """Why an action of a waypoint is not possible; empty if all are.
+
+    Args:
+        waypoint: The waypoint.
+        robot: The robot that is to fly there.
+    """
+    if not waypoint.actions:
+        return ""
+    return _first(kind.objection(waypoint, robot) for kind in added("action_executors")) or ""
+
+
+def _first(found: Iterable[T | None]) -> T | None:
+    return next(filter(None, found), None)
 
 
 def added_executors(vehicle: object, robot: RobotConfig, log: MissionLog) -> list[ActionExecutor]:
@@ -115,9 +171,9 @@ class ActionRunner(ActionExecutor):
         self._executors = executors
         self._log = log
 
-    def objection(self, waypoint: Waypoint) -> str:
-        """The first objection; empty for none."""
-        return next(filter(None, (one.objection(waypoint) for one in self._executors)), "")
+    def handle(self, command: Command, state: MissionState, now: int) -> Answer | None:
+        """The first answer; None if no executor knows the command."""
+        return _first(executor.handle(command, state, now) for executor in self._executors)
 
     def poll(self, now: int) -> None:
         """Poll each."""
@@ -140,12 +196,20 @@ class ActionRunner(ActionExecutor):
 
     def ongoing(self) -> str:
         """The first that goes on; empty for none."""
-        return next(filter(None, (executor.ongoing() for executor in self._executors)), "")
+        return _first(executor.ongoing() for executor in self._executors) or ""
 
-    def end(self, now: int) -> None:
-        """End each."""
+    def interruption(self) -> tuple[MissionState, str] | None:
+        """The first."""
+        return _first(executor.interruption() for executor in self._executors)
+
+    def ending(self) -> tuple[MissionState, str] | None:
+        """The first."""
+        return _first(executor.ending() for executor in self._executors)
+
+    def on_state(self, state: MissionState, now: int) -> None:
+        """Inform each."""
         for executor in self._executors:
-            self._call(executor.end, now)
+            self._call(executor.on_state, state, now)
 
     def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:  # noqa: ANN401 - any of its
         """Call a method of an executor, whose last argument is the mission clock."""

@@ -18,17 +18,15 @@ from aerodaas.errors import failure_line
 from aerodaas.geometry.braking import stopping_point
 from aerodaas.geometry.energy import EnergyMeter, EnergyModel
 from aerodaas.geometry.frames import GeodeticOrigin, Vector
-from aerodaas.messages.actuators import ActuatedVehicle
 from aerodaas.messages.mission import RECENT, MissionState, MissionStatus
 from aerodaas.messages.mission_mode import MissionModeVehicle
 from aerodaas.messages.payload import Photo
 from aerodaas.messages.readings import Alert
 from aerodaas.messages.vehicle import Setpoint, VehicleMode, VehicleState
 from aerodaas.messages.waypoints import HeightDatum
-from aerodaas.mission.action_executor import ActionRunner, Course, added_executors
+from aerodaas.mission.action_executor import ActionRunner, Course, action_objection, added_executors
 from aerodaas.mission.command_handler import DONE, CommandHandler, ManualControl
 from aerodaas.mission.commands import (
-    Actuate,
     AddNavigation,
     Answer,
     ClearNavigation,
@@ -40,7 +38,6 @@ from aerodaas.mission.commands import (
     Pause,
     RearrangeNavigation,
     ReleaseControls,
-    ReleaseParachute,
     Resume,
     ReturnHome,
     Start,
@@ -75,7 +72,6 @@ from aerodaas.mission.navigation.planner import Planner
 from aerodaas.mission.navigation.planning import Planning
 from aerodaas.mission.navigation.queue import QueuedWaypoint
 from aerodaas.mission.navigation.route import Route
-from aerodaas.mission.payload.actuation import Actuation
 from aerodaas.mission.safety.failsafe import FailsafeAction
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.ground_clearance import GroundClearance
@@ -139,11 +135,7 @@ class Mission:
         self._obeyed = obeyed
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
-        # Once: to ask a protocol about an object looks up all its members each time.
-        actuated = payload if isinstance(payload, ActuatedVehicle) else None
-        self.actuation = Actuation(actuated, robot, self._log)
-        added = added_executors(payload, robot, self._log)
-        self._actions = ActionRunner((*added, self.actuation), self._log)
+        self._actions = ActionRunner(added_executors(payload, robot, self._log), self._log)
         self._meter = EnergyMeter(
             EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
         )
@@ -158,7 +150,7 @@ class Mission:
             clearance=clearance,
             command_timeout=limits.command_timeout,
             resume_after=robot.mission.resume_after,
-            objection=self._actions.objection,
+            objection=lambda waypoint: action_objection(waypoint, robot),
         )
         self._planning = Planning(self._navigator, robot, self.home, self._meter, self._log)
         self._route = Route(self.fence, limits, self.home, clearance)
@@ -251,8 +243,8 @@ class Mission:
                     return self._command_handler.navigate(command, self._now)
                 case TakeControls() | Steer() | ReleaseControls():
                     return self._control_by_hand(command)
-                case Actuate() | ReleaseParachute() | HandOver() | TakeBack():
-                    return self._act(command)
+                case HandOver() | TakeBack():
+                    return self._hand_over(command)
                 case _:
                     return self._control(command)
         except Exception as error:  # noqa: BLE001 - a sender's objects may raise anything
@@ -272,7 +264,7 @@ class Mission:
         late = isinstance(command, _NAVIGATION) and self.state in _LEAVING
         return f"the drone is {self.state.value} by now" if late else ""
 
-    def _control(self, command: object) -> Answer:
+    def _control(self, command: Command) -> Answer:
         match command:
             case OpenStream():
                 self._command_handler.open(command, self._now)
@@ -288,12 +280,12 @@ class Mission:
                 return self._pause()
             case Resume():
                 return self._resume()
-            case ReturnHome():
-                return self._abandon(MissionState.RETURNING, command.reason)
-            case End():
-                return self._abandon(MissionState.LANDING, command.reason)
+            case ReturnHome() | End():
+                leaves = isinstance(command, ReturnHome)
+                state = MissionState.RETURNING if leaves else MissionState.LANDING
+                return self._abandon(state, command.reason)
             case _:
-                raise TypeError(f"{type(command).__name__} is no command")
+                return self._act(command)
         return DONE
 
     def _pause(self) -> Answer:
@@ -319,18 +311,17 @@ class Mission:
         """Fly by setpoints again, if the autopilot flies the waypoints."""
         self.handover.take_back(reason, self._now)
 
-    def _act(self, command: Actuate | ReleaseParachute | HandOver | TakeBack) -> Answer:
-        if isinstance(command, HandOver | TakeBack):
-            return self._hand_over(command)
-        if isinstance(command, Actuate):
-            return self.actuation.move(command)
-        if self.state in _ON_GROUND:
-            text = f"a parachute is fired in the air only, and the drone is {self.state.value}"
-            return Answer(accepted=False, text=text)
-        answer = self.actuation.release(command)
-        if answer.accepted and self.state is not MissionState.LANDING:
-            self._to(MissionState.LANDING, f"the parachute {command.parachute} is to open")
+    def _act(self, command: Command) -> Answer:
+        answer = self._actions.handle(command, self.state, self._now)
+        self._heed_actions()
+        if answer is None:
+            raise TypeError(f"{type(command).__name__} is no command of this installation")
         return answer
+
+    def _heed_actions(self) -> None:
+        """Land, or end the mission, where an action leaves no other way."""
+        if (ending := self._actions.ending()) and not self.finished and ending[0] != self.state:
+            self._to(*ending)
 
     def _resume(self) -> Answer:
         if not self._paused:
@@ -411,9 +402,7 @@ class Mission:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
         self._actions.poll(now)
-        if self.actuation.released and not self.finished:
-            self._to(MissionState.ABORTED, f"the parachute {self.actuation.released} was released")
-            self._log.alert(now, "parachute", self._machine.reason)
+        self._heed_actions()
         last, self._last = self._last, state
         on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
         if last is None or on_ground or not has_position(last):
@@ -564,8 +553,8 @@ class Mission:
         position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
         busy = self._actions.attend(stop, state.odometry, self._now)
-        if failure := self.actuation.take_failure():
-            return self._after_failure(failure, state)
+        if interruption := self._actions.interruption():
+            return self._interrupt(*interruption, state)
         if busy and phase is LegPhase.DONE:
             phase = LegPhase.HOVERING
         routed = self._route.towards(stop.waypoint.position, position, stop.above_ground)
@@ -583,12 +572,14 @@ class Mission:
         )
         return Fly(flown, stop.cause)
 
-    def _after_failure(self, failure: str, state: VehicleState) -> MotionRequest:
-        """Request after the failure of an actuator, where the flight is not to go on."""
-        if self._options.on_actuator_failure == "pause":
+    def _interrupt(
+        self, following: MissionState, reason: str, state: VehicleState
+    ) -> MotionRequest:
+        """Pause or return after the failure of an action."""
+        if following is MissionState.PAUSED:
             self._paused = True
             return self._stay(state)
-        self._to(MissionState.RETURNING, failure)
+        self._to(following, reason)
         return self._return(state)
 
     def _finish(self, stop: QueuedWaypoint, phase: LegPhase) -> None:
@@ -678,9 +669,7 @@ class Mission:
         if state in _LEAVING and self.state not in _LEAVING and not commanded:
             self._note_unfinished(reason)
         self._machine.to(state, self._now, reason)
-        self.actuation.step(self._now, home=self.finished or state in _LEAVING)
-        if self.finished:
-            self._actions.end(self._now)
+        self._actions.on_state(self.state, self._now)
 
     def _note_unfinished(self, reason: str) -> None:
         """Record why the drone leaves, if it does so with waypoints ahead or in its take-off."""

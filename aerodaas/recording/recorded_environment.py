@@ -107,8 +107,6 @@ _ROBOT: dict[str, Rule] = {
         "resume_after",
         "plan_timeout",
         "stall_timeout",
-        "actuator_timeout",
-        "on_actuator_failure",
     ),
 }
 _TASK = _fields(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerodaas.analytics.base import Analytics
 from aerodaas.config.checked import checked, near
+from aerodaas.config.extensions import service
 from aerodaas.config.plugins import (
     PluginKind,
     is_built_in,
@@ -218,9 +219,10 @@ def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place
 
 
 def _check_actuators(robot: RobotConfig, place: str) -> None:
-    """Raise ConfigError for actuators that the robot's driver cannot move."""
+    """Raise ConfigError for actuators that the driver, or this installation, cannot move."""
     if not robot.actuators:
         return
+    service("actuators.objection")
     known: Collection[str] = getattr(load_plugin("drivers", robot.driver), "actuator_types", ())
     for number, one in enumerate(robot.actuators):
         if one.type not in known:

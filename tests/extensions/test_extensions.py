@@ -136,7 +136,8 @@ class Sprayer(ActionExecutor):
     done = []
     def __init__(self, vehicle, robot, log):
         self.since = None
-    def objection(self, waypoint):
+    @classmethod
+    def objection(cls, waypoint, robot):
         spray = waypoint.action(Spray)
         return "the tank holds 5 litres" if spray and spray.litres > 5 else ""
     def attend(self, stop, odometry, now):

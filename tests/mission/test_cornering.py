@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
-from aerodaas.config.sections.actuators import ServoConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.geometry.braking import braking_distance, braking_speed
@@ -152,16 +151,6 @@ def test_what_lies_in_the_same_place_is_not_passed() -> None:
     """There is no direction in which to go on."""
     one = flight(add(ROW[0], replace(ROW[0], id="again"), ROW[1]), limits=LIMITS)
     assert passed_at(one, "w1") == 0.0
-
-
-def test_an_actuator_at_a_waypoint_has_the_drone_stop() -> None:
-    """It is moved there."""
-    hook = ServoConfig.model_validate(
-        {"type": "servo", "id": "hook", "channel": 9, "positions": {"open": 1900}}
-    )
-    there = replace(ROW[1], actuate={"hook": "open"})
-    one = flight(add(ROW[0], there, ROW[2]), limits=LIMITS, actuators=[hook])
-    assert passed_at(one, "w2") == 0.0
 
 
 def test_a_corner_of_the_fence_is_neither_passed_nor_on_the_line() -> None:

@@ -11,12 +11,17 @@ from offered import PILOT, Provider
 from served import document
 
 from aerodaas.cli.provider.serve import _actuators
+from aerodaas.config.extensions import extensions
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.schemas import MissionIn
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.orders import FlightOrder
+
+pytestmark = pytest.mark.skipif(
+    "actuators" not in extensions(), reason="no waypoint moves an actuator without the extension"
+)
 
 CARRIED: dict[str, Any] = {
     "actuators": [

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
 from aerodaas.config.checked import Strict, near
 from aerodaas.identifiers import Identifier
-from aerodaas.messages.actions import Action, MoveActuator
 
 __all__ = [
     "ACTUATOR_TYPES",
@@ -18,8 +17,6 @@ __all__ = [
     "ParachuteConfig",
     "RelayConfig",
     "ServoConfig",
-    "actuator_objection",
-    "parachute_objection",
     "permitted",
 ]
 
@@ -120,43 +117,3 @@ def permitted(
         for one in actuators
         if f"{robot}/{one.id}" in names and not isinstance(one, ParachuteConfig)
     ]
-
-
-def actuator_objection(
-    actuators: Sequence[ActuatorConfig], actions: Iterable[Action], *, by_waypoint: bool
-) -> str:
-    """Why actuators cannot be moved as `actions` say; empty if they can.
-
-    Args:
-        actuators: Those of the robot.
-        actions: The actions, of which those of other kinds are left out.
-        by_waypoint: Whether a waypoint asks, which has no say over a parachute.
-    """
-    known = {one.id: one for one in actuators}
-    for action in actions:
-        if not isinstance(action, MoveActuator):
-            continue
-        name, position = action.actuator, action.position
-        actuator = known.get(name)
-        if actuator is None:
-            return f"no actuator is called {name!r}{near(name, known)}"
-        if by_waypoint and isinstance(actuator, ParachuteConfig):
-            return f"{name!r} is a parachute, which no waypoint touches"
-        if position not in actuator.positions:
-            return f"{name!r} has no position {position!r}{near(position, actuator.positions)}"
-    return ""
-
-
-def parachute_objection(actuators: Sequence[ActuatorConfig], name: str) -> str:
-    """Why a parachute is not fired; empty if it is permitted.
-
-    Args:
-        actuators: Those of the robot.
-        name: Id of the parachute.
-    """
-    chutes = {one.id: one for one in actuators if isinstance(one, ParachuteConfig)}
-    if name not in chutes:
-        return f"no parachute is called {name!r}{near(name, chutes)}"
-    if not chutes[name].may_release:
-        return f"{name!r} may not be fired: its may_release in the environment file is false"
-    return ""

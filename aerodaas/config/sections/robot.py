@@ -134,11 +134,6 @@ class MissionConfig(Extensible):
     """Wait for a scheduler's first plan before flying the order given."""
     stall_timeout: Positive = 60.0
     """A waypoint that comes no nearer for so long is given up."""
-    actuator_timeout: Positive = 15.0
-    """Seconds that each actuator gets at a waypoint; then it has failed."""
-    on_actuator_failure: Literal["continue", "pause", "return"] = "continue"
-    """What follows where an actuator fails at a waypoint: the next waypoint, without the other
-    actuators of this one; a pause, until somebody resumes the mission; or the way home."""
 
 
 class SensorConfig(Strict):

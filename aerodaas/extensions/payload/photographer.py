@@ -22,6 +22,7 @@ from aerodaas.extensions.payload.filming import Filming
 from aerodaas.extensions.payload.photo_trigger import PhotoTrigger
 from aerodaas.extensions.payload.point_of_interest import PointOfInterest, fresh, near
 from aerodaas.extensions.payload.settings import PayloadMission
+from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.payload import (
     Gimbal,
@@ -37,6 +38,7 @@ from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.action_executor import ActionExecutor, Course
 from aerodaas.mission.log import MissionLog, words
 from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.state_machine import TERMINAL
 
 __all__ = ["NO_CAMERA", "PhotoCapture", "PhotoRequest", "Photographer"]
 
@@ -279,9 +281,10 @@ class Photographer(ActionExecutor):
         self._shutter.poll(now)
         self._filming.poll(now)
 
-    def end(self, now: int) -> None:
-        """End what goes on after the mission, at `now` (ns)."""
-        self._filming.end(now)
+    def on_state(self, state: MissionState, now: int) -> None:
+        """End a video with the mission."""
+        if state in TERMINAL:
+            self._filming.end(now)
 
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, to which the drone flies or at which it is.

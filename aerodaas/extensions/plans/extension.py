@@ -5,7 +5,7 @@ from aerodaas.config.extensions import Command, Extension
 EXTENSION = Extension(
     name="plans",
     summary="Plans of QGroundControl and Mission Planner, and areas from KML and GeoJSON.",
-    requires=("payload",),
+    requires=("actuators", "payload"),
     commands=(
         Command(
             "plan",

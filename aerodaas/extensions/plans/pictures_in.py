@@ -15,6 +15,7 @@ from functools import partial
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError, InvalidWaypointError
+from aerodaas.extensions.actuators.actions import MoveActuator
 from aerodaas.extensions.payload.actions import (
     LEAST_TRIGGER,
     AimGimbal,
@@ -33,7 +34,6 @@ from aerodaas.extensions.plans.commands import (
 from aerodaas.extensions.plans.formats.numbers import LatLon, place
 from aerodaas.extensions.plans.plan import PlanItem
 from aerodaas.geometry.frames import wrap_angle
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.waypoints import HeightReference, Waypoint
 
 __all__ = ["Height", "PictureItems", "same_place"]

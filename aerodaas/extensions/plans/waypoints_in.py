@@ -10,6 +10,7 @@ from dataclasses import replace
 from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
+from aerodaas.extensions.actuators.actions import MoveActuator
 from aerodaas.extensions.plans.actuators import MOVES, move_of
 from aerodaas.extensions.plans.commands import (
     FRAMES_ABOVE_GROUND,
@@ -22,7 +23,6 @@ from aerodaas.extensions.plans.formats.numbers import LatLon, finite, place
 from aerodaas.extensions.plans.pictures_in import PictureItems, same_place
 from aerodaas.extensions.plans.plan import Notice, Plan, PlanItem
 from aerodaas.geometry.frames import yaw_ned_to_enu
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.waypoints import HeightReference, Waypoint, WaypointType
 
 __all__ = ["Ground", "waypoints_of"]

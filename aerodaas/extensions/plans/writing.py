@@ -14,6 +14,7 @@ import numpy as np
 from aerodaas.config.sections.actuators import ActuatorConfig
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.errors import ConfigError
+from aerodaas.extensions.actuators.actions import MoveActuator
 from aerodaas.extensions.payload.actions import LookAt, RecordVideo
 from aerodaas.extensions.plans.actuators import move_item
 from aerodaas.extensions.plans.commands import (
@@ -26,7 +27,6 @@ from aerodaas.extensions.plans.formats.waypoint_file import HEADER
 from aerodaas.extensions.plans.pictures_out import PictureWriter
 from aerodaas.extensions.plans.plan import Notice, Plan, PlanHome, PlanItem
 from aerodaas.geometry.frames import GeodeticOrigin, yaw_enu_to_ned
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.waypoints import DEFAULT_PRIORITY, HeightReference, Waypoint, WaypointType
 
 __all__ = ["planned", "write_plan"]

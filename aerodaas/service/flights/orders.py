@@ -13,7 +13,6 @@ from aerodaas.config.checked import checked
 from aerodaas.config.options import EdgeShare
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.mission import Place, RobotStatus
 from aerodaas.protocol.schemas import (
     Area,
@@ -236,11 +235,11 @@ class FlightOrders:
         """Raise RefusedError for a document that moves what the tenant may not."""
         may = self._settings.actuators.get(tenant, frozenset())
         asked = {
-            f"{entry.robot}/{action.actuator}"
+            f"{entry.robot}/{action.equipment}"
             for entry in document.navigation
             for waypoint in entry.waypoints
             for action in waypoint.actions
-            if isinstance(action, MoveActuator)
+            if action.equipment
         }
         if refused := sorted(asked - may):
             raise RefusedError(

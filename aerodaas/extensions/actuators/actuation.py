@@ -8,29 +8,33 @@ drone comes home, so that nothing goes on spraying on the way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import ClassVar
 
 from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.config.sections.actuators import (
-    RelayConfig,
-    ServoConfig,
-    actuator_objection,
-    parachute_objection,
-)
+from aerodaas.config.checked import added_settings
+from aerodaas.config.sections.actuators import RelayConfig, ServoConfig
 from aerodaas.config.sections.robot import RobotConfig
 from aerodaas.errors import VehicleError, failure_line
+from aerodaas.extensions.actuators.actions import MoveActuator
+from aerodaas.extensions.actuators.objections import command_objection, waypoint_objection
+from aerodaas.extensions.actuators.settings import ActuatorMission
 from aerodaas.geometry.frames import Vector, length
-from aerodaas.messages.actions import MoveActuator
 from aerodaas.messages.actuators import ActuatedVehicle, Actuators, MoveResult
+from aerodaas.messages.mission import MissionState
 from aerodaas.messages.odometry import Odometry
 from aerodaas.messages.waypoints import Waypoint
 from aerodaas.mission.action_executor import ActionExecutor
-from aerodaas.mission.commands import Actuate, Answer, ReleaseParachute
+from aerodaas.mission.commands import Actuate, Answer, Command, ReleaseParachute
 from aerodaas.mission.log import MissionLog
 from aerodaas.mission.navigation.queue import QueuedWaypoint
+from aerodaas.mission.state_machine import TERMINAL
 
 __all__ = ["Actuation"]
 
+_ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
+_UNPLANNED = frozenset({MissionState.RETURNING, MissionState.LANDING, *TERMINAL})
+"""States of a drone that flies by no plan any more."""
 _KIND = "actuator"
 """Kind of the alerts."""
 _INTERRUPTED = NANOSECONDS // 4
@@ -61,54 +65,71 @@ class _Release:
     number: int
 
 
-@dataclass(slots=True)
 class Actuation(ActionExecutor):
-    """Actuators of one mission, called by it once a turn."""
+    """Actuators of one mission."""
 
-    vehicle: ActuatedVehicle | None
-    """Uses the actuators of this one; None for a vehicle that moves none."""
-    robot: RobotConfig
-    log: MissionLog
-    released: str = ""
-    """Parachute that was fired; empty for none."""
-    _tasks: dict[str, _Task] = field(default_factory=dict)
-    _asked: dict[int, str] = field(default_factory=dict)
-    """What was asked for by command, by the command's number."""
-    _release: _Release | None = None
-    _failure: str = ""
-    _home: bool = False
+    order: ClassVar[int] = 2
 
-    def take_failure(self) -> str:
-        """Failure after which the flight is not to go on; returned once, otherwise empty."""
+    def __init__(self, vehicle: object, robot: RobotConfig, log: MissionLog) -> None:
+        """Use the actuators of `vehicle`, if it is an `ActuatedVehicle`; alerts go to `log`."""
+        # Once: to ask a protocol about an object looks up all its members each time.
+        self._vehicle = vehicle if isinstance(vehicle, ActuatedVehicle) else None
+        self._robot = robot
+        self._settings = added_settings(robot.mission, ActuatorMission)
+        self._log = log
+        self._tasks: dict[str, _Task] = {}
+        self._asked: dict[int, str] = {}
+        """What was asked for by command, by the command's number."""
+        self._release: _Release | None = None
+        self._released = ""
+        """Parachute that was fired; empty for none."""
+        self._failure = ""
+        self._unplanned = False
+
+    @classmethod
+    def objection(cls, waypoint: Waypoint, robot: RobotConfig) -> str:
+        """An actuator or a position that the robot has not."""
+        return waypoint_objection(waypoint, robot)
+
+    def handle(self, command: Command, state: MissionState, now: int) -> Answer | None:
+        """Move an actuator, or fire a parachute in the air; a failure becomes an alert."""
+        del now
+        if not isinstance(command, Actuate | ReleaseParachute):
+            return None
+        if isinstance(command, ReleaseParachute) and state in _ON_GROUND:
+            text = f"a parachute is fired in the air only, and the drone is {state.value}"
+            return Answer(accepted=False, text=text)
+        if text := command_objection(self._robot, command):
+            return Answer(accepted=False, text=text)
+        try:
+            if isinstance(command, Actuate):
+                self._move(command.actuator, command.position)
+            else:
+                number = self._actuators().release_parachute(command.parachute)
+                self._release = _Release(command.parachute, number)
+        except VehicleError as error:
+            return Answer(accepted=False, text=str(error))
+        return Answer(accepted=True)
+
+    def _move(self, actuator: str, position: str) -> None:
+        number = self._actuators().move(actuator, position)
+        self._asked[number] = f"{actuator}: {position}"
+
+    def ending(self) -> tuple[MissionState, str] | None:
+        """A parachute has the drone land, and ends the flight once it is known to be out."""
+        if self._released:
+            return MissionState.ABORTED, f"the parachute {self._released} was released"
+        if self._release is not None:
+            return MissionState.LANDING, f"the parachute {self._release.name} is to open"
+        return None
+
+    def interruption(self) -> tuple[MissionState, str] | None:
+        """A failure, where the environment file has the mission pause or return for it."""
         failure, self._failure = self._failure, ""
-        return failure
-
-    def objection(self, waypoint: Waypoint) -> str:
-        """Why what a waypoint asks of actuators is not possible; empty if it is."""
-        return actuator_objection(self.robot.actuators, waypoint.actions, by_waypoint=True)
-
-    def move(self, command: Actuate) -> Answer:
-        """Move an actuator by command, wherever the drone is; a failure becomes an alert."""
-        actions = [MoveActuator(command.actuator, command.position)]
-        if text := actuator_objection(self.robot.actuators, actions, by_waypoint=False):
-            return Answer(accepted=False, text=text)
-        try:
-            number = self._actuators().move(command.actuator, command.position)
-        except VehicleError as error:
-            return Answer(accepted=False, text=str(error))
-        self._asked[number] = f"{command.actuator}: {command.position}"
-        return Answer(accepted=True)
-
-    def release(self, command: ReleaseParachute) -> Answer:
-        """Fire a parachute, where the environment file permits it."""
-        if text := parachute_objection(self.robot.actuators, command.parachute):
-            return Answer(accepted=False, text=text)
-        try:
-            number = self._actuators().release_parachute(command.parachute)
-        except VehicleError as error:
-            return Answer(accepted=False, text=str(error))
-        self._release = _Release(command.parachute, number)
-        return Answer(accepted=True)
+        follows = self._settings.on_actuator_failure
+        if not failure or follows == "continue":
+            return None
+        return MissionState.PAUSED if follows == "pause" else MissionState.RETURNING, failure
 
     def poll(self, now: int) -> None:
         """Process the results of commands, and withdraw those of a stop that was left.
@@ -116,26 +137,26 @@ class Actuation(ActionExecutor):
         `now` is the mission clock, nanoseconds.
         """
         try:
-            actuators = None if self.vehicle is None else self.vehicle.actuators
+            actuators = None if self._vehicle is None else self._vehicle.actuators
             for result in () if actuators is None else actuators.results():
                 self._on_result(result, now)
             for task in self._tasks.values():
                 if actuators is not None and now - task.attended > _INTERRUPTED:
                     self._withdraw(task, actuators)
         except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight
-            self.log.alert(now, _KIND, f"the actuators: {failure_line(error)}")
+            self._log.alert(now, _KIND, f"the actuators: {failure_line(error)}")
 
-    def step(self, now: int, *, home: bool) -> None:
+    def on_state(self, state: MissionState, now: int) -> None:
         """Give its rest to all that has one, if the drone flies by no plan from now on.
 
         Args:
+            state: The mission's state.
             now: Mission clock, nanoseconds.
-            home: Whether the drone comes home, lands, or the mission is over.
         """
-        begins, self._home = home and not self._home, home
+        begins, self._unplanned = state in _UNPLANNED and not self._unplanned, state in _UNPLANNED
         if not begins:
             return
-        for one in self.robot.actuators:
+        for one in self._robot.actuators:
             if isinstance(one, RelayConfig | ServoConfig) and one.rest is not None:
                 self._rest(one.id, one.rest, now)
 
@@ -144,12 +165,11 @@ class Actuation(ActionExecutor):
             # What a stop asked for might be repeated after it.
             for task in self._tasks.values():
                 self._withdraw(task, self._actuators())
-            answer = self.move(Actuate(name, position))
-            fault = "" if answer.accepted else answer.text
+            self._move(name, position)
+        except VehicleError as error:
+            self._log.alert(now, _KIND, f"{name}: {position}: not done: {error}")
         except Exception as error:  # noqa: BLE001 - a driver's actuators must not end a flight
-            fault = failure_line(error)
-        if fault:
-            self.log.alert(now, _KIND, f"{name}: {position}: not done: {fault}")
+            self._log.alert(now, _KIND, f"{name}: {position}: not done: {failure_line(error)}")
 
     @staticmethod
     def _withdraw(task: _Task, actuators: Actuators) -> None:
@@ -161,13 +181,14 @@ class Actuation(ActionExecutor):
         release, asked = self._release, self._asked.pop(result.number, None)
         if release is not None and release.number == result.number:
             self._release = None
-            self.released = release.name if result.accepted else ""
+            self._released = release.name if result.accepted else ""
+            text = f"the parachute {release.name} was released"
             if not result.accepted:
                 text = f"the parachute {release.name} was not released: {result.reason}"
-                self.log.alert(now, "parachute", text)
+            self._log.alert(now, "parachute", text)
         elif asked is not None:
             if not result.accepted:
-                self.log.alert(now, _KIND, f"{asked}: not done: {result.reason}")
+                self._log.alert(now, _KIND, f"{asked}: not done: {result.reason}")
         else:
             for task in self._tasks.values():
                 if task.number == result.number:
@@ -180,10 +201,9 @@ class Actuation(ActionExecutor):
         if fault:
             more = f"; nor {', '.join(one.actuator for one in task.left)}" if task.left else ""
             text = f"{task.stop.id}: {move.actuator}: {move.position}: not done: {fault}{more}"
-            self.log.alert(now, _KIND, text)
+            self._log.alert(now, _KIND, text)
             task.left = []
-            if self.robot.mission.on_actuator_failure != "continue":
-                self._failure = text
+            self._failure = text
 
     def attend(self, stop: QueuedWaypoint, odometry: Odometry, now: int) -> bool:
         """Do what is due for `stop`, at which the drone is.
@@ -220,8 +240,8 @@ class Actuation(ActionExecutor):
         task.since = now if task.since is None else task.since
         # The drone may have been blown away since it arrived.
         away = length(task.stop.waypoint.position - position)
-        near = away <= self.robot.limits.arrival_radius
-        timeout = self.robot.mission.actuator_timeout
+        near = away <= self._robot.limits.arrival_radius
+        timeout = self._settings.actuator_timeout
         if seconds(now - task.since) > timeout:
             if task.number is None:
                 raise VehicleError(f"the drone did not stay at its place within {timeout:g} s")
@@ -231,7 +251,7 @@ class Actuation(ActionExecutor):
             task.number = actuators.move(*task.left[0].names)
 
     def _actuators(self) -> Actuators:
-        actuators = None if self.vehicle is None else self.vehicle.actuators
+        actuators = None if self._vehicle is None else self._vehicle.actuators
         if actuators is None:
             raise VehicleError("the vehicle has no actuators")
         return actuators

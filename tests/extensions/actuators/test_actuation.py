@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 import pytest
-from flights import Flight, KinematicVehicle, add, flight
+from flights import Flight, KinematicVehicle, add, flight, passed_at
 
 from aerodaas.config.model import LimitsConfig, MissionConfig
 from aerodaas.config.sections.actuators import (
@@ -96,7 +96,7 @@ def prepared(
     return flight(
         add(*(waypoints or STOPS)),
         vehicle=vehicle,
-        options=MissionConfig(actuator_timeout=4.0, **options),
+        options=MissionConfig.model_validate({"actuator_timeout": 4.0, **options}),
         actuators=carried,
     )
 
@@ -413,3 +413,12 @@ def test_a_servo_rests_where_it_has_a_position() -> None:
     """A slip is told with what was perhaps meant."""
     with pytest.raises(ValueError, match="no position is called 'close'"):
         ServoConfig(id="x", type="servo", channel=1, positions={"closed": 1000}, rest="close")
+
+
+def test_a_drone_stops_for_an_actuator() -> None:
+    """Where it would fly through the waypoint otherwise."""
+    row = [Waypoint(f"w{number}", 10.0 * number, 0.0, 2.0) for number in range(1, 4)]
+    row[1] = replace(row[1], actuate={"hook": "release"})
+    made = prepared(Hauler(), *row)
+    assert passed_at(made, "w1") > 0.0
+    assert passed_at(made, "w2") == 0.0

@@ -12,6 +12,7 @@ from keywords import keywords
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.dataflow.mission_document import NavigationDocument
 from aerodaas.errors import ConfigError, GraphError, InvalidWaypointError
+from aerodaas.messages.serialization.schema import message_of
 
 CARRIED: list[dict[str, Any]] = [
     {"id": "hook", "type": "gripper"},
@@ -92,10 +93,12 @@ def test_moves_are_positions_by_actuator(moves: Any) -> None:  # noqa: ANN401
 
 
 def test_a_document_holds_moves_in_order() -> None:
-    """There and back."""
+    """There and back; one of version 0.1 has a field for them."""
     stop = Waypoint("drop", 0, 5, 2, actuate={"hatch": "open", "hook": "release"})
     text = NavigationDocument(robot="drone", waypoints=[stop]).model_dump_json()
     assert '"actions":[{"type":"move_actuator","actuator":"hatch","position":"open"},' in text
     (read,) = NavigationDocument.model_validate_json(text).waypoints
     assert read == stop
     assert list(keywords(read).actuate) == ["hatch", "hook"]
+    moves = {"hatch": "open", "hook": "release"}
+    assert message_of(Waypoint, {"id": "drop", "x": 0, "y": 5, "z": 2, "actuate": moves}) == stop

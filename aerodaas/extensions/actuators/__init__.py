@@ -1,0 +1,1 @@
+"""Actuators of a mission: grippers, relays, servos and parachutes."""

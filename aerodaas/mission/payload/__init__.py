@@ -1,1 +1,0 @@
-"""Pictures, video, gimbals and actuators in a mission."""
