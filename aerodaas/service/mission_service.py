@@ -297,15 +297,7 @@ class MissionService:
         return active
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
-        """A mission that this account may see; its own user counts as present.
-
-        Args:
-            principal: The account that asks.
-            mission: Id of the mission.
-
-        Raises:
-            RefusedError: If it is another mission.
-        """
+        """As `Missions.mission`; the mission's own user counts as present."""
         found = shown(self._seen(principal, mission))
         if _is_user(principal, found):
             self.record_presence(mission)

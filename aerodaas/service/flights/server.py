@@ -124,16 +124,7 @@ class LeasedFlight(OwnFlight):
         super().__init__(run, name)
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command, unless the lease is over.
-
-        Args:
-            principal: The account that asks; an operator's command is given after the lease, too.
-            mission: Id of the mission.
-            command: The command, which names the robot.
-
-        Raises:
-            AeroDaaSError: As `OwnFlight.fly`.
-        """
+        """As `OwnFlight.fly`; once the lease is over, an operator's command alone is given."""
         if self._lease.reason and not principal.role.reaches(Role.OPERATOR):
             return self.refusal()
         return super().fly(principal, mission, command)

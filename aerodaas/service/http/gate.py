@@ -21,7 +21,7 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access.principal import Principal, require
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.http.limits import RateLimiter, RequestLimits
-from aerodaas.service.http.page import is_page
+from aerodaas.service.http.page import PAGE_PATHS
 from aerodaas.service.http.refusals import refuse
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ class LimitsMiddleware:
             await self._app(scope, receive, send)
             return
         connection = HTTPConnection(scope)
-        if is_page(connection):
+        if scope["type"] == "http" and scope["path"] in PAGE_PATHS:
             await self._app(scope, _Bounded(receive, 0), send)
             return
         try:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
-from starlette.requests import HTTPConnection
 
 from aerodaas.config.sections.map_tiles import MapTilesConfig
 
-__all__ = ["is_page", "page_routes"]
+__all__ = ["PAGE_PATHS", "page_routes"]
 
 _FOLDER = Path(__file__).parent / "page"
 _FILES = {
@@ -20,6 +19,8 @@ _FILES = {
     "/icon.svg": ("icon.svg", "image/svg+xml"),
     "/console.css": ("console.css", "text/css; charset=utf-8"),
 }
+PAGE_PATHS = frozenset(_FILES)
+"""Paths of the page's own files, which hold no secret."""
 _HEADERS = {
     # Nothing from elsewhere, no inline script or style, and in nobody's frame unless asked for.
     "content-security-policy": (
@@ -36,11 +37,6 @@ _HEADERS = {
 _NOBODY = "'none'"
 _NOTEBOOKS = "http://127.0.0.1:* http://localhost:*"
 """Pages that may hold the console in a frame of theirs, where a notebook asked for it."""
-
-
-def is_page(connection: HTTPConnection) -> bool:
-    """Whether a request is for one of the page's own files, which hold no secret."""
-    return connection.scope["type"] == "http" and connection.scope["path"] in _FILES
 
 
 def page_routes(*, framed: bool = False, tiles: MapTilesConfig | None = None) -> APIRouter:

@@ -235,12 +235,7 @@ class OwnFlight:
         return self._run.config
 
     def publish_alert(self, kind: str, text: str) -> None:
-        """Publish an alert.
-
-        Args:
-            kind: Short machine-readable name.
-            text: One sentence for the operator.
-        """
+        """As `FlightRun.publish_alert`."""
         self._run.publish_alert(kind, text)
 
     @property
@@ -301,16 +296,7 @@ class OwnFlight:
         return self._scenery
 
     def fly(self, principal: Principal, mission: str, command: PilotCommand) -> Answer:
-        """Give a robot a command, of which an alert tells.
-
-        Args:
-            principal: The account that asks.
-            mission: The flight's id.
-            command: The command, which names the robot.
-
-        Raises:
-            AeroDaaSError: If the account may not command it, or the drone does not answer.
-        """
+        """As `Missions.fly`; an alert tells of the command, and SilentError of no answer."""
         self.require_pilot(principal, mission)
         given, told = _worded(command)
         if isinstance(given, AddNavigation):
@@ -366,16 +352,7 @@ class OwnFlight:
     def items(
         self, mission: str, stream: str, form: PictureForm
     ) -> Iterator[tuple[dict[str, Any], bytes]]:
-        """Items of a stream; an empty one a while without any.
-
-        Args:
-            mission: Ignored.
-            stream: Name of the stream.
-            form: Form of its pictures.
-
-        Raises:
-            ConfigError: If there is no such stream.
-        """
+        """As `Missions.items`; an empty one a while without any."""
         del mission
         reader = self.reader(stream, form)
         while not self.over:

@@ -160,17 +160,6 @@ def test_an_extension_lasts_if_nobody_waits_and_the_quota_allows(book: LeaseBook
         book.extend(lease.id, 1, NOW + 900, FLEET)
 
 
-def test_any_one_that_waits_stands_against_an_extension(book: LeaseBook) -> None:
-    """If the drone is one that it could have."""
-    lease = ask(book, "near")
-    ask(book, "far")
-    ask(book, camera=True, battery_minutes=10.0)
-    assert book.extend(lease.id, 1, NOW, FLEET)[0].minutes == 16
-    ask(book, camera=True)
-    with pytest.raises(RefusedError, match="another waits"):
-        book.extend(lease.id, 1, NOW, FLEET)
-
-
 def test_what_cannot_be_asked_for(book: LeaseBook) -> None:
     """Unknown, twice, and too many."""
     with pytest.raises(RefusedError, match=r"no robot mole; it has: blind, far, near") as refused:
@@ -232,16 +221,6 @@ def test_while_the_database_is_gone_leases_end_and_none_is_granted(tmp_path: Pat
         assert [one.id for one in book.advance(NOW + 61, FLEET)] == [second.id]
         assert store.leases.require(first.id).end is LeaseEnd.EXPIRED
         assert ask(book, "far").state is LeaseState.GRANTED
-
-
-def test_a_change_that_is_refused_leaves_its_news_to_the_next(book: LeaseBook) -> None:
-    """So that no flight is forgotten."""
-    first, second = ask(book, "near", minutes=1), ask(book, "near")
-    book.advance(NOW, FLEET)
-    with pytest.raises(RefusedError, match="no lease"):
-        book.extend("unknown", 1, NOW + 60, FLEET)
-    news = book.advance(NOW + 60, FLEET)
-    assert [one.id for one in news] == [first.id, second.id]
 
 
 def test_of_threads_that_ask_for_one_drone_one_gets_it(book: LeaseBook) -> None:
