@@ -27,8 +27,7 @@ from aerodaas.clock import ScaledClock
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.extensions.sitl.process import SitlProcess
-from aerodaas.extensions.sitl.programs import Family, SitlOptions
+from aerodaas.extensions.sitl.process import Family, SitlOptions, SitlProcess
 from aerodaas.messages.mission import MissionState
 from aerodaas.messages.waypoints import NavigationType, SchedulingType, Waypoint
 from aerodaas.mission.commands import AddNavigation, HandOver, Start

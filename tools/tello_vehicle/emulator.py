@@ -8,7 +8,7 @@ import selectors
 import time
 
 from aerodaas.errors import VehicleError
-from aerodaas.extensions.tello.sockets import bound_socket, datagrams
+from aerodaas.extensions.tello.link import bound_socket, datagrams
 from aerodaas.messages.vehicle import VehicleMode
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment

@@ -17,8 +17,7 @@ from aerodaas.cli.options import ExampleGroup
 from aerodaas.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:
-    from aerodaas.extensions.sitl.process import SitlProcess
-    from aerodaas.extensions.sitl.programs import Family, SimulatedHome
+    from aerodaas.extensions.sitl.process import Family, SimulatedHome, SitlProcess
 
 __all__ = ["app"]
 
@@ -138,8 +137,7 @@ def px4(
 
 
 def _simulate(family: Family, options: dict[str, object], run: Path | None, robot: str) -> None:
-    from aerodaas.extensions.sitl.process import SitlProcess  # noqa: PLC0415 - slow to load
-    from aerodaas.extensions.sitl.programs import SitlOptions  # noqa: PLC0415 - as above
+    from aerodaas.extensions.sitl.process import SitlOptions, SitlProcess  # noqa: PLC0415 - slow
 
     if run is not None and not run.is_file():
         raise ConfigError(f"there is no application {run}")
@@ -211,7 +209,7 @@ def _files(defaults: Sequence[Path] | None) -> Sequence[Path]:
 
 def _home(text: str | None, env: Path | None) -> SimulatedHome:
     """The place that the command line names, the environment's, or one at Zurich."""
-    from aerodaas.extensions.sitl.programs import SimulatedHome  # noqa: PLC0415
+    from aerodaas.extensions.sitl.process import SimulatedHome  # noqa: PLC0415
 
     if text is not None:
         try:

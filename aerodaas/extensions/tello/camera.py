@@ -18,12 +18,12 @@ from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.drivers.pin import Pin
 from aerodaas.drivers.waiting import wait_readable
 from aerodaas.errors import ConfigError, SourceError
+from aerodaas.extensions.tello.link import bound_socket, datagrams
 from aerodaas.extensions.tello.settings import (
     TelloCameraSettings,
     tello_camera_settings,
     tello_settings,
 )
-from aerodaas.extensions.tello.sockets import bound_socket, datagrams
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.messages.odometry import Odometry
 

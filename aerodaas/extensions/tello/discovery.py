@@ -13,8 +13,8 @@ import psutil
 from aerodaas.config.extensions import VehicleDiscovery
 from aerodaas.errors import VehicleError
 from aerodaas.extensions.tello.commands import ENTER, Command
+from aerodaas.extensions.tello.link import bound_socket, datagrams
 from aerodaas.extensions.tello.settings import STATE_PORT, TelloSettings
-from aerodaas.extensions.tello.sockets import bound_socket, datagrams
 from aerodaas.extensions.tello.state import parse_state
 
 __all__ = ["find_tello"]

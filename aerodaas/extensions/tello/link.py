@@ -1,10 +1,13 @@
-"""Link to one Tello: one thread that owns its sockets and sends only what it is given."""
+"""Link to one Tello: one thread that owns its sockets, and the handshake by which it begins."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
 import math
+import os
+import queue
 import selectors
 import socket
 import threading
@@ -14,14 +17,97 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from aerodaas.drivers.pin import Pin
-from aerodaas.errors import VehicleError
-from aerodaas.extensions.tello.commands import STILL, Command, Sticks
+from aerodaas.errors import AeroDaaSError, VehicleError
+from aerodaas.extensions.tello.commands import (
+    ENTER,
+    STILL,
+    STREAM_ON,
+    VERSION,
+    Command,
+    Sticks,
+    ports,
+)
 from aerodaas.extensions.tello.dead_man import DeadMan
-from aerodaas.extensions.tello.settings import TelloSettings
-from aerodaas.extensions.tello.sockets import bound_socket, datagrams
+from aerodaas.extensions.tello.settings import STATE_PORT, VIDEO_PORT, TelloSettings
 from aerodaas.extensions.tello.state import TelloState, parse_state
 
-__all__ = ["LinkCounts", "TelloLink"]
+__all__ = [
+    "LinkCounts",
+    "TelloLink",
+    "bound_socket",
+    "datagrams",
+    "explain_no_states",
+    "greet",
+    "meaning",
+]
+
+_LARGEST = 65535
+_AT_ONCE = 256
+"""Most datagrams received in one turn."""
+
+
+def bound_socket(
+    place: str,
+    port: int,
+    *,
+    address: str = "",
+    interface: str = "",
+    receive_buffer: int | None = None,
+    raises: type[AeroDaaSError],
+) -> socket.socket:
+    """Open a non-blocking UDP socket of this host.
+
+    Args:
+        place: What needs it, for errors.
+        port: 0 for any.
+        address: Of this host; empty for all.
+        interface: Network interface; empty for any.
+        receive_buffer: Bytes; None for the system's default.
+        raises: Class of the error where it cannot be opened.
+    """
+    opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        opened.settimeout(0.0)
+        if receive_buffer is not None:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        if interface:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, interface.encode())
+        opened.bind((address, port))
+    except OSError as error:
+        opened.close()
+        raise raises(f"{place}: {_explain(error, address, port, interface)}") from None
+    return opened
+
+
+def _explain(error: OSError, address: str, port: int, interface: str) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return (
+            f"UDP port {port} is taken by another program or another Tello of this host; "
+            f"`ss -ulnp sport = :{port}` shows by whom (docs/tello.md: several Tellos)"
+        )
+    if error.errno == errno.EADDRNOTAVAIL:
+        return f"{address} is no address of this host; `ip address` lists them"
+    if error.errno == errno.ENODEV:
+        return f"no network interface is called {interface!r}; `ip link` lists them"
+    if error.errno in {errno.EPERM, errno.EACCES}:
+        return f"not allowed to use UDP port {port} {interface}: {os.strerror(error.errno)}"
+    return f"cannot open UDP port {port}: {error.strerror or error}"
+
+
+def datagrams(source: socket.socket) -> list[tuple[bytes, str, int]]:
+    """Received datagrams: content, sender's address, sender's port; never blocks."""
+    arrived = []
+    for _ in range(_AT_ONCE):
+        try:
+            content, (address, port) = source.recvfrom(_LARGEST)
+        except BlockingIOError:
+            break
+        except ConnectionError:
+            # The system reports here that an earlier datagram reached no socket.
+            continue
+        arrived.append((content, address, port))
+    return arrived
+
 
 _log = logging.getLogger(__name__)
 
@@ -286,3 +372,122 @@ class TelloLink:
             self.failure = error
         else:
             self.failure = None
+
+
+_MEANINGS = {
+    "motor stop": "the battery is low, a propeller is blocked, or it was tilted: charge it, look",
+    "no valid imu": "it cannot see the ground: give it light and a floor with a pattern, or "
+    "calibrate it in the Tello app",
+    "not joystick": "it cannot do this in the air as things stand",
+    "auto land": "it is landing by itself: low battery, heat, or 15 s without a command",
+    "out of range": "beyond the ranges of the SDK",
+    "unknown command": "its firmware does not know it: update it in the Tello app",
+}
+
+_REFUSALS = 2
+
+
+def meaning(reply: str) -> str:
+    """Meaning of refusals whose texts are known from reports of users."""
+    for words, text in _MEANINGS.items():
+        if words in reply.lower():
+            return text
+    return "it gives no reason; battery, heat and level ground are the usual ones"
+
+
+def greet(
+    link: TelloLink,
+    name: str,
+    settings: TelloSettings,
+    video_port: int | None,
+    deadline: float,
+) -> None:
+    """Enter SDK mode, set ports that are not the default ones, switch the video on.
+
+    Args:
+        link: The link to the Tello.
+        name: Id of the robot, for errors.
+        settings: Ports of this host.
+        video_port: Port for video; None leaves the video off.
+        deadline: Monotonic seconds by which it returns or raises.
+
+    Raises:
+        VehicleError: If the Tello does not answer, or refuses.
+    """
+    if _ask(link, ENTER, deadline) is None:
+        raise VehicleError(_explain_silence(link, name, settings))
+    video = VIDEO_PORT if video_port is None else video_port
+    if (settings.state_port, video) != (STATE_PORT, VIDEO_PORT):
+        reply = _ask(link, ports(settings.state_port, video), deadline)
+        if reply is None or not Command.succeeded(reply):
+            version = _ask(link, VERSION, deadline) or "unknown"
+            raise VehicleError(
+                f"{name}: the Tello answered {reply!r} when told to send to the ports "
+                f"{settings.state_port} and {video}: this needs SDK 3.0, and it has version "
+                f'{version}. Use the default ports, and "local_address" or "interface" to tell '
+                "several Tellos apart"
+            )
+    if video_port is not None:
+        reply = _ask(link, STREAM_ON, deadline)
+        if reply is None or not Command.succeeded(reply):
+            answer = "did not answer" if reply is None else f"answered {reply!r}"
+            raise VehicleError(f"{name}: the Tello {answer} when told to send video")
+
+
+def _ask(link: TelloLink, command: Command, deadline: float) -> str | None:
+    """The reply to `command`; None after the timeout.
+
+    Only `command` itself is repeated until the timeout; also after a refusal, as the request or
+    the reply may have been garbled.
+    """
+    answers: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+    reply, refusals = None, 0
+    while (left := deadline - time.monotonic()) > 0.0 and refusals < _REFUSALS:
+        link.request(command, answers.put)
+        try:
+            reply = answers.get(timeout=left)
+        except queue.Empty:
+            return None
+        if reply is not None and Command.succeeded(reply):
+            break
+        refusals += reply is not None or command is not ENTER
+    return reply
+
+
+def _explain_silence(link: TelloLink, name: str, settings: TelloSettings) -> str:
+    if link.failure is not None:
+        return (
+            f"{name}: nothing can be sent to {settings.address}: {link.failure.strerror}; "
+            "join the Tello's Wi-Fi (TELLO-…), or set its address"
+        )
+    if link.counts.strangers:
+        return (
+            f"{name}: {settings.address} does not answer, but {link.counts.strangers} packets came "
+            "from elsewhere: set the Tello's address"
+        )
+    return (
+        f"{name}: no answer from {settings.address}:{settings.command_port}; is the Tello switched "
+        "on (light flashing yellow), this host in its Wi-Fi (TELLO-…), no other program or phone "
+        f"connected to it, and the firewall open for replies (`ping {settings.address}`)?"
+    )
+
+
+def explain_no_states(link: TelloLink, name: str, settings: TelloSettings) -> str:
+    """Reason why no state packet arrives although the Tello replies to commands.
+
+    Args:
+        link: The link to the Tello.
+        name: Id of the robot, for the text.
+        settings: The port for states.
+    """
+    port, counts = settings.state_port, link.counts
+    if counts.malformed:
+        return (
+            f"{name}: {counts.malformed} packets came to UDP port {port}, none of which is a "
+            "state packet of a Tello; update its firmware in the Tello app"
+        )
+    elsewhere = f" ({counts.strangers} came from elsewhere)" if counts.strangers else ""
+    return (
+        f"{name}: the Tello answers but no state packet came to UDP port {port}{elsewhere}; open "
+        f"the firewall (`sudo ufw allow {port}/udp`), and end other programs that use a Tello"
+    )

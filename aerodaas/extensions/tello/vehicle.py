@@ -23,8 +23,7 @@ from aerodaas.extensions.tello.commands import (
     Command,
     StickScale,
 )
-from aerodaas.extensions.tello.handshake import explain_no_states, greet, meaning
-from aerodaas.extensions.tello.link import TelloLink
+from aerodaas.extensions.tello.link import TelloLink, explain_no_states, greet, meaning
 from aerodaas.extensions.tello.phase import LIFTED, FlightPhase
 from aerodaas.extensions.tello.reckoning import DeadReckoning
 from aerodaas.extensions.tello.settings import TelloSettings, tello_settings, video_port

@@ -18,8 +18,7 @@ from typer.testing import CliRunner
 from aerodaas.cli.app import app
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.extensions.sitl.command_line import _home
-from aerodaas.extensions.sitl.process import SitlProcess
-from aerodaas.extensions.sitl.programs import PROGRAMS, SimulatedHome, SitlOptions
+from aerodaas.extensions.sitl.process import PROGRAMS, SimulatedHome, SitlOptions, SitlProcess
 
 SPEAKS = """#!{python}
 import json, os, pathlib, socket, subprocess, sys, time

@@ -16,8 +16,7 @@ from sitl.relay import Relay
 
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.extensions.sitl.process import SitlProcess
-from aerodaas.extensions.sitl.programs import SitlOptions
+from aerodaas.extensions.sitl.process import SitlOptions, SitlProcess
 from aerodaas.extensions.vehicle_logs.log_service import LogEntry
 from aerodaas.extensions.vehicle_logs.mavlink_logs import MavlinkLogs
 from aerodaas.messages.mission import MissionState

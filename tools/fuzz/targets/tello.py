@@ -14,7 +14,7 @@ from typing_extensions import Self
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.errors import VehicleError
-from aerodaas.extensions.tello import handshake, link, vehicle
+from aerodaas.extensions.tello import link, vehicle
 from aerodaas.extensions.tello.link import TelloLink
 from aerodaas.extensions.tello.vehicle import TelloVehicle
 from tools.fuzz.flight import (
@@ -138,8 +138,8 @@ def run(data: bytes) -> None:
 
     clock = clock_of(rig, rig.advance)
     with replaced(
-        *((module, "time", clock) for module in (handshake, link, vehicle)),
-        (handshake, "queue", queues_of(rig)),
+        *((module, "time", clock) for module in (link, vehicle)),
+        (link, "queue", queues_of(rig)),
         (link, "bound_socket", rig.open),
         (link, "datagrams", _taken),
         (link, "DeadMan", guard),
