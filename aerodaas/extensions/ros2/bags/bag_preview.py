@@ -36,7 +36,6 @@ _TYPES = {
     "odometry": (types.ODOMETRY,),
     "gps": (types.NAV_SAT_FIX,),
     "battery": (types.BATTERY,),
-    "detections": (types.DETECTIONS,),
 }
 """Types that a topic may have, by its use."""
 _SINGLE = ("odometry", "gps", "battery")
@@ -77,7 +76,6 @@ class BagTopics:
     """One at most, for a vehicle is at one place; as with fix and battery."""
     gps: Mapping[str, str] = field(default_factory=dict)
     battery: Mapping[str, str] = field(default_factory=dict)
-    detections: Mapping[str, str] = field(default_factory=dict)
 
     def taken(self) -> list[Taken]:
         """All topics."""
@@ -295,12 +293,6 @@ class BagPreview:
         if median <= 0:
             return None
         return round(min(max(NANOSECONDS / median, _SLOWEST), _FASTEST), 2)
-
-    def camera_of_frame(self, frame: str) -> str | None:
-        """Topic of the camera whose pictures are in `frame`, or of the only one; None: unknown."""
-        found = [topic for topic, one in self._frames.items() if one == frame]
-        topics = found or list(self.topics.camera.values())
-        return topics[0] if len(topics) == 1 else None
 
     def _inspect(self, message: BagMessage, kind: str) -> None:
         value, topic = message.value, message.topic

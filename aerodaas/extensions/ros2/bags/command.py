@@ -22,7 +22,7 @@ Taken = Annotated[
     list[str] | None,
     typer.Option(
         metavar="[ID=]TOPIC",
-        help="What becomes the sensor or analysis ID, which is called as the option if left out.",
+        help="What becomes the sensor ID, which is called as the option if left out.",
     ),
 ]
 
@@ -36,7 +36,6 @@ def import_bag(
     odometry: Taken = None,
     gps: Taken = None,
     battery: Taken = None,
-    detections: Taken = None,
     robot: Annotated[str, typer.Option(help="Id of the vehicle in the recording.")] = "drone",
     images: Annotated[
         str, typer.Option(help="How raw pictures are encoded: jpeg, png or h264.")
@@ -67,7 +66,6 @@ def import_bag(
         odometry=_named(odometry, "odometry"),
         gps=_named(gps, "gps"),
         battery=_named(battery, "battery"),
-        detections=_named(detections, "detections"),
     )
     with RosBag.open(bag) as opened:
         if not taken.taken():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,13 +29,11 @@ from aerodaas.extensions.ros2.bags.bag_preview import BagPreview, BagTopics
 from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.incoming import (
     battery_of,
-    detection_items,
     fix_of,
     odometry_of,
 )
 from aerodaas.geometry.frames import CameraModel
 from aerodaas.identifiers import internal
-from aerodaas.messages.detections import Detections
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame, Header
 from aerodaas.messages.odometry import Odometry
@@ -53,8 +51,6 @@ _MOVING = 0.2
 """Metres a second."""
 _LIFTED = 0.15
 """Metres."""
-_RECENT = 256
-"""Pictures of a camera that detections may still be of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +148,6 @@ class _Import:
         self._flying = False
         self._ground: float | None = None
         """Height at which it stood first, metres."""
-        self._recent: dict[str, OrderedDict[int, tuple[int, int, int]]] = {}
-        """Number, width and height of each camera's newest pictures by stamp."""
 
     def run(self, bag: RosBag) -> None:
         """Read all and write what is whole."""
@@ -162,7 +156,6 @@ class _Import:
             "odometry": self._state,
             "gps": self._gps,
             "battery": self._charge,
-            "detections": self._detections,
         }
         uses = {one.topic: takers[one.use] for one in self._topics.taken()}
         epoch = self._preview.epoch_ns
@@ -213,10 +206,6 @@ class _Import:
         stream = self._streams[message.topic]
         header = Header(self._sequences[stream], captured, stream)
         item = self._frame(message, header)
-        recent = self._recent.setdefault(message.topic, OrderedDict())
-        recent[captured] = header.id, item.width, item.height
-        if len(recent) > _RECENT:
-            recent.popitem(last=False)
         self._write(stream, header, recorded, item)
 
     def _frame(self, message: BagMessage, header: Header) -> Frame | EncodedFrame:
@@ -244,16 +233,6 @@ class _Import:
                 self._models[topic] = camera_model(lens, width, height)
         return self._models[topic]
 
-    def _detections(self, message: BagMessage, captured: int, recorded: int) -> None:
-        topic = self._preview.camera_of_frame(message.value.header.frame_id)
-        picture = self._recent.get(topic or "", OrderedDict()).get(captured)
-        if topic is None or picture is None:
-            raise ValueError("no picture of this stamp and frame was taken")
-        number, width, height = picture
-        header = Header(number, captured, self._streams[topic])
-        found = Detections(header, tuple(detection_items(message.value)), width, height)
-        self._write(self._streams[message.topic], header, recorded, found)
-
     def _write(self, stream: str, header: Header, recorded: int, item: object) -> None:
         sequence = self._sequences[stream]
         self._sequences[stream] += 1
@@ -265,8 +244,6 @@ def _environment(path: Path, preview: BagPreview) -> EnvironmentConfig:
     topics = preview.topics
     sensors: list[dict[str, Any]] = []
     for use, name, topic in topics.taken():
-        if use == "detections":
-            continue
         sensor: dict[str, Any] = {"id": name, "type": use}
         rate = preview.rate(topic)
         if rate is not None:

@@ -11,12 +11,10 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import RecordingError
 from aerodaas.geometry.frames import Vector, is_finite, rotation_from_rpy
-from aerodaas.messages.detections import Detection
 from aerodaas.messages.odometry import Battery, GpsFix, Odometry
 
 __all__ = [
     "battery_of",
-    "detection_items",
     "euler_of",
     "fix_of",
     "odometry_of",
@@ -119,36 +117,6 @@ def battery_of(message: Any) -> Battery:  # noqa: ANN401
         voltage if math.isfinite(voltage) else 0.0,
         -current if math.isfinite(current) and current else 0.0,
     )
-
-
-def detection_items(message: Any) -> list[Detection]:  # noqa: ANN401
-    """Detections of a `vision_msgs/Detection2DArray`, best first, each by its best hypothesis.
-
-    Of a box that is turned, the upright one around it.
-
-    Raises:
-        ValueError: If a figure is not finite.
-    """
-    found = []
-    for item in message.detections:
-        if not item.results:
-            continue
-        best = max((one.hypothesis for one in item.results), key=lambda one: one.score)
-        centre, theta = item.bbox.center.position, item.bbox.center.theta
-        cos, sin = abs(math.cos(theta)), abs(math.sin(theta))
-        half_width = (item.bbox.size_x * cos + item.bbox.size_y * sin) / 2
-        half_height = (item.bbox.size_x * sin + item.bbox.size_y * cos) / 2
-        box = (
-            centre.x - half_width,
-            centre.y - half_height,
-            centre.x + half_width,
-            centre.y + half_height,
-        )
-        if not all(map(math.isfinite, (*box, best.score))):
-            raise ValueError("a detection whose box or score is not finite")
-        track = int(item.id) if item.id.isascii() and item.id.isdigit() else None
-        found.append(Detection(box, best.class_id, float(best.score), track))
-    return sorted(found, key=lambda one: -one.score)
 
 
 def _vector(value: Any) -> Vector:  # noqa: ANN401

@@ -61,7 +61,6 @@ ROS_TYPES = frozenset(
         NAV_SAT_FIX,
         BATTERY,
         TRANSFORMS,
-        DETECTIONS,
     }
 )
 """Types whose messages are decoded."""

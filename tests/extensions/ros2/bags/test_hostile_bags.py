@@ -7,16 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ros_bags import EPOCH, SECOND, TYPES, Sent, odometry, write
+from ros_bags import SECOND, TYPES, Sent, odometry, write
 
 from aerodaas.errors import RecordingError
 from aerodaas.extensions.ros2.bags.bag import RosBag
 from aerodaas.extensions.ros2.bags.bag_preview import BagTopics
 from aerodaas.extensions.ros2.bags.importing import ImportedBag, import_bag
-from aerodaas.extensions.ros2.bags.outgoing import MessageBuilder
-from aerodaas.extensions.ros2.topics.types import DETECTIONS, ros_decoder
-from aerodaas.messages.detections import Detection, Detections
-from aerodaas.messages.frames import Header
+from aerodaas.extensions.ros2.topics.types import TRANSFORMS, ros_decoder, ros_message
 
 TOPICS = BagTopics(odometry={"odometry": "/odom"})
 
@@ -50,15 +47,14 @@ def test_a_bag_that_holds_nothing_whole_is_told(tmp_path: Path) -> None:
 
 
 def test_lengths_that_lie_cost_no_memory() -> None:
-    """A sequence of four billion detections in sixty bytes; a message larger than any."""
-    header = b"\x00\x01\x00\x00" + struct.pack("<iII", 1, 2, 1) + b"\x00\x00\x00\x00"
+    """A sequence of four billion transforms in sixty bytes; a message larger than any."""
     with pytest.raises(Exception, match=r".") as caught:
-        ros_decoder(DETECTIONS)(header + struct.pack("<I", 2**32 - 1) + bytes(40))
+        ros_decoder(TRANSFORMS)(b"\x00\x01\x00\x00" + struct.pack("<I", 2**32 - 1) + bytes(60))
     assert not isinstance(caught.value, MemoryError)
-    found = Detections(Header(0, 0, "cam"), (Detection((0, 0, 1, 1), "x", 0.5),) * 4000, 9, 9)
-    raw = bytes(TYPES.serialize_cdr(MessageBuilder(EPOCH).detections(found), DETECTIONS))
+    moved = ros_message("geometry_msgs/msg/TransformStamped")
+    many = ros_message(TRANSFORMS, transforms=[moved] * 20_000)
     with pytest.raises(ValueError, match="exceeds"):
-        ros_decoder(DETECTIONS)(raw)
+        ros_decoder(TRANSFORMS)(bytes(TYPES.serialize_cdr(many, TRANSFORMS)))
 
 
 def spoilt(change: Callable[[Sent], None]) -> list[Sent]:

@@ -20,7 +20,6 @@ from aerodaas.extensions.ros2.bags.live import RosGraph
 from aerodaas.extensions.ros2.topics import types
 from aerodaas.extensions.ros2.topics.incoming import (
     battery_of,
-    detection_items,
     fix_of,
     odometry_of,
     stamp_of,
@@ -152,7 +151,10 @@ def test_a_frame_is_a_picture_with_its_lens_and_depth(graph: RosGraph, ears: Ear
     assert np.abs(shown.astype(int) - picture()).mean() < 3
     np.testing.assert_array_equal(decode_depth(measured), depth)
     assert (lens.width, lens.height, lens.k[0], lens.k[2]) == (48, 32, LENS.fx, 24.0)
-    assert detection_items(boxes) == [box]
+    (found,) = boxes.detections
+    hypothesis, centre = found.results[0].hypothesis, found.bbox.center.position
+    assert (hypothesis.class_id, hypothesis.score, found.id) == ("person", 0.75, "7")
+    assert (centre.x, centre.y, found.bbox.size_x, found.bbox.size_y) == (12.0, 18.0, 16.0, 24.0)
 
 
 def test_where_a_camera_is_mounted_is_kept(graph: RosGraph) -> None:
