@@ -9,23 +9,20 @@ from http import HTTPStatus
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from aerodaas.http_server.denial import answer_of, closing_reason, deny
+from aerodaas.http_server.denial import answer_of, deny
 
 LONG = "ä" * 300
 
 
-def sent(kind: str, *extensions: str) -> list[dict[str, Any]]:
+def sent(kind: str) -> list[dict[str, Any]]:
     """What a refusal sends."""
     messages: list[dict[str, Any]] = []
 
     async def send(message: MutableMapping[str, Any]) -> None:
         messages.append(dict(message))
 
-    scope = {"type": kind, "extensions": {name: {} for name in extensions}}
-    asyncio.run(deny(scope, send, 403, {"text": LONG}, pause=3))
+    asyncio.run(deny({"type": kind}, send, 403, {"text": LONG}, pause=3))
     return messages
 
 
@@ -34,7 +31,7 @@ def sent(kind: str, *extensions: str) -> list[dict[str, Any]]:
 )
 def test_the_answer_has_the_whole_reason(kind: str, answer: str) -> None:
     """Whatever was asked for, it is one answer, with its status and headers."""
-    start, body = sent(kind, "websocket.http.response")
+    start, body = sent(kind)
     assert (start["type"], start["status"]) == (f"{answer}.start", 403)
     assert (b"retry-after", b"3") in start["headers"]
     assert (b"content-length", str(len(body["body"])).encode()) in start["headers"]
@@ -54,27 +51,6 @@ def test_only_a_missing_identity_is_asked_for() -> None:
     asked = [dict(message["headers"]) for message in messages if "headers" in message]
     assert [headers.get(b"www-authenticate") for headers in asked] == [b"Bearer", None]
     assert not any(b"retry-after" in headers for headers in asked)
-
-
-def test_a_server_that_cannot_answer_closes_with_a_reason() -> None:
-    """As long as a closing takes."""
-    (message,) = sent("websocket")
-    assert (message["type"], message["code"]) == ("websocket.close", 1008)
-    assert message["reason"] == closing_reason(LONG)
-
-
-@given(st.text())
-def test_a_closing_reason_fits_and_is_cut_between_letters(text: str) -> None:
-    """At most 123 bytes; a shorter one is whole, and a longer one is its beginning and a mark."""
-    reason = closing_reason(text)
-    assert len(reason.encode()) <= 123
-    readable = text.encode("utf-8", "replace").decode()
-    if len(readable.encode()) <= 123:
-        assert reason == readable
-    else:
-        assert reason.endswith("…")
-        assert readable.startswith(reason[:-1])
-        assert len(reason.encode()) > 123 - 3 - 4
 
 
 def test_a_server_of_its_own_answers_alike() -> None:

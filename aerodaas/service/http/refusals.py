@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -15,7 +16,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
 
 from aerodaas.errors import AeroDaaSError, MissionError, SilentError
-from aerodaas.http_server.denial import deny, malformed
+from aerodaas.http_server.denial import deny
 from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError, without_folders
 
@@ -73,7 +74,7 @@ async def refuse(scope: Scope, send: Send, error: Exception) -> None:
         silent = isinstance(error, SilentError)
         status = int(HTTPStatus.GATEWAY_TIMEOUT if silent else HTTPStatus.CONFLICT)
     elif isinstance(error, RequestValidationError | WebSocketRequestValidationError):
-        status, text = malformed(error.errors())
+        status, text = _malformed(error.errors())
     elif isinstance(error, HTTPException):
         status, text = error.status_code, str(error.detail)
     await deny(
@@ -83,6 +84,21 @@ async def refuse(scope: Scope, send: Send, error: Exception) -> None:
         RefusalOut(text=without_folders(text)[:_LONGEST]).model_dump(),
         pause=pause,
     )
+
+
+def _malformed(problems: Sequence[Mapping[str, Any]]) -> tuple[int, str]:
+    """Status and text for a request that is not as its schema has it; `problems` are pydantic's.
+
+    Each wrong field and its place, without the input, which may hold NaN or secrets.
+    """
+    invalid = any(problem["type"] == "json_invalid" for problem in problems)
+    status = HTTPStatus.BAD_REQUEST if invalid else HTTPStatus.UNPROCESSABLE_ENTITY
+    said = (f"{_place(problem['loc'])}: {problem['msg']}" for problem in problems)
+    return int(status), "; ".join(said)
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    return ".".join(map(str, location[1:])) or str(location[0])
 
 
 def _log_failure(error: StoreError) -> None:
