@@ -26,7 +26,7 @@ def issuer() -> Iterator[Issuer]:
 def provider(issuer: Issuer) -> Iterator[Served]:
     """A drone for the issuer's people; missions wait for an operator, so that none flies."""
     words = ["--oidc-issuer", issuer.url, "--oidc-audience", AUDIENCE]
-    words += ["--oidc-role", "fliers=pilot", "--oidc-unknown", "viewer"]
+    words += ["--oidc-role", "fliers=pilot"]
     with Served(fleet(robot("one")), "--no-rehearse", "--approval", *words) as served:
         yield served
 
@@ -50,7 +50,6 @@ def test_people_of_the_issuer_fly_without_an_account_made_for_them(
     [
         (("--oidc-issuer", "https://id.example"), "go together"),
         (("--oidc-audience", "drones"), "go together"),
-        (("--oidc-unknown", "pilot"), "refuse or viewer"),
         (("--oidc-role", "fliers=king"), "VALUE=ROLE"),
         (("--oidc-role", "fliers"), "VALUE=ROLE"),
     ],

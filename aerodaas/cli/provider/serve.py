@@ -86,9 +86,6 @@ def serve(
             metavar="VALUE=ROLE", help="Role by value of the claim. Default: roles by their names."
         ),
     ] = None,
-    oidc_unknown: Annotated[
-        str, typer.Option(help="Who has none of these roles: `refuse`, or is a `viewer`.")
-    ] = "refuse",
 ) -> None:
     """Offer a fleet of drones: users' applications fly on it by URL.
 
@@ -126,7 +123,6 @@ def serve(
             oidc_audience,
             claims=(oidc_role_claim, oidc_tenant_claim),
             roles=oidc_role or (),
-            unknown=oidc_unknown,
         ),
     )
     run(
@@ -168,7 +164,6 @@ def _oidc(
     *,
     claims: tuple[str, str],
     roles: Iterable[str],
-    unknown: str,
 ) -> OidcSettings | None:
     """Trust in an OpenID issuer; raises ConfigError for options that do not fit."""
     from aerodaas.protocol.schemas import Role  # noqa: PLC0415 - slow to load
@@ -181,8 +176,6 @@ def _oidc(
         )
     if issuer is None or audience is None:
         return None
-    if unknown not in {"refuse", "viewer"}:
-        raise ConfigError(f"--oidc-unknown is refuse or viewer, not {unknown!r}")
     known = {role.value: role for role in Role}
     mapped: dict[str, Role] = {}
     for text in roles:
@@ -191,5 +184,4 @@ def _oidc(
             raise ConfigError(f"--oidc-role is VALUE=ROLE with {', '.join(known)}, not {text!r}")
         mapped[value] = known[role]
     role_claim, tenant_claim = claims
-    lowest = Role.VIEWER if unknown == "viewer" else None
-    return OidcSettings(issuer, audience, role_claim, tenant_claim, mapped, lowest)
+    return OidcSettings(issuer, audience, role_claim, tenant_claim, mapped)

@@ -54,8 +54,6 @@ class OidcSettings:
     tenant_claim: str = "aerodaas_tenant"
     roles: Mapping[str, Role] = field(default_factory=dict)
     """Role by value of the claim; empty: the roles by their own names."""
-    unknown: Role | None = None
-    """Role of who has none of these; None: they are refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +197,7 @@ class OidcVerifier:
         given = _claim(claims, self._settings.role_claim)
         known = self._settings.roles or {role.value: role for role in Role}
         names = given if isinstance(given, list) else [given]
-        best = self._settings.unknown
+        best: Role | None = None
         for name in names:
             role = known.get(name) if isinstance(name, str) else None
             if role is not None and (best is None or role.reaches(best)):
