@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerodaas.actors.base import NodeActor
-from aerodaas.actors.batch_pause import BatchPause
 from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.config.options import LiveViews
@@ -18,12 +17,41 @@ from aerodaas.runtime.node import Node
 from aerodaas.runtime.nodes.recorder import RecorderNode
 from aerodaas.runtime.session import Session
 
-__all__ = ["RecorderActor", "RecorderSpec"]
+__all__ = ["BatchPause", "RecorderActor", "RecorderSpec"]
 
 _LONGEST_PAUSE = 0.1
 """Wall seconds between two batches of messages."""
 _WAIT = 0.2
 """Wall seconds of one wait for messages."""
+
+
+_FIRST = 0.001
+_GROWTH = 1.25
+"""Factor by which the pause grows from batch to batch, while no queue fills."""
+_ROOM = 4
+"""A batch that has more of a stream than this part of its queue divides the pause by as much."""
+
+
+class BatchPause:
+    """Wall seconds until the next batch: as many as leave most of each queue free."""
+
+    def __init__(self, longest: float) -> None:
+        """Begin with a millisecond; `longest` is the longest pause in seconds, 0 for none."""
+        self._longest = longest
+        self._pause = _FIRST
+
+    def after(self, counts: Mapping[str, int], depths: Mapping[str, int]) -> float:
+        """The pause after a batch, seconds.
+
+        Args:
+            counts: Messages of the batch, by stream.
+            depths: Depth of each stream's queue.
+        """
+        if any(count > depths[stream] // _ROOM for stream, count in counts.items()):
+            self._pause /= _ROOM
+        else:
+            self._pause = min(self._longest, self._pause * _GROWTH)
+        return self._pause
 
 
 @dataclass(frozen=True)

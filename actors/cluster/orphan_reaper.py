@@ -10,20 +10,22 @@ others, or of one of its own in a run that is not recorded.
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+import psutil
 import ray
 
 from aerodaas.actors.cluster.dead_man import exit_actor, exit_soon
 from aerodaas.actors.cluster.run_lock import RunLock
-from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 
-__all__ = ["REAPER", "OrphanReaperActor", "ReaperHost", "Watched"]
+__all__ = ["REAPER", "ApplicationProcess", "OrphanReaperActor", "ReaperHost", "Watched"]
 
 REAPER = "reaper"
 """Concurrency group of an actor for the calls to its reaper, which its own work must not block."""
@@ -32,6 +34,42 @@ _LAUNCH = 200.0
 _SILENCE = 5.0
 """Wall seconds without a heartbeat after which the application is considered dead."""
 _LOOK_INTERVAL = 1.0
+
+
+def _pid_namespace() -> str:
+    try:
+        return str(Path("/proc/self/ns/pid").readlink())
+    except OSError:
+        return ""
+
+
+@dataclass(frozen=True)
+class ApplicationProcess:
+    """The application's process: created by the application, checked by the reaper."""
+
+    time_waits: bool
+    """Whether mission time stands while it does: its drones are simulated and cannot fall."""
+    node: str = field(default_factory=lambda: ray.get_runtime_context().get_node_id())
+    pid: int = field(default_factory=os.getpid)
+    pids: str = field(default_factory=_pid_namespace)
+    """PID namespace of the process, such as a container's; empty if there are none."""
+    began: float = field(default_factory=lambda: psutil.Process().create_time())
+
+    @property
+    def near(self) -> bool:
+        """Whether the calling process runs on the same node and PID namespace."""
+        here: str = ray.get_runtime_context().get_node_id()
+        return here == self.node and _pid_namespace() == self.pids
+
+    def ended(self) -> bool:
+        """Whether it has ended; valid only if `near`."""
+        try:
+            process = psutil.Process(self.pid)
+            # A process id may be reused.
+            again = process.create_time() != self.began
+            return bool(again or process.status() == psutil.STATUS_ZOMBIE)
+        except psutil.NoSuchProcess:
+            return True
 
 
 @dataclass(frozen=True)

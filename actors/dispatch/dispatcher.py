@@ -19,8 +19,7 @@ from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.clock import NANOSECONDS, Clock
 from aerodaas.messages.envelope import Message
 from aerodaas.messages.frames import Frame
-from aerodaas.runtime.dispatch.costs import Estimates
-from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
+from aerodaas.runtime.dispatch.costs import DeadlineReserve, Estimates
 from aerodaas.runtime.dispatch.dispatcher import Dispatcher, Managed
 from aerodaas.runtime.dispatch.recent_frames import FrameReferences, MissingFrame
 from aerodaas.runtime.node import Host

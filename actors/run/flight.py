@@ -16,7 +16,13 @@ from typing_extensions import Self
 from aerodaas.actors.base import ActorInfo, NodeActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
-from aerodaas.actors.cluster.orphan_reaper import REAPER, OrphanReaperActor, ReaperHost, Watched
+from aerodaas.actors.cluster.orphan_reaper import (
+    REAPER,
+    ApplicationProcess,
+    OrphanReaperActor,
+    ReaperHost,
+    Watched,
+)
 from aerodaas.actors.cluster.ray_cluster import options_for
 from aerodaas.actors.dispatch.dispatcher import DispatcherSpec
 from aerodaas.actors.dispatch.executor import CloudExecutor
@@ -26,7 +32,6 @@ from aerodaas.actors.isolation import environment_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.recorder import RecorderActor, RecorderSpec
 from aerodaas.actors.run.actor_state import ActorState, ask, require_clock, routes
-from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.live import live_source
 from aerodaas.actors.run.losses import (
     DeadError,

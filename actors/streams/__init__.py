@@ -10,8 +10,7 @@ from aerodaas.actors.streams.codec import UnreadableError
 from aerodaas.actors.streams.codec import decode as decode_message
 from aerodaas.actors.streams.codec import encode as encode_message
 from aerodaas.actors.streams.local_publisher import MAX_DEPTH
-from aerodaas.actors.streams.publisher import Publisher, RemoteReader
-from aerodaas.actors.streams.remote import UNDER_WAY
+from aerodaas.actors.streams.publisher import UNDER_WAY, Publisher, RemoteReader
 from aerodaas.actors.streams.subscriber import Subscriber
 
 __all__ = [

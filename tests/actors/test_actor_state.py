@@ -53,9 +53,9 @@ def test_calls_that_take_long_are_no_fault_of_a_clock(monkeypatch: pytest.Monkey
         monkeypatch.setattr(module, "host_time_ns", lambda: round(now[0] * NANOSECONDS))
     monkeypatch.setattr("ray.wait", lambda waiting, timeout: (waiting[:1], timeout))
     monkeypatch.setattr(flight, "ask", infos.get)
-    monkeypatch.setattr(Flight, "_connect_all", lambda _: None)
+    monkeypatch.setattr(Flight, "_connect", lambda *_: None)
     ready: list[str] = []
     bare = object.__new__(Flight)
-    bare._origin = 0
-    Flight._prepare(bare, [one("drone"), one("camera")], ready.append)
+    bare._members = {name: one(name) for name in ("drone", "camera")}
+    Flight._prepare(bare, ready.append)
     assert ready == ["drone", "camera"]

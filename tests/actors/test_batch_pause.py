@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.actors.batch_pause import BatchPause
+from aerodaas.actors.recorder import BatchPause
 
 _LONGEST = 0.1
 

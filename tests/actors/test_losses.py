@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from aerodaas.actors.run.application_process import ApplicationProcess
+from aerodaas.actors.cluster.orphan_reaper import ApplicationProcess
 from aerodaas.actors.run.losses import SuspensionMonitor
 
 

@@ -14,7 +14,7 @@ import pytest
 from provider_stub import MISSION, TOKEN, Stub, mission
 
 from aerodaas.cli.app import main
-from aerodaas.environment.provider import pauses
+from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.logins import Logins
 from aerodaas.errors import AeroDaaSError
 from aerodaas.protocol.schemas import MissionPhase
@@ -50,7 +50,7 @@ def aerodaas(
     monkeypatch.setenv("AERODAAS_TOKEN", TOKEN)
     monkeypatch.setenv("AERODAAS_PROVIDER", stub.url)
     monkeypatch.setattr("aerodaas.terminal.console.show_results", lambda *_, **__: None)
-    monkeypatch.setattr(pauses, "_FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(exchange, "_FIRST_PAUSE", 0.01)
     (tmp_path / "app.py").write_text(APP)
 
     def run(*words: str) -> Ended:

@@ -14,7 +14,7 @@ import pytest
 from certificates import make_certificates, tls_variables
 from required import needs
 
-from aerodaas.actors.cluster.encryption import require_same_encryption
+from aerodaas.actors.cluster.handshake import require_same_encryption
 from aerodaas.errors import AeroDaaSError, ConfigError
 
 pytestmark = needs(shutil.which("openssl"), "install openssl")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerodaas.messages.envelope import Message, TraceSpan
 from aerodaas.messages.frames import Header
-from aerodaas.runtime.dispatch.deadline_reserve import DeadlineReserve
+from aerodaas.runtime.dispatch.costs import DeadlineReserve
 from aerodaas.schedulers.analytics.base import MILLISECOND
 
 _FAR = 10_000 * MILLISECOND

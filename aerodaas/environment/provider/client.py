@@ -14,10 +14,8 @@ from urllib.parse import quote, urlencode
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from aerodaas.environment.provider.address import ServiceAddress
-from aerodaas.environment.provider.exchange import Method, ProviderConnection
-from aerodaas.environment.provider.live import LiveConnection
-from aerodaas.environment.provider.pauses import pauses
-from aerodaas.environment.provider.wire import WireConnection
+from aerodaas.environment.provider.exchange import Method, ProviderConnection, pauses
+from aerodaas.environment.provider.wire import LiveConnection, WireConnection
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.messages.health import HealthReport
 from aerodaas.mission.commands import Answer

@@ -1,8 +1,9 @@
-"""HTTP exchanges with a provider's service: bounded answers, time limits, refusals as errors."""
+"""HTTP exchanges with a provider's service: bounded answers, time limits, refusals."""
 
 from __future__ import annotations
 
 import json
+import random
 import ssl
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -17,7 +18,7 @@ from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, Unreachabl
 from aerodaas.http_client import http_client, http_errors, read_at_most
 from aerodaas.text.printable import printable
 
-__all__ = ["Method", "ProviderConnection", "printed"]
+__all__ = ["Method", "ProviderConnection", "pauses", "printed"]
 
 _MOST_BYTES = 32 << 20
 """Largest JSON of an answer: a mission of 64 robots has a thousandth of that."""
@@ -232,3 +233,16 @@ def printed(content: Any) -> Any:  # noqa: ANN401 - JSON
     if isinstance(content, dict):
         return {printable(key): printed(one) for key, one in content.items()}
     return content
+
+
+_FIRST_PAUSE = 0.5
+_LONGEST_PAUSE = 10.0
+"""Seconds between two attempts to connect again."""
+
+
+def pauses() -> Iterator[float]:
+    """Yield pauses between attempts: doubled each time, and spread, so that clients do not meet."""
+    pause = _FIRST_PAUSE
+    while True:
+        yield pause * random.uniform(0.5, 1.0)
+        pause = min(2.0 * pause, _LONGEST_PAUSE)

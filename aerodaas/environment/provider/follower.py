@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable
 
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.environment.provider.live import LiveConnection
-from aerodaas.environment.provider.pauses import pauses
+from aerodaas.environment.provider.exchange import pauses
+from aerodaas.environment.provider.wire import LiveConnection
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.protocol.schemas import MissionOut
 

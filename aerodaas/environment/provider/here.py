@@ -23,8 +23,8 @@ import numpy as np
 from aerodaas.analytics.here.relay import oversize
 from aerodaas.analytics.wire_items import UnknownClassError, item_json, unpack
 from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.environment.provider.exchange import pauses
 from aerodaas.environment.provider.follower import MissionFollower
-from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.errors import AeroDaaSError, SourceError, failure_line
 from aerodaas.messages.serialization.opaque_item import OpaqueItem

@@ -1,4 +1,4 @@
-"""ProvidedRun: one run of an application on a provider's drones, as `Run` is on one's own."""
+"""ProvidedRun: one run of an application on a provider's drones, and its commands on the wire."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
 from aerodaas.clock import seconds
 from aerodaas.config.extras import require_extra
 from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.environment.provider.commands import send_command
+from aerodaas.environment.provider.exchange import pauses
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.here import HereLink, HereServer
-from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals
@@ -25,12 +26,26 @@ from aerodaas.errors import (
     AeroDaaSError,
     ConfigError,
     GraphError,
+    InvalidWaypointError,
     MissionError,
     RecordingError,
     SourceError,
 )
-from aerodaas.mission.commands import Answer, Command, initial_commands
-from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.messages.waypoints import SchedulingType
+from aerodaas.mission.commands import (
+    Actuate,
+    AddNavigation,
+    Answer,
+    ClearNavigation,
+    Command,
+    HandOver,
+    RearrangeNavigation,
+    ReleaseParachute,
+    TakeBack,
+    initial_commands,
+)
+from aerodaas.protocol.piloting import ActuateIn, RearrangeIn
+from aerodaas.protocol.schemas import CommandIn, MissionOut, MissionPhase, NavigationIn, word_for
 from aerodaas.runtime.checks import check_graph
 
 if TYPE_CHECKING:
@@ -140,7 +155,7 @@ class ProvidedRun:
         """Send a robot's mission a command."""
         if self.over or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
-        return send_command(self._client, self._id, robot, command)
+        return _send_command(self._client, self._id, robot, command)
 
     def wait(self) -> None:
         """Watch until the mission has ended; raises the error that it ended with.
@@ -340,3 +355,55 @@ class ProvidedRun:
             view.show_message(text)
         else:
             Console(stderr=True, highlight=False, soft_wrap=True).print(text, markup=False)
+
+
+def _send_command(client: ProviderClient, mission: str, robot: str, command: Command) -> Answer:
+    """Send a command over the wire; raises GraphError for one that cannot be given from afar."""
+    if isinstance(command, AddNavigation):
+        if command.navigation:
+            return client.add_navigation(mission, _navigation(robot, command))
+        if not command.clear_first:
+            return Answer(accepted=False, text="the navigation is empty: there is nothing to fly")
+        command = ClearNavigation()
+    if isinstance(command, RearrangeNavigation):
+        return client.rearrange(mission, _change(robot, command))
+    if isinstance(command, Actuate):
+        wanted = ActuateIn(robot=robot, actuator=command.actuator, position=command.position)
+        return client.actuate(mission, wanted)
+    if isinstance(command, ReleaseParachute):
+        raise GraphError(f"{robot} flies at a provider, and no parachute is fired from afar")
+    if isinstance(command, HandOver | TakeBack):
+        raise GraphError(f"{robot} flies at a provider, which hands no waypoints over")
+    word = word_for(command)
+    if word is None:
+        raise GraphError(
+            f"{robot} flies at a provider: streams of navigation are connected before "
+            "start_mission(); in flight, waypoints can be added"
+        )
+    return client.command(mission, CommandIn(robot=robot, command=word))
+
+
+def _navigation(robot: str, command: AddNavigation) -> NavigationIn:
+    navigation = command.navigation
+    if navigation.commands:
+        raise GraphError(f"{robot} flies at a provider, where velocity commands come from analyses")
+    try:
+        return NavigationIn(
+            robot=robot,
+            waypoints=list(navigation.waypoints),
+            ordered=navigation.scheduling_type is SchedulingType.ORDERED,
+            index=command.index,
+            deadline=command.deadline,
+            clear_first=command.clear_first,
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InvalidWaypointError(f"{robot}: {first['msg']}") from None
+
+
+def _change(robot: str, command: RearrangeNavigation) -> RearrangeIn:
+    try:
+        return RearrangeIn(robot=robot, order=list(command.order), remove=list(command.remove))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InvalidWaypointError(f"{robot}: {first['msg']}") from None

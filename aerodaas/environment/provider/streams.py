@@ -11,9 +11,9 @@ from typing import Any
 
 from aerodaas.analytics.wire_items import unpack
 from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.environment.provider.exchange import pauses
 from aerodaas.environment.provider.follower import MissionFollower
-from aerodaas.environment.provider.live import ReceivedItem
-from aerodaas.environment.provider.pauses import pauses
+from aerodaas.environment.provider.wire import ReceivedItem
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError, failure_line
 from aerodaas.messages.serialization.schema import MessageError
 

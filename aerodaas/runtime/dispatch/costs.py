@@ -1,4 +1,4 @@
-"""Cost estimates of a node: transfer time by size, and execution time of each analysis.
+"""Cost estimates of a node: transfer time by size, execution time of each analysis, and overhead.
 
 All are measured in seconds of the host. Only a few newest samples are used, so that estimates
 follow the network, and quantiles rather than means, because they are robust to outliers.
@@ -12,9 +12,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from aerodaas.clock import NANOSECONDS
+from aerodaas.messages.envelope import Message
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 
-__all__ = ["Estimates", "ExecutionEstimates", "LinkEstimate", "Uplink", "quantile"]
+__all__ = [
+    "DeadlineReserve",
+    "Estimates",
+    "ExecutionEstimates",
+    "LinkEstimate",
+    "Uplink",
+    "quantile",
+]
 
 _KEPT = 11
 _LINK_KEPT = 5
@@ -215,3 +223,58 @@ class Estimates:
     def _time(self, seconds: float | None) -> int | None:
         """Mission nanoseconds of a duration in host seconds; at least a millisecond."""
         return None if seconds is None else max(MILLISECOND, round(seconds * self._second))
+
+
+_OVERHEADS_KEPT = 200
+_ENOUGH = 20
+"""Samples before the measurements are used."""
+_AT_FIRST = 5 * MILLISECOND
+_QUANTILE = 0.95
+_LARGEST_SHARE = 0.1
+"""Largest fraction of a task's deadline held in reserve."""
+
+
+class DeadlineReserve:
+    """Measured overhead, by which the deadlines given to every scheduler are shortened.
+
+    Tables of execution times and simulators do not include messages and thread switches. A
+    scheduler that defers to the last moment would miss deadlines by them, so each task's deadline
+    is moved forward by a high quantile of the recent overhead; results are judged by the true
+    deadline.
+    """
+
+    def __init__(self) -> None:
+        self._ways: deque[int] = deque(maxlen=_OVERHEADS_KEPT)
+        self._delays: deque[int] = deque(maxlen=_OVERHEADS_KEPT)
+        self._reserve = _AT_FIRST
+        self._news = 0
+
+    def travelled(self, answer: Message[object], taken: int) -> None:
+        """Add an execution on the edge.
+
+        Args:
+            answer: Its answer, whose last span is the work.
+            taken: Time from sending the task to the answer, nanoseconds.
+        """
+        work = answer.spans[-1].published - answer.spans[-1].received
+        self._ways.append(max(0, taken - work))
+        self._refresh()
+
+    def delayed(self, late: int) -> None:
+        """Add a timer that was `late` nanoseconds late."""
+        self._delays.append(max(0, late))
+        self._refresh()
+
+    def reserve(self, deadline: int) -> int:
+        """Nanoseconds to subtract from a relative deadline."""
+        return min(self._reserve, int(_LARGEST_SHARE * deadline))
+
+    def _refresh(self) -> None:
+        self._news += 1
+        if self._news >= _ENOUGH and len(self._ways) >= _ENOUGH:
+            self._news = 0
+            self._reserve = _high(self._ways) + _high(self._delays)
+
+
+def _high(samples: deque[int]) -> int:
+    return sorted(samples)[int(_QUANTILE * (len(samples) - 1))] if samples else 0

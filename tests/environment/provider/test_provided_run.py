@@ -20,7 +20,7 @@ from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
 from aerodaas.environment.provider import client as client_module
-from aerodaas.environment.provider import follower, pauses
+from aerodaas.environment.provider import exchange, follower
 from aerodaas.errors import (
     ConfigError,
     GraphError,
@@ -39,7 +39,7 @@ def _quiet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No terminal view, no plots; recordings go to the test's own folder."""
     current_options.set(RunOptions(view=False, record=tmp_path / "out"))
     monkeypatch.setattr("aerodaas.terminal.console.show_results", lambda *_, **__: None)
-    monkeypatch.setattr(pauses, "_FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(exchange, "_FIRST_PAUSE", 0.01)
 
 
 def hop(*places: tuple[float, float], name: str = "a") -> AeroNavigation:

@@ -10,7 +10,7 @@ import pytest
 from provider_stub import MISSION, Stub, mission
 
 from aerodaas.analytics.wire_items import pack
-from aerodaas.environment.provider import pauses as module
+from aerodaas.environment.provider import exchange as module
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.here import HereLink
