@@ -22,7 +22,7 @@ import psutil
 import ray
 
 from aerodaas.actors.cluster.dead_man import exit_actor, exit_soon
-from aerodaas.actors.cluster.run_lock import RunLock
+from aerodaas.actors.cluster.ray_process import RunLock
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 
 __all__ = ["REAPER", "ApplicationProcess", "OrphanReaperActor", "ReaperHost", "Watched"]

@@ -2,7 +2,7 @@
 
 It is run as a script, needs the standard library only (10 MB), and is in a session of its own, so
 that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. The supervisor ends Ray
-once the application has ended and no run is active: each run holds a lock (`run_lock.py`) for as
+once the application has ended and no run is active: each run holds a `RunLock` for as
 long as its drones may fly and its actors have work. `ray stop` would end all of the user's Rays,
 so the supervisor ends its own child processes instead. On standard output it sends the application
 one line of JSON per message: `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` if it
@@ -26,10 +26,11 @@ import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
-__all__ = ["LOCKS", "PREFIX", "RAY", "VARIABLE", "main"]
+__all__ = ["LOCKS", "PREFIX", "RAY", "VARIABLE", "RunLock", "main"]
 
 VARIABLE = "AERODAAS_LOCAL_RAY"
 """Environment variable of all processes of a local Ray, set to its folder."""
@@ -170,6 +171,27 @@ def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
         return "", f"`ray start` did not end within {_START_SECONDS:.0f} s"
     silent = f"`ray start` ended with code {code} and said nothing"
     return "", "\n".join(said.splitlines()[-_LAST_LINES:]) or silent
+
+
+class RunLock:
+    """Lock of an active run, held once constructed; without effect on a remote cluster.
+
+    It is a POSIX record lock, which child processes do not inherit.
+    """
+
+    def __init__(self) -> None:
+        folder = os.environ.get(VARIABLE)
+        self._path = Path(folder) / LOCKS / uuid.uuid4().hex if folder else None
+        if self._path is not None:
+            self._file = self._path.open("w")
+            fcntl.lockf(self._file, fcntl.LOCK_EX)
+
+    def release(self) -> None:
+        """Release the lock."""
+        if self._path is not None:
+            self._path.unlink(missing_ok=True)
+            self._file.close()
+            self._path = None
 
 
 def _free_ports(count: int) -> list[int]:

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 from aerodaas.actors.base import ActorInfo, NodeActor, NodeMaker
-from aerodaas.actors.cluster.run_lock import RunLock
+from aerodaas.actors.cluster.ray_process import RunLock
 from aerodaas.actors.drone.planner import planner_for
 from aerodaas.actors.node_runner import NodeRunner
 from aerodaas.actors.priority import IdleGarbageCollector, punctual, raise_niceness

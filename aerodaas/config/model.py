@@ -29,8 +29,7 @@ from aerodaas.config.sections.actuators import (
     ServoConfig,
 )
 from aerodaas.config.sections.compute import ComputeConfig, EndpointConfig, RuntimeEnvConfig
-from aerodaas.config.sections.home import HomeConfig
-from aerodaas.config.sections.map_tiles import MapTilesConfig
+from aerodaas.config.sections.place import HomeConfig, MapTilesConfig, TerrainConfig
 from aerodaas.config.sections.preflight import PreflightConfig
 from aerodaas.config.sections.robot import (
     CameraConfig,
@@ -41,7 +40,6 @@ from aerodaas.config.sections.robot import (
     RobotConfig,
     SensorConfig,
 )
-from aerodaas.config.sections.terrain import TerrainConfig
 from aerodaas.identifiers import Identifier, ScopedName
 from aerodaas.text.json_text import check_plain, read_json
 

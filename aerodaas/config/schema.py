@@ -12,7 +12,7 @@ from aerodaas.config import model
 from aerodaas.config.checked import Extensible
 from aerodaas.config.extensions import section_models
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.config.sections import compute, home, preflight, robot, terrain
+from aerodaas.config.sections import compute, place, preflight, robot
 
 __all__ = ["environment_schema"]
 
@@ -36,7 +36,7 @@ def _docstrings() -> dict[str, dict[str, str]]:
     found: dict[str, dict[str, str]] = {}
     sections = Extensible.__subclasses__()
     added = [(one, it) for one in sections for it in section_models(one.section).values()]
-    modules = [home, terrain, preflight, robot, compute, model]
+    modules = [place, preflight, robot, compute, model]
     modules += [sys.modules[it.__module__] for _, it in added]
     sources = map(inspect.getsource, dict.fromkeys(modules))
     for node in (node for source in sources for node in ast.parse(source).body):

@@ -10,7 +10,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcon
 import anyio.to_thread
 from fastapi import APIRouter, FastAPI
 
-from aerodaas.config.sections.map_tiles import MapTilesConfig
+from aerodaas.config.sections.place import MapTilesConfig
 from aerodaas.service.http.gate import Admission, LimitsMiddleware
 from aerodaas.service.http.limits import PROVIDER, RequestLimits
 from aerodaas.service.http.map_archive import archive_routes

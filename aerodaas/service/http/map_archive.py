@@ -12,7 +12,7 @@ from pathlib import Path
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from aerodaas.config.sections.map_tiles import MapTilesConfig
+from aerodaas.config.sections.place import MapTilesConfig
 from aerodaas.errors import ConfigError
 from aerodaas.protocol.scenery import ARCHIVE_PATH
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from aerodaas.config.sections.map_tiles import MapTilesConfig
+from aerodaas.config.sections.place import MapTilesConfig
 
 __all__ = ["PAGE_PATHS", "page_routes"]
 

@@ -1,16 +1,66 @@
-"""Tiles of a map of the Earth, which the console lays below the flight."""
+"""Where the environment lies on the Earth: its home, the map below it, and the ground."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 from urllib.parse import urlsplit
 
 from pydantic import Field, field_validator
 
-from aerodaas.config.checked import Strict
+from aerodaas.config.checked import Finite, Positive, Strict
 
-__all__ = ["MapTilesConfig"]
+if TYPE_CHECKING:
+    from aerodaas.geometry.frames import GeodeticOrigin
+
+__all__ = ["HomeConfig", "MapTilesConfig", "TerrainConfig"]
+
+
+class HomeConfig(Strict):
+    """Where the local ENU frame is pinned on WGS84: degrees and metres."""
+
+    latitude: Annotated[float, Field(ge=-90, le=90)]
+    longitude: Annotated[float, Field(ge=-180, le=180)]
+    altitude: Finite = 0.0
+    """Above the ellipsoid, as GPS counts."""
+    above_sea: Finite | None = None
+    """The same place above mean sea level, for waypoints that are; None: as the vehicle says."""
+
+    @property
+    def origin(self) -> GeodeticOrigin:
+        """The origin of the local ENU frame."""
+        # Reading an environment file needs no numpy.
+        from aerodaas.geometry.frames import GeodeticOrigin  # noqa: PLC0415
+
+        return GeodeticOrigin(self.latitude, self.longitude, self.altitude)
+
+
+class TerrainConfig(Strict):
+    """The ground around home. Drones keep away from it, and never fly where it is not known."""
+
+    files: Annotated[list[str], Field(min_length=1, max_length=400)]
+    """SRTM's `.hgt` or GeoTIFF (EPSG:4326), metres above the sea; they lie where drones are flown
+    from, too."""
+    clearance: Positive = 5.0
+    """Metres kept above the ground in flight, from the end of the take-off to the landing."""
+
+    def check(self, robot: str, takeoff_height: float) -> None:
+        """Refuse a take-off that would end too near to the ground.
+
+        Args:
+            robot: Id of the robot, for the error.
+            takeoff_height: Metres, the robot's `limits.takeoff_height`.
+
+        Raises:
+            ValueError: If it is less than `clearance`.
+        """
+        if takeoff_height < self.clearance:
+            message = (
+                f"{robot}: limits.takeoff_height ({takeoff_height:g} m) must be at least "
+                f"terrain.clearance ({self.clearance:g} m): raise the one or lower the other"
+            )
+            raise ValueError(message)
+
 
 _LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 _PLACES = ("{z}", "{x}", "{y}")
