@@ -506,21 +506,3 @@ def test_a_signed_flight_over_a_wire_with_strangers(flight: Flight, tmp_path: Pa
             attacker.sendto(forged(bytes(32)), (LOOPBACK, ends.port))
         ends.take_off()
         assert ends.vehicle.read().extra["refused_packets"] >= 100
-
-
-def test_forwarding_is_bytes_as_they_are() -> None:
-    """Over a socket, both ways, unread."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-        station.bind((LOOPBACK, 0))
-        station.settimeout(5.0)
-        forwarder = forwarding.Forwarder(
-            f"udpout:{LOOPBACK}:{station.getsockname()[1]}", "a", lambda: True
-        )
-        forwarder.send(b"\xfd anything")
-        content, ours = station.recvfrom(100)
-        assert content == b"\xfd anything"
-        station.sendto(b"back", ours)
-        received: list[bytes] = []
-        wait_for(lambda: bool(received.extend(forwarder.receive(0.0)) or received))
-        assert received == [b"back"]
-        forwarder.close()

@@ -271,22 +271,6 @@ def test_a_port_that_there_is_not_is_no_other_port(kind: str) -> None:
         open_transport(f"{kind}:{HOST}:99999", "a")
 
 
-def test_a_tcp_line_that_is_reset_is_a_cut(clock: SimpleNamespace) -> None:
-    """A peer that ends the hard way raises nothing here."""
-    with socket.create_server((HOST, 0)) as server:
-        server.settimeout(5.0)
-        wire = open_transport(f"tcp:{HOST}:{server.getsockname()[1]}", "a")
-        client = server.accept()[0]
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
-        client.close()
-        assert heard(wire) == []
-        assert wire.fileno() == -1
-        clock.now += 2.0
-        wire.receive()
-        assert wire.fileno() != -1
-        wire.close()
-
-
 def test_a_full_serial_line_gets_whole_packets() -> None:
     """What has no room is dropped whole: half a packet would take the next one with it."""
     master, slave = os.openpty()

@@ -222,18 +222,6 @@ def test_a_transmitter_lost_in_flight_is_told_once(
             assert told == "Remote ID: TX: power lost"
 
 
-def test_a_flight_without_the_transmitter_that_is_configured_is_told_of(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """By a warning before take-off, where that is all that is asked for, and in flight."""
-    with ends_of(monkeypatch, carried=False, preflight={"remote_id": "warn"}) as ends:
-        mission = ends.mission([STOP]).fly()
-        assert mission.state is S.LANDED
-        texts = {alert.text for alert in mission.alerts}
-        assert "Remote ID: no transmitter is heard" in texts
-        assert any(text.startswith("remote_id: no transmitter is heard") for text in texts)
-
-
 def arm_status(status: int, error: bytes = b"", component: int = 236) -> Any:  # noqa: ANN401
     """One word of a transmitter, decoded."""
     codec = mavlink.MAVLink(None, 1, component)
@@ -336,14 +324,3 @@ def test_a_transmitter_does_not_speak_for_the_vehicle(
     assert bench.vehicle.health().objections.get("remote_id") == ""
     assert math.isclose(bench.vehicle.read().extra["silence"], 3.0, abs_tol=0.2)
     bench.close()
-
-
-def test_a_fixed_place_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wherever the drone is."""
-    place = {"latitude": -35.5, "longitude": 149.25, "altitude": 600.0}
-    with ends_of(monkeypatch, remote_id={**WHO, "operator": place}) as ends:
-        ends.watch(3.0)
-        system = ends.autopilot.transmitter.newest["OPEN_DRONE_ID_SYSTEM"]
-        assert system.operator_location_type == mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_FIXED
-        assert (system.operator_latitude, system.operator_longitude) == (-355000000, 1492500000)
-        assert system.operator_altitude_geo == 600.0

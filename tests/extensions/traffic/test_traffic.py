@@ -146,26 +146,6 @@ def test_the_action_is_what_is_demanded(action: Any, demand: FailsafeAction) -> 
     assert fault.text == "traffic: HBXYZ is 60 m away, 30 m above"
 
 
-def test_texts_tell_below_unknown_and_coming() -> None:
-    """As it is."""
-    texts = [
-        one.text
-        for one in near(
-            state(
-                aircraft((0.0, 30.0, -20.0)),
-                aircraft((0.0, 30.0, math.nan), address=2),
-                aircraft((250.0, 0.0, 10.0), (-30.0, 0.0, 0.0), address=3),
-            ),
-            CLOSE,
-        )
-    ]
-    assert texts == [
-        "traffic: HBXYZ is 30 m away, 30 m below",
-        "traffic: HBXYZ is 30 m away, at an unknown height",
-        "traffic: HBXYZ is 250 m away, 0 m above, coming nearer",
-    ]
-
-
 def test_nothing_is_judged_that_is_to_be_ignored_or_from_nowhere() -> None:
     """Without a position of its own, nobody is near; other faults say what to do then."""
     beside = aircraft((10.0, 0.0, 10.0))
@@ -348,16 +328,6 @@ def test_a_return_waits_for_an_aircraft_over_home() -> None:
     flying.run()
     flying.expect(S.LANDED)
     assert float(np.linalg.norm(flying.vehicle.position[:2])) < 0.6
-
-
-def test_a_lost_link_goes_before_traffic() -> None:
-    """The vehicle comes home by itself."""
-    flying = flown(crossing(until=600.0))
-    flying.run(15.0)
-    flying.vehicle.lost = True
-    flying.run(6.0)
-    flying.expect(S.RETURNING)
-    assert "no word" in flying.status.reason
 
 
 @pytest.mark.parametrize(

@@ -164,19 +164,6 @@ def test_the_same_name_twice_is_refused(tmp_path: Path, log: Path) -> None:
     assert path.read_bytes() == old
 
 
-def test_a_link_stays_one(tmp_path: Path, log: Path) -> None:
-    """What it leads to is attached to, with the rights that it had."""
-    path = write_file(tmp_path / "flight.mcap", SAID)
-    path.chmod(0o640)
-    link = tmp_path / "latest.mcap"
-    link.symlink_to(path)
-    attach_file(link, log, *LABELS)
-    assert link.is_symlink()
-    assert path.stat().st_mode & 0o777 == 0o640
-    with Recording.open(path) as opened:
-        assert "logs/one" in opened.attachments
-
-
 def test_a_damaged_attachment_is_told(tmp_path: Path, log: Path) -> None:
     """By its checksum, and by its bound."""
     path = write_file(tmp_path / "flight.mcap", SAID)

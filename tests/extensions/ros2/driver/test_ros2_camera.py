@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from collections.abc import Iterator
@@ -205,31 +204,6 @@ def test_damaged_pictures_alone_are_told(
         opened(camera_of(f"{topics}/image"), publisher, huge),
     ):
         pass
-
-
-def test_a_topic_that_falls_silent_is_told(
-    ros_link: RosLink,
-    topics: str,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    """Once, and once when it is back."""
-    monkeypatch.setattr(module, "_SILENT", 0.2)
-    publisher = ros_link.publisher(f"{topics}/image", types.IMAGE)
-    first = raw(gradient(), "bgr8")
-    with (
-        caplog.at_level(logging.WARNING),
-        opened(camera_of(f"{topics}/image"), publisher, first) as camera,
-    ):
-        next_picture(camera)
-        for _ in range(5):
-            time.sleep(0.1)
-            camera.capture(NOW, None)
-        publisher.publish(raw(gradient(), "bgr8", 2))
-        next_picture(camera)
-    told = [one.getMessage().removeprefix("x3/eye: ") for one in caplog.records]
-    topic = f"{topics}/image"
-    assert told == [f"no picture for 0 s on {topic}", f"there are pictures again on {topic}"]
 
 
 def test_settings_are_checked() -> None:

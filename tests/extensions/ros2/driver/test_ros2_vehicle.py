@@ -250,16 +250,6 @@ def test_a_missing_topic_is_told(ros_link: RosLink, topics: str) -> None:
             vehicle.connect(timeout=0.8)
 
 
-def test_odometry_that_is_refused_is_told(ros_link: RosLink, topics: str) -> None:
-    """With the reason, rather than as missing."""
-    robot = robot_of(topics)
-    vehicle = module.Ros2Vehicle(robot, EnvironmentConfig(robots=[robot]))
-    with RosDrone(ros_link, topics) as drone:
-        drone.spoiled = True
-        with pytest.raises(VehicleError, match="/odometry: odometry refused: a vector of"):
-            vehicle.connect(timeout=0.8)
-
-
 def test_settings_are_checked() -> None:
     """Topics are needed, and need to be names."""
     for wrong in ({"odometry": "/a b"}, {"velocity_frame": "ned"}, {"domain": 233}, {"speed": 1}):
