@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.drivers.mavlink.payload.video_streams import SCHEMES, video_stream
+from aerodaas.drivers.mavlink.payload.camera_status import SCHEMES, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 

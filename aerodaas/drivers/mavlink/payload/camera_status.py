@@ -4,10 +4,51 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from urllib.parse import urlsplit
 
+from aerodaas.config.secrets import shown_text
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 
-__all__ = ["CameraModelTold", "CaptureStatus", "camera_model_told", "capture_status"]
+__all__ = [
+    "SCHEMES",
+    "CameraModelTold",
+    "CaptureStatus",
+    "CardState",
+    "VideoStream",
+    "camera_model_told",
+    "capture_status",
+    "card_state",
+    "video_stream",
+]
+
+_FULL = 64.0
+"""MiB: room for a handful of pictures."""
+_TROUBLES = {
+    mavlink.STORAGE_STATUS_EMPTY: "it has no card",
+    mavlink.STORAGE_STATUS_UNFORMATTED: "its card is not formatted",
+}
+
+
+@dataclass(frozen=True)
+class CardState:
+    """State of a camera's memory card, as the camera tells it."""
+
+    free: float | None
+    """MiB; None where it is not told."""
+    trouble: str = ""
+    """Why it keeps no pictures, or soon will not; empty if it does."""
+
+
+def card_state(message: Message) -> CardState:
+    """Read a STORAGE_INFORMATION, whatever it holds."""
+    status, free = int(message.status), float(message.available_capacity)
+    known = status == mavlink.STORAGE_STATUS_READY and math.isfinite(free) and free >= 0.0
+    room = free if known else None
+    if room is not None and room < _FULL:
+        return CardState(room, f"its card is full: {room:.0f} MiB are left")
+    return CardState(room, _TROUBLES.get(status, ""))
+
 
 _BY_INTERVAL = frozenset({2, 3})
 """CAMERA_CAPTURE_STATUS.image_status: by an interval, idle or just taking one."""
@@ -82,3 +123,65 @@ def _positive(value: float) -> float:
 def _text(characters: list[int]) -> str:
     text = bytes(characters[:_MOST_NAME]).split(b"\0")[0].decode("ascii", "replace")
     return "".join(one if one.isascii() and one.isprintable() else "?" for one in text).strip()
+
+
+SCHEMES = frozenset({"rtsp", "rtsps", "udp", "tcp"})
+"""Schemes of addresses that are read: streams over the network."""
+_MOST_PIXELS = 65_535
+
+
+@dataclass(frozen=True)
+class VideoStream:
+    """One stream of a VIDEO_STREAM_INFORMATION."""
+
+    uri: str
+    """As it was told; it may hold user and password."""
+    name: str
+    width: int
+    height: int
+    rate: float
+    """Pictures a second; 0 where it is not told."""
+    objection: str = ""
+    """Why it is not read; empty if it may be."""
+
+    def __str__(self) -> str:
+        """One line for people, without user, password and parameters."""
+        size = f", {self.width}x{self.height}" if self.width and self.height else ""
+        rate = f", {self.rate:g}/s" if self.rate else ""
+        name = f" ({self.name})" if self.name else ""
+        not_read = f"; not read: {self.objection}" if self.objection else ""
+        return f"{shown_text(self.uri) or 'no address'}{name}{size}{rate}{not_read}"
+
+
+def video_stream(message: Message) -> VideoStream:
+    """Read a VIDEO_STREAM_INFORMATION, whatever it holds."""
+    uri = _printable(str(message.uri))
+    rate = float(message.framerate)
+    return VideoStream(
+        uri,
+        _printable(str(message.name)),
+        min(int(message.resolution_h), _MOST_PIXELS),
+        min(int(message.resolution_v), _MOST_PIXELS),
+        rate if 0.0 < rate < 1e4 else 0.0,  # noqa: PLR2004 - NaN is neither
+        _objection(str(message.uri)),
+    )
+
+
+def _printable(text: str) -> str:
+    return "".join(one if one.isascii() and one.isprintable() else "?" for one in text)
+
+
+def _objection(uri: str) -> str:
+    if not uri:
+        return "it has no address"
+    # FFmpeg has options behind a bar, and playlists of several addresses behind others.
+    if not uri.isascii() or not uri.isprintable() or any(one in uri for one in " |\\\"'<>"):
+        return "its address holds characters that none has"
+    try:
+        parts = urlsplit(uri)
+        host, _ = parts.hostname, parts.port
+    except ValueError:
+        return "its address is none"
+    if parts.scheme not in SCHEMES:
+        return f"only {', '.join(sorted(SCHEMES))} are, not {parts.scheme or 'a bare address'!r}"
+    return "" if host else "its address names no host"

@@ -15,18 +15,23 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     CommandResult,
     PendingCommand,
 )
+from aerodaas.drivers.mavlink.payload.camera import (
+    MavlinkCamera,
+    MavlinkLens,
+    MavlinkRecorder,
+    Moment,
+)
 from aerodaas.drivers.mavlink.payload.camera_status import (
     CameraModelTold,
     CaptureStatus,
+    CardState,
+    VideoStream,
     camera_model_told,
     capture_status,
+    card_state,
+    video_stream,
 )
 from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
-from aerodaas.drivers.mavlink.payload.lens import MavlinkLens
-from aerodaas.drivers.mavlink.payload.photo_camera import MavlinkCamera, Moment
-from aerodaas.drivers.mavlink.payload.storage import CardState, card_state
-from aerodaas.drivers.mavlink.payload.video_recorder import MavlinkRecorder
-from aerodaas.drivers.mavlink.payload.video_streams import VideoStream, video_stream
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.drivers.mavlink.wire.senders import CAMERAS

@@ -11,17 +11,17 @@ import itertools
 import logging
 import math
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import ClassVar
 
 from aerodaas.clock import Clock
 from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.payload.camera import MavlinkCamera
+from aerodaas.drivers.mavlink.payload.camera_status import VideoStream
 from aerodaas.drivers.mavlink.payload.components import PayloadComponent
 from aerodaas.drivers.mavlink.payload.gimbal import MavlinkGimbal
-from aerodaas.drivers.mavlink.payload.photo_camera import MavlinkCamera
-from aerodaas.drivers.mavlink.payload.video_streams import VideoStream
 from aerodaas.drivers.mavlink.wire.link import Message
 from aerodaas.errors import VehicleError
 from aerodaas.geometry.frames import yaw_enu_to_ned
@@ -291,20 +291,22 @@ class _Cameras:
         self._payload = payload
         self._lock = lock
 
-    def take_photo(self, label: str) -> int:
-        """See `PhotoCamera`."""
+    @contextmanager
+    def _used(self) -> Iterator[MavlinkCamera]:
         with self._lock:
             camera = self._payload.used_camera()
             if camera is None:
                 raise VehicleError("no camera answers any more")
+            yield camera
+
+    def take_photo(self, label: str) -> int:
+        """See `PhotoCamera`."""
+        with self._used() as camera:
             return camera.take_photo(label, time.monotonic())
 
     def adjust(self, target: LensTarget) -> None:
         """See `LensCamera`."""
-        with self._lock:
-            camera = self._payload.used_camera()
-            if camera is None:
-                raise VehicleError("no camera answers any more")
+        with self._used() as camera:
             camera.lens.adjust(target, time.monotonic())
 
     @property

@@ -1,6 +1,6 @@
-"""A camera by the camera protocol v2: one picture after the other, each until it is told.
+"""A camera by the camera protocol v2: its pictures, its lens, and video on its own card.
 
-That a picture was taken is told by CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with
+Pictures are taken one after the other, each until it is told. That a picture was taken is told by CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with
 the place that the autopilot had at its exposure. Where that message is lost on the way, the
 camera's own count (CAMERA_CAPTURE_STATUS) tells that it was taken, and no more.
 """
@@ -19,14 +19,184 @@ from aerodaas.drivers.mavlink.microservices.commander import (
     PendingCommand,
 )
 from aerodaas.drivers.mavlink.payload.camera_status import CaptureStatus
-from aerodaas.drivers.mavlink.payload.lens import MavlinkLens
-from aerodaas.drivers.mavlink.payload.video_recorder import MavlinkRecorder
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.errors import VehicleError
 from aerodaas.messages.odometry import Odometry
-from aerodaas.messages.payload import GimbalAttitude, Photo, PhotoFailure, PhotoOutcome, PhotoPlace
+from aerodaas.messages.payload import (
+    GimbalAttitude,
+    LensTarget,
+    Photo,
+    PhotoFailure,
+    PhotoOutcome,
+    PhotoPlace,
+)
 
-__all__ = ["MavlinkCamera", "Moment"]
+__all__ = ["MavlinkCamera", "MavlinkLens", "MavlinkRecorder", "Moment"]
+
+_START, _STOP = mavlink.MAV_CMD_VIDEO_START_CAPTURE, mavlink.MAV_CMD_VIDEO_STOP_CAPTURE
+_SETTLED = 2.0
+"""Seconds that a camera has, after its acknowledgement, until its status is to be so."""
+
+
+class MavlinkRecorder:
+    """The recording of one camera; the caller locks.
+
+    Whether it records is told by its acknowledgements, and by CAMERA_CAPTURE_STATUS, which counts
+    for more: where it says otherwise, that is a fault.
+    """
+
+    def __init__(self, commander: Commander, flags: int) -> None:
+        """Command it by `commander`; `flags` are those of its CAMERA_INFORMATION."""
+        self.fault = ""
+        """Why it refused the last order, or what it says against its own acknowledgement."""
+        self.filming: bool | None = None
+        """Whether it records, by its newest word; None while that is not known."""
+        self._commander = commander
+        self._flags = flags
+        self._now = -math.inf
+        """Second of its newest turn."""
+        self._acknowledged: tuple[bool, float] | None = None
+        """The order that its status is compared with, and the second of its acknowledgement."""
+        self._confirmed = False
+        """Whether its status has agreed."""
+
+    @property
+    def ending(self) -> bool:
+        """Whether it has been told to end, and has not answered."""
+        return self._commander.under_way(_STOP) is not None
+
+    @property
+    def unconfirmed(self) -> bool:
+        """Whether its status has yet to agree with what it has acknowledged."""
+        return self._acknowledged is not None and not self._confirmed
+
+    def step(self, now: float) -> None:
+        """Let time pass."""
+        self._now = now
+
+    def film(self, now: float, *, on: bool) -> None:
+        """Have it begin or end.
+
+        Args:
+            now: Monotonic clock, seconds.
+            on: Whether to record.
+
+        Raises:
+            VehicleError: If the camera says that it cannot.
+        """
+        if self._flags and not self._flags & mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO:
+            raise VehicleError("the camera records no video")
+        if self.filming is on and not self.fault:
+            # By a word that may be old: the next one is compared with it.
+            self._expect(now, on=on)
+            return
+        before, self.filming, self.fault = self.filming, None, ""
+        self._acknowledged = None
+
+        def done(outcome: CommandResult) -> None:
+            if outcome.replaced:
+                return
+            if outcome.accepted:
+                self.filming = on
+                self._expect(self._now, on=on)
+            elif outcome.text != "no answer":
+                self.filming, self.fault = before, outcome.text
+
+        # A beginning that is repeated after the end would record on.
+        self._commander.withdraw(_STOP if on else _START)
+        number, what = (_START, "record video") if on else (_STOP, "end the video")
+        self._commander.give(PendingCommand(number, (0.0,) * 7, what), done, now=now)
+
+    def _expect(self, now: float, *, on: bool) -> None:
+        self._acknowledged, self._confirmed = (on, now), False
+
+    def heed(self, status: CaptureStatus, now: float) -> None:
+        """Compare with what the camera says that it does.
+
+        Args:
+            status: Activity of the camera.
+            now: Monotonic clock, seconds.
+        """
+        if any(self._commander.under_way(number) is not None for number in (_START, _STOP)):
+            return
+        records = status.recording is not None
+        if self._acknowledged is None:
+            self.filming = records
+            return
+        on, since = self._acknowledged
+        if records is on:
+            self.filming, self._confirmed = records, True
+            if not on:
+                # What it records from now on is somebody else's.
+                self._acknowledged = None
+        elif now - since >= _SETTLED:
+            self.filming, self._acknowledged = records, None
+            doing = "still recording" if records else "not recording"
+            self.fault = f"the camera says that it is {doing}"
+
+    def give_up(self) -> None:
+        """Give up what a camera that is gone has not answered, and know nothing of it."""
+        for number in (_START, _STOP):
+            self._commander.withdraw(number)
+        self.filming = None
+
+
+class MavlinkLens:
+    """The lens of one camera; the caller locks."""
+
+    def __init__(self, commander: Commander, flags: int) -> None:
+        """Command it by `commander`; `flags` are those of its CAMERA_INFORMATION."""
+        self.fault = ""
+        """Why it did not take the last target, in a few words."""
+        self._commander = commander
+        self._flags = flags
+        self._open: set[int] = set()
+        """Commands that are not answered."""
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether the last target was acknowledged."""
+        return not self._open and not self.fault
+
+    def adjust(self, target: LensTarget, now: float) -> None:
+        """Have the lens set.
+
+        Args:
+            target: Zoom and focus; None leaves one as it is.
+            now: Monotonic clock, seconds.
+
+        Raises:
+            VehicleError: If the camera says that it has not what is asked.
+        """
+        zooms = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM
+        focuses = self._flags & mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS
+        if self._flags and target.zoom is not None and not zooms:
+            raise VehicleError("the camera has no zoom")
+        if self._flags and target.focus is not None and not focuses:
+            raise VehicleError("the focus of the camera cannot be set")
+        self.fault = ""
+        if target.zoom is not None:
+            kind = float(mavlink.ZOOM_TYPE_RANGE)
+            self._command(mavlink.MAV_CMD_SET_CAMERA_ZOOM, kind, target.zoom, "zoom", now)
+        if target.focus is not None:
+            kind = float(mavlink.FOCUS_TYPE_RANGE)
+            self._command(mavlink.MAV_CMD_SET_CAMERA_FOCUS, kind, target.focus, "focus", now)
+
+    def _command(self, number: int, kind: float, value: float, what: str, now: float) -> None:
+        def done(outcome: CommandResult) -> None:
+            if outcome.replaced:
+                return
+            self._open.discard(number)
+            if not outcome.accepted:
+                self.fault = f"{what}: {outcome.text}"
+
+        # A command that replaces another one of its number ends that one first.
+        self._commander.give(
+            PendingCommand(number, (kind, value, *[0.0] * 5), f"set the {what}"), done, now=now
+        )
+        self._open.add(number)
+
 
 Moment: TypeAlias = Callable[[], tuple[int, Odometry | None, GimbalAttitude | None]]
 """Mission clock, vehicle and gimbal now."""
