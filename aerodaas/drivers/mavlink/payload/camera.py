@@ -1,8 +1,9 @@
 """A camera by the camera protocol v2: its pictures, its lens, and video on its own card.
 
-Pictures are taken one after the other, each until it is told. That a picture was taken is told by CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with
-the place that the autopilot had at its exposure. Where that message is lost on the way, the
-camera's own count (CAMERA_CAPTURE_STATUS) tells that it was taken, and no more.
+Pictures are taken one after the other, each until it is told. That one was taken is told by
+CAMERA_IMAGE_CAPTURED, or by ArduPilot's CAMERA_FEEDBACK, with the place that the autopilot had at
+its exposure. Where that message is lost on the way, the camera's own count
+(CAMERA_CAPTURE_STATUS) tells that it was taken, and no more.
 """
 
 from __future__ import annotations
